@@ -5,7 +5,7 @@ the same code; they differ in the `Method` that is handed over.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeGuard, TypeVar, cast
 
@@ -16,7 +16,7 @@ from codegen.arrays import Array
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.setup import AXLE_FORCE, HALF_BAND, Block, Port, Setup
-from identifier.tire_model import Axle, TireModel
+from identifier.tire_model import Reached, TireModel
 from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -74,20 +74,6 @@ class Track(NamedTuple):
     title: str
     unit: str
     values: Array
-
-
-class Reached(NamedTuple):
-    """A learnt number at its bound: of which axle (None: the car), what, how much, what that means.
-
-    refuses : whether an answer that rests on it is not valid.
-    """
-
-    axle: Axle | None
-    title: str
-    value: float
-    unit: str
-    meaning: str
-    refuses: bool
 
 
 class Run(Protocol):
@@ -154,6 +140,33 @@ class Method(ABC):
     def remark(self) -> str:
         """What a table of methods must say of it beside its name; empty: nothing."""
         return ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether it learns from a whole log at once, by `fitted`, and has no step."""
+        return False
+
+    def fitted(
+        self,
+        recording: Recording,
+        vehicle: Vehicle,
+        start: TireModel | None = None,
+        *,
+        progress: Callable[[float], None] | None = None,
+    ) -> TireModel:
+        """Return the tires that a whole log taught: of a method that is `whole`.
+
+        Parameters
+        ----------
+        progress : called now and then with the share that is done, 0 to 1.
+
+        Raises
+        ------
+        CannotFreezeError
+            For a method that learns sample by sample.
+        """
+        del recording, vehicle, start, progress
+        raise CannotFreezeError("it learns sample by sample")
 
     def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.

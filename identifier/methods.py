@@ -23,6 +23,7 @@ from identifier.baselines import (
 )
 from identifier.certificate import Certificate
 from identifier.driving import Driving
+from identifier.estimate.method import FitMethod
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
@@ -33,7 +34,8 @@ from models.vehicle import Vehicle
 
 Factory = Callable[[Vehicle, int], Method]
 REGRESSIONS = ("kreisselmeier", "kreisselmeier_newton", "rls", "concurrent")
-DEFAULT = "axle"
+DEFAULT = "fit"  # on logs
+LIVE = "axle"  # the default in a car, sample by sample
 WITHOUT_V_Y = "inertial"  # the default where a log has no lateral velocity
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
@@ -55,7 +57,8 @@ def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
 
 
 METHODS: Mapping[str, Factory] = {
-    DEFAULT: _seedless(AxleIdentifier.for_vehicle),
+    DEFAULT: _seedless(FitMethod.for_vehicle),
+    LIVE: _seedless(AxleIdentifier.for_vehicle),
     WITHOUT_V_Y: _seedless(InertialIdentifier.for_vehicle),
     **{law: _regression(law) for law in REGRESSIONS},
     **{law: _paper(law) for law in VARIANTS},

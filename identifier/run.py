@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -79,6 +79,8 @@ class History:
     state: Mapping[str, Array]
     outputs: Mapping[str, Array]
     start: TireModel | None = None
+    models: dict[int, TireModel] = field(default_factory=dict)
+    """Of a method that learns from whole logs: the model by number of samples that taught it."""
 
     @property
     def diverged_at(self) -> float | None:
@@ -169,6 +171,12 @@ class History:
             Where the recording begins after that time.
         """
         t = float(self.recording.t[-1]) if t is None else t
+        if self.design.whole:
+            n = max(state_index(self.recording, t), 1)
+            if n not in self.models:
+                driven = self.recording.taken(slice(0, n))
+                self.models[n] = self.design.fitted(driven, self.vehicle, self.start)
+            return self.models[n]
         state = self.state_at(t)
         diverged_at = self.diverged_at
         if diverged_at is not None and diverged_at <= t:
@@ -196,7 +204,7 @@ class History:
         """
         from identifier.verdict import calibrated
 
-        return calibrated(self, t)
+        return self.freeze(t) if self.design.whole else calibrated(self, t)
 
     def guaranteed(
         self,
@@ -339,6 +347,18 @@ def identify(
     """
     recording = recording.as_logged()
     check_recording(recording, design)
+    if design.whole:
+        model = design.fitted(recording, vehicle, start, progress=progress)
+        return History(
+            vehicle=vehicle,
+            design=design,
+            recording=recording,
+            axle_force=model.axle_force(recording),
+            state={},
+            outputs={},
+            start=start,
+            models={len(recording): model},
+        )
     setup = design.setup(vehicle, start)
     v_y = None if recording.v_y is not None else large((len(recording),))
     force, begins = large((len(recording), 2)), []
@@ -404,6 +424,8 @@ def learn(
     recording = recording.as_logged()
     check_recording(recording, design)
     n = len(recording) if t is None else state_index(recording, t)
+    if design.whole:
+        return design.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start)
     state = design.setup(vehicle, start).last(recording, n)
     if not all(np.isfinite(value).all() for value in state.values()):
         raise DivergedError(f"the law diverged within {n} samples")

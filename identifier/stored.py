@@ -7,6 +7,7 @@ from pathlib import Path
 from codegen.escape import shown
 from identifier.axle.model import AxleModel
 from identifier.baselines.curves import CurveModel
+from identifier.estimate.model import FittedModel
 from identifier.frozen import FORMAT, FrozenModelError, require_alive
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
@@ -14,7 +15,7 @@ from identifier.tire_model import TireModel
 from models.schema import Table, read_json
 
 MODELS: Mapping[str, type[TireModel]] = {
-    model.kind: model for model in (NetworkModel, AxleModel, CurveModel, OnnxModel)
+    model.kind: model for model in (NetworkModel, AxleModel, CurveModel, OnnxModel, FittedModel)
 }
 
 

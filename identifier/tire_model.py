@@ -74,6 +74,20 @@ class Estimate(NamedTuple):
     learnt: bool
 
 
+class Reached(NamedTuple):
+    """A learnt number at its bound: of which axle (None: the car), what, how much, what that means.
+
+    refuses : whether an answer that rests on it is not valid.
+    """
+
+    axle: Axle | None
+    title: str
+    value: float
+    unit: str
+    meaning: str
+    refuses: bool
+
+
 class TireModel(ABC):
     """Axle forces from weights that no longer change: the front and the rear tires of one car."""
 
@@ -278,6 +292,15 @@ class TireModel(ABC):
     def known_slip(self) -> Array | None:
         """Slip [rad] up to which the forces were learnt, (2,); None where the model cannot tell."""
         return None
+
+    @property
+    def known_speeds(self) -> Array | None:
+        """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
+        return None
+
+    def at_bounds(self) -> "tuple[Reached, ...]":
+        """Return the learnt numbers that rest at their bounds."""
+        return ()
 
     def relative_sd(self, alpha: Array) -> Array | None:
         """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.

@@ -3,8 +3,8 @@
 import logging
 from collections.abc import Callable
 
-from identifier.axle import AxleIdentifier
 from identifier.doctor import diagnose
+from identifier.estimate.method import FitMethod
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
@@ -43,7 +43,7 @@ def identify(
     ----------
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
-    method : the identifier; None takes `AxleIdentifier.for_vehicle` at the recording's interval, or
+    method : the identifier; None takes `FitMethod.for_vehicle` at the recording's interval, or
         `InertialIdentifier.for_vehicle`, which estimates v_y, where the recording has none.
     start : model to go on learning from; None begins afresh.
     check : whether what this vehicle cannot have driven is refused, and the doctor asked.
@@ -66,7 +66,7 @@ def identify(
     require_kind(Vehicle, VEHICLE, vehicle=vehicle)
     if method is not None:
         require_kind(Method, METHOD, method=method)
-    usual = InertialIdentifier if recording.logged_v_y is None else AxleIdentifier
+    usual = InertialIdentifier if recording.logged_v_y is None else FitMethod
     design = usual.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
         check_against_vehicle(recording, vehicle)

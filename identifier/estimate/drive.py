@@ -45,23 +45,20 @@ class Drive:
     counts: NDArray[np.bool_]
     every: int
 
-    @staticmethod
-    def slowest(vehicle: Vehicle) -> float:
-        """Return the speed [m/s] below which samples do not count."""
-        return SLOW * vehicle.froude_speed
-
     @classmethod
     def of(
-        cls, recording: Recording, vehicle: Vehicle, part: slice = ALL, *, thin: bool = True
+        cls, recording: Recording, vehicle: Vehicle, part: slice = ALL, *, replay: bool = False
     ) -> "Drive":
         """Return a recording with a v_y as the estimate reads it.
 
         Parameters
         ----------
         part : samples that are read.
-        thin : whether samples that come faster than 100 Hz are averaged.
+        replay : whether each sample is asked about, down to the lowest speed; else those that
+            come faster than 100 Hz are averaged, and slow ones do not count.
         """
-        every = max(1, round(FASTEST / recording.dt)) if thin else 1
+        every = 1 if replay else max(1, round(FASTEST / recording.dt))
+        slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
         within = [
@@ -70,7 +67,7 @@ class Drive:
             if one.start < end and one.stop > begin
         ]
         pieces = [
-            _piece(recording, one, vehicle, every, dt)
+            _piece(recording, one, vehicle, every, dt, slowest)
             for one in within
             if one.stop - one.start >= every
         ]
@@ -79,7 +76,7 @@ class Drive:
 
 
 def _piece(
-    recording: Recording, piece: slice, vehicle: Vehicle, every: int, dt: float
+    recording: Recording, piece: slice, vehicle: Vehicle, every: int, dt: float, slowest: float
 ) -> tuple[Array, Array]:
     """Return signals and rates of a stretch; its first sample does not count."""
     v_y = recording.needed("v_y")
@@ -96,7 +93,6 @@ def _piece(
     count = round(SMOOTHED * scale / dt) | 1
     raw = (recording.v_x, v_y, recording.r, recording.delta_f, recording.delta_r)
     v_x, v_y, r, delta_f, delta_r = (box(thinned(signal), count) for signal in raw)
-    slowest = Drive.slowest(vehicle)
     on = v_x > slowest
     v_x = np.where(on, v_x, slowest)
     n3 = LONGITUDINAL / dt

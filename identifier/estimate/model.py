@@ -30,6 +30,7 @@ from identifier.tire_model import (
     Axle,
     Estimate,
     Fact,
+    Reached,
     TireModel,
 )
 from models.recordings import Recording
@@ -42,6 +43,7 @@ WIDEST = 0.6  # rad, as far as it is fitted
 BEYOND = 0.02  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
+BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LARGEST = 1e6  # of the numbers in a file
 
@@ -100,7 +102,7 @@ class FittedModel(TireModel):
     @property
     def min_speed(self) -> float:
         """Below this speed [m/s] the forces read zero."""
-        return Drive.slowest(self.vehicle)
+        return self.vehicle.lowest_speed
 
     @property
     def _loads(self) -> Array:
@@ -252,7 +254,7 @@ class FittedModel(TireModel):
             for part in blocks(end - begin):
                 first = max(part.start - WARM, 0)
                 some = slice(begin + first, begin + part.stop)
-                drive = Drive.of(recording, self.vehicle, some, thin=False)
+                drive = Drive.of(recording, self.vehicle, some, replay=True)
                 out = simulate(drive, self.p, self.vehicle)
                 kept = slice(begin + part.start, begin + part.stop)
                 force[kept] = out["force"][part.start - first :]
@@ -263,6 +265,31 @@ class FittedModel(TireModel):
         """Return the slope of the force curves over the slip of a drive [static loads/rad]."""
         _, slope, _ = self.curve_at(self.lagged_slip(recording))
         return slope * self.vehicle.load_ratio(recording.v_x)
+
+    @property
+    def known_speeds(self) -> Array:
+        """Least and largest speed [m/s] of the drives that taught, (2,)."""
+        return self.speeds
+
+    def at_bounds(self) -> tuple[Reached, ...]:
+        """Return the numbers of the tires that rest at the bounds of what tires have."""
+        priors, listed = Priors.of(self.vehicle), []
+        for i, axle in enumerate(AXLES):
+            for name, title, refuses in BOUNDED:
+                k = INDEX[f"{name}_{'fr'[i]}"]
+                if priors.low[k] + 1e-6 < self.p[k] < priors.high[k] - 1e-6:
+                    continue
+                listed.append(
+                    Reached(
+                        axle,
+                        title,
+                        float(np.exp(self.p[k])),
+                        "static loads" if name == "ln_grip" else "static loads per rad",
+                        "beyond what tires have: check signs, units and the vehicle file",
+                        refuses,
+                    )
+                )
+        return tuple(listed)
 
     def outside(self, recording: Recording) -> NDArray[np.bool_]:
         """Return where the slip leaves the known range, (n, 2)."""

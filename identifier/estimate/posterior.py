@@ -44,6 +44,13 @@ class Posterior:
         inverse: Array = np.linalg.inv(self.information)
         return inverse
 
+    @property
+    def whole_covariance(self) -> Array:
+        """Covariance of all parameters, zero of those that did not move (p, p)."""
+        found = np.zeros((len(self.p), len(self.p)))
+        found[np.ix_(self.index, self.index)] = self.covariance
+        return found
+
     def sd(self, name: str) -> float:
         """Return the standard deviation of a parameter; 0 where it did not move."""
         found = np.flatnonzero(self.index == INDEX[name])

@@ -1,43 +1,77 @@
-"""Judging a run, and a model that is asked about a drive."""
+"""Judging a model by the motion: the share of the axle forces that it misses of a drive.
+
+A drive that did not teach the model is the judge proper. Of its own drive the share says less, so
+that it counts there together with what the drive left undecided.
+"""
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle import AxleIdentifier
-from identifier.method import Method
-from identifier.reproducibility import motion_error
-from identifier.run import History, identify
-from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
-from identifier.verdict.causes import CAUSES, OF_ROAD, Ask, Cause, Mended, Suspect, suspects
+from identifier.estimate.drive import Drive
+from identifier.reproducibility import beyond_known, motion_error
+from identifier.run import History, state_index
+from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Reached, TireModel
 from identifier.verdict.friction import RoadFriction, road_friction
-from identifier.verdict.motion import (
-    FEWEST,
-    WINDOW,
-    Evidence,
-    Windows,
-    clean_share,
-    evidence,
-    measured_force,
-    modelled_force,
-    noise_variance,
-)
-from identifier.verdict.parts import asked_run, taught_elsewhere, without_v_y
-from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings, is_off_center
+from identifier.verdict.motion import FEWEST, WINDOW, Evidence, evidence, lateral_noise
 from identifier.verdict.verdict import WITHOUT_V_Y, Number, Objection, Verdict
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
-STRETCH = 0.3  # share of the windows that may be missed in one piece
-REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
-CONFINED = 0.6  # and of what is missed with the piece
-ROADS = 3  # stretches of another friction that are told one by one
-TINY = 1e-9  # of a force, squared [static axle loads²]
-GEOMETRY, PRESS = "center_of_gravity", "downforce"
+PERCENT = 100.0
+ROADS = 3  # segments of another friction that are listed one by one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rules:
+    """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
+
+    Parameters
+    ----------
+    missed : share of the force, rms, that a model may miss at an axle of a drive that it is asked
+        about [-].
+    missed_own : the same of the drive that taught it [-].
+    force : below which there is no force to judge by [static axle loads].
+    doubt : standard deviation of the curve over the prior's, where the force is [-].
+    stiffness : that tires have, over the static load [1/rad].
+    beyond : share of the samples beyond the known slip, from which it is noted [-].
+    rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
+    """
+
+    missed: float = 0.12
+    missed_own: float = 0.12
+    force: float = 0.1
+    doubt: float = 0.5
+    stiffness: tuple[float, float] = (2.0, 100.0)
+    beyond: float = 0.01
+    rolling: tuple[float, float] = (0.85, 1.25)
+
+
+RULES = Rules()
+
+
+class Asked(NamedTuple):
+    """A model and a drive: what of it is asked, what the model explains, whether it learnt there."""
+
+    model: TireModel
+    portion: Portion
+    found: Evidence
+    own: bool
+
+    @property
+    def recording(self) -> Recording:
+        """What is asked of the drive."""
+        return self.portion.recording
+
+    @property
+    def forceless(self) -> list[bool]:
+        """Which axles have no force to judge by."""
+        return [bool(peak < RULES.force) for peak in self.found.peak]
 
 
 def judge(history: History, t: float | None = None) -> Verdict:
@@ -55,35 +89,14 @@ def judge(history: History, t: float | None = None) -> Verdict:
     CannotFreezeError
         Where the method estimates a signal, not a model.
     """
-    run = asked_run(history, t)
-    model, asked, whole, road = run.model, run.portion, history.recording, run.road
-
-    def taught(mended: Mended) -> TireModel:
-        return run.taught(mended.recording, mended.vehicle)
-
-    drive = _looked_at(taught, model, asked, whole.t, road)
-    if drive is None:
+    model, whole = history.freeze(t), history.recording
+    end = float(whole.t[-1]) if t is None else t
+    asked = _asked(model, whole, own=True, frozen=state_index(whole, end))
+    if asked is None:
         return _too_short(model)
-    drive = drive._replace(
-        center=(
-            None if drive.notes or without_v_y(asked) else _suspect(GEOMETRY, drive, taught, road)
-        ),
-        elsewhere=_elsewhere(taught, drive, history.vehicle),
-        apart=_apart(history.axle_force[asked.samples], history.vehicle, drive.found),
-        learns=True,
-    )
-    if is_off_center(drive):
-        drive = drive._replace(pressed=_suspect(PRESS, drive, taught, road))
-    reached = [
-        Objection(
-            "at_bound",
-            one.axle,
-            f"the {one.title} rests at its bound, {one.value:.3g} {one.unit}: {one.meaning}",
-            one.refuses,
-        )
-        for one in history.design.reached(history.vehicle, history.state_at(run.end))
-    ]
-    return _verdict(drive, [*findings(drive), *reached, *_asked_of(asked, whole)])
+    state = {} if history.design.whole else history.state_at(end)
+    reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
+    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached)], whole)
 
 
 def judge_prediction(
@@ -96,145 +109,187 @@ def judge_prediction(
     model : that learns nothing from it.
     recording : the drive.
     another_road : whether the road may be another one than that which taught, and its friction is
-        told; of a drive that taught the model it is not.
+        reported; of a drive that taught the model it is not.
     """
-
-    def mounted(mended: Mended) -> TireModel:
-        tires = model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
-        return tires if mended.friction == 1.0 else tires.at_friction(mended.friction)
-
-    asked = portion(recording)
-    road = _road_driven(asked.recording, model.vehicle)
-    # Downforce changes the curve that is learnt: of one that is not learnt anew it is friction.
-    of_drive = tuple(one for one in CAUSES if one.code != PRESS)
-    causes = (*of_drive, OF_ROAD) if another_road else of_drive
-    drive = _looked_at(mounted, model, asked, recording.t, road, causes)
-    if drive is None:
+    asked = _asked(model, recording, own=False)
+    if asked is None:
         return _too_short(model)
+    road = _road(asked.recording, model.vehicle)
     friction = road_friction(model, recording, road) if another_road else None
-    listed = [*findings(drive), *_roads(friction), *_asked_of(asked, recording)]
-    return replace(_verdict(drive, listed), friction=friction)
+    verdict = _verdict(asked, [*_findings(asked), *_roads(friction)], recording)
+    return replace(verdict, friction=friction)
+
+
+def _asked(
+    model: TireModel, recording: Recording, *, own: bool, frozen: int | None = None
+) -> Asked | None:
+    """Return what is judged; None where too little is driven."""
+    part = portion(recording) if frozen is None else portion(recording, frozen)
+    found = evidence(model, part.recording, _road(part.recording, model.vehicle))
+    return None if found is None else Asked(model, part, found, own)
+
+
+def _road(recording: Recording, vehicle: Vehicle) -> Array | None:
+    """Return what a banked road pushes to the left, by the accelerometer (n,) [weights]."""
+    if recording.a_y is None or recording.logged_v_y is None:
+        return None
+    bank: Array = Drive.of(recording, vehicle, replay=True).signals[:, 6] / GRAVITY
+    return bank
+
+
+def _findings(asked: Asked) -> list[Objection]:
+    rules = (_v_y_stuck, _no_force, _missed, _unsure, _no_tire, _beyond, _turning)
+    return [finding for rule in rules for finding in rule(asked)]
+
+
+def _v_y_stuck(asked: Asked) -> Iterator[Objection]:
+    recording, brisk = asked.recording, asked.found.windows.starts
+    v_y = recording.logged_v_y
+    if v_y is None:
+        return
+    turns = float(np.std(recording.r[brisk] * recording.v_x[brisk])) > RULES.force * GRAVITY
+    if turns and not float(np.ptp(v_y[brisk])) > 0.0:
+        text = "v_y never changes while the car turns: it was not measured"
+        yield Objection("v_y_stuck", None, text, True)
+
+
+def _no_force(asked: Asked) -> Iterator[Objection]:
+    forceless = asked.forceless
+    hidden = np.sqrt(asked.found.noise) > RULES.force
+    for axle, peak, none, noisy in zip(AXLES, asked.found.peak, forceless, hidden, strict=True):
+        if not none:
+            continue
+        if noisy:
+            advice = "noise of v_y and yaw rate hides it: repair the sensors"
+        elif asked.own:
+            advice = "its numbers are default values; drive a slalom"
+        else:
+            advice = "this drive cannot judge the model"
+        yield Objection(
+            "no_force",
+            axle,
+            f"lateral force reaches {peak:.2g} of the static load, {RULES.force:g} are needed: "
+            f"{advice}",
+            asked.own or all(forceless),
+        )
+
+
+def _missed(asked: Asked) -> Iterator[Objection]:
+    limit = RULES.missed_own if asked.own else RULES.missed
+    for axle, missed, none in zip(AXLES, asked.found.missed, asked.forceless, strict=True):
+        if not (missed <= limit or none):
+            yield Objection(
+                "force_missed",
+                axle,
+                f"model error {PERCENT * missed:.0f} % of the force in the motion (limit "
+                f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause",
+                True,
+            )
+
+
+def _unsure(asked: Asked) -> Iterator[Objection]:
+    if not asked.own:
+        return
+    car, windows = asked.model.vehicle, asked.found.windows
+    slip = np.abs(windows.mean(np.asarray(asked.recording.alpha(car.l_f, car.l_r))))
+    for i, axle in enumerate(AXLES):
+        doubt = asked.model.relative_sd(np.maximum(slip[:, i], 1e-4))
+        if doubt is None:
+            return
+        power = asked.found.measured[:, i] ** 2
+        mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
+        if not (mean <= RULES.doubt or asked.forceless[i]):
+            yield Objection(
+                "prior",
+                axle,
+                f"the drive reduced the uncertainty of the curve to {PERCENT * mean:.0f} % of the "
+                f"prior's (limit {PERCENT * RULES.doubt:.0f} %): drive longer",
+                True,
+            )
+
+
+def _no_tire(asked: Asked) -> Iterator[Objection]:
+    loads, stiffness = np.array(asked.model.vehicle.axle_loads), asked.model.stiffness
+    least, most = RULES.stiffness
+    for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
+        if not least <= each <= most:
+            yield Objection(
+                "no_tire",
+                axle,
+                f"cornering stiffness {C / 1e3:.3g} kN/rad is {each:.2g} static loads per rad, "
+                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file",
+                True,
+            )
+
+
+def _beyond(asked: Asked) -> Iterator[Objection]:
+    beyond, known = beyond_known(asked.model, asked.recording), asked.model.known_slip
+    if beyond is None or known is None or asked.own:
+        return
+    for axle, share, slip in zip(AXLES, beyond, known, strict=True):
+        if share > RULES.beyond:
+            yield Objection(
+                "beyond_known",
+                axle,
+                f"{PERCENT * share:.0f} % of the samples exceed the identified slip range "
+                f"({np.degrees(slip):.1f} deg); there the curve is extrapolated",
+                False,
+            )
+
+
+def _turning(asked: Asked) -> Iterator[Objection]:
+    """Judge an estimated v_y by the accelerometer; means tell of bank and offset, and are left."""
+    recording, windows = asked.recording, asked.found.windows
+    if recording.logged_v_y is not None or recording.v_y is None or recording.a_y is None:
+        return
+    felt = windows.mean(recording.a_y)
+    motion = windows.rate(recording.v_y) + windows.mean(recording.v_x * recording.r)
+    felt, motion = felt - felt.mean(), motion - motion.mean()
+    power = float(np.mean(motion**2)) - lateral_noise(recording, windows)[0]
+    if not power > (RULES.force * GRAVITY) ** 2:
+        return
+    slope, (least, most) = float(np.mean(felt * motion)) / power, RULES.rolling
+    if not least <= slope <= most:
+        yield Objection(
+            "a_y_disagrees",
+            None,
+            f"the recorded a_y is {slope:.2g} times what v_x, r and the estimated v_y give "
+            f"({least:g} to {most:g} are usual): check the scales of v_x, r and a_y, and delays",
+            True,
+        )
+
+
+def _at_bound(one: Reached) -> Objection:
+    text = f"{one.title} is at its bound, {one.value:.3g} {one.unit}: {one.meaning}"
+    return Objection("at_bound", one.axle, text, one.refuses)
 
 
 def _roads(found: RoadFriction | None) -> list[Objection]:
-    """Return a note for each of the first stretches on another road than that which taught."""
+    """Return a note for each of the first segments on another road than that which taught."""
     roads = () if found is None else found.roads
     listed = [Objection("another_road", None, one.text, False) for one in roads[:ROADS]]
     if len(roads) > ROADS:
-        more = f"and {len(roads) - ROADS} more stretches of another friction"
+        more = f"and {len(roads) - ROADS} more segments of another friction"
         listed.append(Objection("another_road", None, more, False))
     return listed
 
 
-def _asked_of(asked: Portion, whole: Recording) -> list[Objection]:
-    """Return a note where only a portion of a drive was asked."""
-    if len(asked.recording) == len(whole):
-        return []
-    minutes = len(asked.recording) * whole.dt / 60.0, whole.duration / 60.0
-    return [
-        Objection(
-            "portion",
-            None,
-            "judged by {:.3g} of its {:.3g} minutes: of each part of the drive those in which the "
-            "car was turned hardest".format(*minutes),
-            False,
-        )
-    ]
-
-
-def _road_driven(recording: Recording, vehicle: Vehicle) -> Array | None:
-    """Return what the default takes a banked road to push, by the accelerometer (n,) [weights]."""
-    if recording.a_y is None or recording.logged_v_y is None:
-        return None
-    design: Method = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt)
-    return design.road_push(identify(recording, vehicle, design).state)
-
-
-Tires = Callable[[Mended], TireModel]  # of a car and a drive that a fault was taken out of
-
-
-def _looked_at(
-    tires: Tires,
-    model: TireModel,
-    asked: Portion,
-    clock: Array,
-    road: Array | None,
-    causes: Iterable[Cause] = CAUSES,
-) -> Drive | None:
-    """Return what the rules look at; None where too little is driven.
-
-    One stretch may be missed, as before a sensor has settled, where all the rest is explained: it
-    is left out, and noted.
-    """
-    recording = asked.recording
-    found = evidence(model, recording, road)
-    notes: tuple[Objection, ...] = ()
-    if found is None:
-        return None
-    if not (found.missed <= REST_MISSED).all():
-        first, last = found.worst_stretch(STRETCH)
-        rest = found.without(first, last)
-        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * found.missed.max())).all()
-        if len(rest.windows) >= FEWEST and confined:
-            notes = (_stretch(found, rest, clock[asked.samples], first, last),)
-            found = rest
-    listed: tuple[Suspect, ...] = ()
-    if not ((found.missed <= MOST_MISSED).all() or without_v_y(asked)):
-        listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle, causes)
-    return Drive(model=model, recording=recording, found=found, suspects=listed, notes=notes)
-
-
-def _suspect(code: str, drive: Drive, tires: Tires, road: Array | None) -> Suspect:
-    """Return a cause of that code with the size that would explain most."""
-    ask = _ask(tires, drive.found.windows, road)
-    causes = [one for one in CAUSES if one.code == code]
-    listed = drive.suspects or suspects(ask, drive.recording, drive.model.vehicle, causes)
-    return next(one for one in listed if one.cause.code == code)
-
-
-def _stretch(found: Evidence, rest: Evidence, t: Array, first: int, last: int) -> Objection:
-    starts = found.windows.starts
-    begin, end = t[starts[first]], t[starts[last - 1] + found.windows.n]
-    return Objection(
-        "stretch",
-        None,
-        f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere all but "
-        f"{PERCENT * float(rest.missed.max()):.0f} % of the force is: a sensor that had not "
-        "settled, or a banked or slippery stretch",
-        False,
-    )
-
-
-def _ask(tires: Tires, windows: Windows, road: Array | None) -> Ask:
-    """Return what asks for the share of the force, of both axles, missed of a mended drive."""
-
-    def ask(mended: Mended) -> float:
-        recording, model = mended.recording, tires(mended)
-        force = measured_force(recording, model.vehicle, windows, road) - mended.road
-        away = force - modelled_force(model, recording, windows)
-        noise = noise_variance(recording, model.vehicle, windows)
-        power = np.mean(force**2, axis=0)
-        return float(np.mean((np.mean(away**2, axis=0) - noise) / np.maximum(power, TINY)))
-
-    return ask
-
-
-def _verdict(drive: Drive, listed: list[Objection]) -> Verdict:
+def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict:
     """Return the verdict of what was found."""
+    model, recording, found = asked.model, asked.recording, asked.found
+    if len(recording) < len(whole):
+        minutes = len(recording) * whole.dt / 60.0, whole.duration / 60.0
+        text = "judged by {:.3g} of {:.3g} minutes: those with the hardest cornering of each part"
+        listed.append(Objection("portion", None, text.format(*minutes), False))
     listed.sort(key=lambda finding: not finding.refuses)
-    found, model, recording = drive.found, drive.model, drive.recording
     motion = motion_error(
         model.axle_force(recording), recording, model.vehicle, recording.v_x >= model.min_speed
     )
     lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
         "force_missed": _pair(found.missed),
-        "force_missed_elsewhere": _pair(drive.elsewhere),
-        "online_from_frozen": _pair(drive.apart),
         "rms_force_static_loads": _pair(found.force),
         "peak_force_static_loads": _pair(found.peak),
-        "center_of_gravity_m": None if drive.center is None else drive.center.size,
-        "center_of_gravity_explains": None if drive.center is None else drive.center.share,
         "explained_lateral": lateral,
         "explained_yaw": yaw,
     }
@@ -248,14 +303,30 @@ def _verdict(drive: Drive, listed: list[Objection]) -> Verdict:
         for one in model.estimates()
     )
     blind = WITHOUT_V_Y if recording.logged_v_y is None else ()
-    return Verdict(findings=tuple(listed), numbers=numbers, measures=measures, blind=blind)
+    return Verdict(
+        findings=tuple(listed),
+        numbers=numbers,
+        measures=measures,
+        reach=_reach(model, recording),
+        blind=blind,
+    )
+
+
+def _reach(model: TireModel, recording: Recording) -> str:
+    """Return in which range of speed and slip a model is known, in words; empty: unknown."""
+    speeds, known = model.known_speeds, model.known_slip
+    if known is None:
+        return ""
+    if speeds is None:
+        driven = recording.v_x[recording.v_x >= model.min_speed]
+        speeds = np.quantile(driven, [0.005, 0.995]) if driven.size else np.zeros(2)
+    front, rear = np.degrees(known)
+    slip = f"slip up to {front:.1f} / {rear:.1f} deg (front / rear)"
+    return f"{speeds[0]:.3g} to {speeds[1]:.3g} m/s, {slip}"
 
 
 def _doubt(one: Estimate, missed: float) -> float | None:
-    """Return the standard deviation of a number: of a force, with the share that is missed of it.
-
-    The recursion knows of noise only; what its curves cannot say is in what they miss.
-    """
+    """Return the standard deviation of a number: of a force, with the share that is missed of it."""
     if one.sd is None or one.title not in (STIFFNESS, GRIP):
         return one.sd
     return math.hypot(one.sd, missed * one.value)
@@ -275,40 +346,3 @@ def _too_short(model: TireModel) -> Verdict:
     )
     numbers = tuple(Number(*one, valid=False) for one in model.estimates())
     return Verdict(findings=(finding,), numbers=numbers, measures={})
-
-
-def _apart(force: Array, vehicle: Vehicle, found: Evidence) -> Array:
-    """Return how far online lies from frozen over the later half, over the frozen force (2,)."""
-    windows = found.windows
-    online = windows.mean(force / np.array(vehicle.axle_loads))
-    later = np.arange(len(windows)) >= len(windows) // 2
-    later &= np.isfinite(online).all(axis=1)  # before a law diverged
-    return clean_share((online - found.modelled)[later], found.modelled[later], np.zeros(2))
-
-
-def _elsewhere(taught: Tires, drive: Drive, car: Vehicle) -> Array | None:
-    """Return what models taught without a part of the drive miss of that part, over its force (2,).
-
-    A window counts where such a model knows the slip.
-    """
-    recording, found = drive.recording, drive.found
-    windows = found.windows
-    slip = np.abs(windows.mean(np.asarray(recording.alpha(car.l_f, car.l_r))))
-    missed, force = np.zeros_like(found.measured), np.zeros_like(found.measured)
-
-    def teach(halting: Recording) -> TireModel:
-        return taught(Mended(halting, car))
-
-    parts = 0
-    for mine, model in taught_elsewhere(teach, recording, found):
-        if model is None:
-            return None
-        parts += 1
-        known = model.known_slip
-        counted = mine[:, None] & (slip <= (np.inf if known is None else known))
-        away = found.measured - modelled_force(model, recording, windows)
-        missed[counted], force[counted] = away[counted], found.measured[counted]
-    if parts == 0:
-        return None
-    seen = np.mean(force != 0.0, axis=0)
-    return np.where(seen > 0.0, clean_share(missed, force, found.noise * seen), 0.0)

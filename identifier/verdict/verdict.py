@@ -1,11 +1,4 @@
-"""Is the answer good? A verdict on a tire model, from the motion alone: no true force is needed.
-
-The rule is one: the frozen model, integrated over windows of the drive, must give back the force
-that the motion shows, at each axle, where it learnt and where it did not. Around it stand rules on
-what that cannot see: no force to learn from, numbers that no tire has, a car that is not the one
-that was told. Thresholds are physical or were set on simulated cars of four classes, never on a
-recording.
-"""
+"""A verdict on a tire model, from the motion alone: no true force is needed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -80,6 +73,7 @@ class Verdict:
     findings : those that refuse first.
     numbers : what was learnt, each with its doubt.
     measures : what was measured on the way, by name, front and rear or one value.
+    reach : range of speed and slip that the drives covered, in words; empty where unknown.
     blind : what more nobody can see of this drive.
     friction : of the drive's road over that of the drive that taught a stored model, window by
         window; None of a run, and where nobody can tell.
@@ -88,6 +82,7 @@ class Verdict:
     findings: tuple[Objection, ...]
     numbers: tuple[Number, ...]
     measures: Mapping[str, tuple[float, ...] | float | None]
+    reach: str = ""
     blind: tuple[str, ...] = ()
     friction: RoadFriction | None = field(default=None, compare=False, repr=False)
 
@@ -105,7 +100,9 @@ class Verdict:
     @property
     def headline(self) -> str:
         """The verdict in one line."""
-        return "verdict: valid" if self.valid else f"verdict: NOT VALID, {self.against}"
+        if self.valid:
+            return f"verdict: valid for {self.reach}" if self.reach else "verdict: valid"
+        return f"verdict: NOT VALID, {self.against}"
 
     @property
     def unseen(self) -> tuple[str, ...]:
@@ -124,6 +121,7 @@ class Verdict:
             "findings": [finding._asdict() for finding in self.findings],
             "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
             "measures": dict(self.measures),
+            "reach": self.reach,
             "unseen": [*UNSEEN, *self.blind],
         }
 

@@ -262,6 +262,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
     """Refuse a filter of forces before it runs: there would be nothing to freeze."""
+    if design.whole:
+        return
     try:
         design.frozen(vehicle, design.setup(vehicle).carry)
     except CannotFreezeError as error:

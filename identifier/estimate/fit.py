@@ -1,0 +1,122 @@
+"""Tires from one log or several: blocks of ten minutes, their information added up."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.estimate.drive import Drive
+from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Posterior
+from identifier.estimate.priors import Priors
+from identifier.estimate.solve import estimate, simulate
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+BLOCK = 600.0  # [s] that are estimated at once
+REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
+MISSED = 0.06  # of the force, by which drives of one car differ from one model; of one log a belief
+
+
+class Fit(NamedTuple):
+    """What logs taught: the model, and the estimate behind it."""
+
+    model: FittedModel
+    posterior: Posterior
+
+
+def fit(
+    recordings: Sequence[Recording],
+    vehicle: Vehicle,
+    priors: Priors | None = None,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> Fit:
+    """Estimate the tires of a car from logs with a v_y, with the same sensors.
+
+    Parameters
+    ----------
+    recordings : logs of the car; a log longer than ten minutes is taken in blocks.
+    vehicle : the car.
+    priors : beliefs; None takes those of the car.
+    progress : called now and then with the share that is done, 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        Where no sample is fast enough to count.
+    """
+    beliefs = Priors.of(vehicle) if priors is None else priors
+    total = sum(one.duration for one in recordings)
+    done, reach, found = 0.0, Reach(), None
+    for drives in _blocks(recordings, vehicle):
+        if not any(one.counts.any() for one in drives):
+            continue
+        begin = None if found is None else found.p
+        found = estimate(drives, vehicle, beliefs, begin)
+        reach = reach.and_of(drives, found, vehicle)
+        information = np.zeros_like(beliefs.information)
+        information[np.ix_(found.index, found.index)] = found.information
+        beliefs = replace(beliefs, mean=found.p, information=information)
+        done += sum(len(one.signals) * one.dt for one in drives)
+        if progress is not None:
+            progress(min(done / max(total, 1e-9), 1.0))
+    if found is None:
+        name = recordings[0].name
+        raise ValueError(f"{name}: no sample is fast enough to learn from")
+    model = FittedModel(
+        vehicle=vehicle,
+        p=found.p,
+        covariance=found.whole_covariance,
+        driven=reach.slip,
+        speeds=reach.speeds,
+        a_x=reach.a_x,
+        missed=np.full(2, MISSED),
+    )
+    return Fit(model, found)
+
+
+class Reach(NamedTuple):
+    """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²]."""
+
+    slip: Array = np.zeros(2)
+    speeds: Array = np.array([np.inf, -np.inf])
+    a_x: Array = np.array([np.inf, -np.inf])
+
+    def and_of(self, drives: Sequence[Drive], found: Posterior, vehicle: Vehicle) -> "Reach":
+        """Return what these drives reached, too."""
+        slip, speeds, a_x = (np.array(one) for one in self)
+        for one in drives:
+            on = one.counts
+            if not on.any():
+                continue
+            size = np.abs(simulate(one, found.p, vehicle)["slip"][on])
+            k = min(max(round(REACHED / one.dt), 1), len(size))
+            slip = np.maximum(slip, np.partition(size, len(size) - k, axis=0)[-k])
+            for both, column in ((speeds, 0), (a_x, 5)):
+                low, high = np.quantile(one.signals[on, column], [0.005, 0.995])
+                both[:] = min(both[0], low), max(both[1], high)
+        return Reach(slip, speeds, a_x)
+
+
+def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[Drive]]:
+    """Yield drives of at most `BLOCK` together."""
+    group: list[Drive] = []
+    length = 0.0
+    for recording in recordings:
+        n = max(round(BLOCK / recording.dt), 1)
+        count = -(-len(recording) // n)
+        edges = np.linspace(0, len(recording), count + 1).astype(int)
+        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+            seconds = (end - begin) * recording.dt
+            if group and length + seconds > BLOCK:
+                yield group
+                group, length = [], 0.0
+            group.append(Drive.of(recording, vehicle, slice(int(begin), int(end))))
+            length += seconds
+    if group:
+        yield group
+
+
