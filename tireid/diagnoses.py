@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
+from identifier.verdict import Verdict
+from identifier.verdict.verdict import Objection
 from models.recordings import LogMap, Recording, Repair
 from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
@@ -48,10 +50,11 @@ NAMES = {  # of findings by their code, where the code is not the word
     "unit": "wrong unit",
     "velocity_sensor_angle": "velocity sensor turned",
     "velocity_sensor_x": "velocity sensor ahead of the c.g.",
-    "velocity_sensor_z": "velocity sensor swings out as the body rolls",
     "yaw_inertia": "yaw inertia, times the right one",
     "zero": "reads exactly 0 again and again",
 }
+
+GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
@@ -178,6 +181,22 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     elif diagnosis.repair:
         lines.append("what is sure is taken out with --repair")
     return "\n".join(lines)
+
+
+def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdict:
+    """Return a verdict that does not pass over what the doctor is sure of.
+
+    A unit, a sign or a ratio that is surely wrong refuses the answer; a sure size is noted.
+
+    Parameters
+    ----------
+    diagnosis : of the log that taught the model.
+    repair : that was taken out of it before: nothing of that speaks against the answer.
+    """
+    left = [] if repair else [one for one in diagnosis.findings if one.sure]
+    said = [Objection("doctor", None, f"doctor: {one.text}", one.code in GROSS) for one in left]
+    ordered = sorted([*verdict.findings, *said], key=lambda one: not one.refuses)
+    return replace(verdict, findings=tuple(ordered)) if said else verdict
 
 
 def write_doctor_report(

@@ -1,7 +1,7 @@
 """The doctor: what is wrong with a log, or with what is told of its car, from the log alone."""
 
 from identifier.doctor.diagnosis import Diagnosis, diagnose
-from identifier.doctor.estimate import Examination, estimate, examine
+from identifier.doctor.faults import Examination, examine
 from identifier.doctor.finding import Finding
 
-__all__ = ["Diagnosis", "Examination", "Finding", "diagnose", "estimate", "examine"]
+__all__ = ["Diagnosis", "Examination", "Finding", "diagnose", "examine"]

@@ -4,11 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from identifier.doctor.balance import Balance, Sizes
-from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, Examination, examine
+from identifier.doctor.faults import Examination, examine, prepared
 from identifier.doctor.finding import Finding
-from identifier.doctor.fit import Fitter
-from identifier.doctor.pieces import stretches_of
 from identifier.doctor.screen import (
     NEAR,
     Screened,
@@ -24,9 +21,9 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-FACTOR, ROUNDS, SETTLED = "factor.delta_f", 4, 0.1  # deviations
-ELSEWHERE = "velocity_sensor_x"  # the size that may be in place of a gross fault
-TOGETHER = 2  # times that a ratio and what is found beside it are asked
+ROUNDS, SETTLED = 3, 0.2  # deviations, to which the ratio of a steering wheel is settled
+WIDE = 0.3  # of that ratio, by which the screen may be off
+ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
@@ -91,7 +88,7 @@ class Diagnosis:
 
 
 def _certainty(one: Finding) -> str:
-    return "sure" if one.sure else f"confidence {one.percent}"
+    return "sure" if one.sure else ("note, " if one.note else "") + f"confidence {one.percent}"
 
 
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
@@ -107,12 +104,12 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         return Diagnosis(name=recording.name, findings=contradicts, unseen=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
-    found, fine = list(gross.findings), Examination((), (), {})
+    found, fine = list(gross.findings), Examination()
     if not blind:
         try:
             found, fine = _asked_finely(gross, recording, vehicle)
-            if gross.without is not None and ELSEWHERE not in fine.sizes:
-                gross, fine = gross.without, Examination((), (), {})
+            if gross.without is not None and ELSEWHERE not in fine.taken:
+                gross, fine = gross.without, Examination()
                 found, blind = list(gross.findings), gross.blind
                 if not blind:
                     found, fine = _asked_finely(gross, recording, vehicle)
@@ -133,31 +130,15 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
 def _asked_finely(
     gross: Screened, recording: Recording, vehicle: Vehicle
 ) -> tuple[list[Finding], Examination]:
-    """Return the gross findings, the ratio of a steering wheel exactly, and sizes beside them.
-
-    What distorts the motion distorts the ratio: where sizes are found beside it, the ratio is asked
-    again together with them, and they with it.
-
-    Parameters
-    ----------
-    gross : findings of the screen.
-    recording, vehicle : as they were told.
-    """
+    """Return the gross findings, the ratio of a steering wheel exactly, and sizes beside them."""
     found = list(gross.findings)
     wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
     if wheel is None:
         return found, examine(*gross.repair.apply(recording, vehicle))
-    beside: Sizes = {}
-    drive, car = gross.repair.apply(recording, vehicle)
-    for _ in range(TOGETHER):
-        exact = _exact_ratio(wheel, drive, car, beside)
-        kept = [exact if one is wheel else one for one in gross.findings]
-        found = [one for one in kept if one is not None]
-        fine = examine(*before_sizes(found).apply(recording, vehicle))
-        beside = {key: size for key, size in fine.sizes.items() if key != FACTOR}
-        if not beside:
-            break
-    return found, fine
+    exact = _exact_ratio(wheel, *gross.repair.apply(recording, vehicle))
+    kept = [exact if one is wheel else one for one in gross.findings]
+    found = [one for one in kept if one is not None]
+    return found, examine(*before_sizes(found).apply(recording, vehicle))
 
 
 def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
@@ -178,7 +159,7 @@ def _told_once(findings: list[Finding]) -> list[Finding]:
     return list(kept.values())
 
 
-def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle, beside: Sizes) -> Finding | None:
+def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | None:
     """Return the ratio of a steering wheel as the drive says it, no stiffness believed.
 
     None where the drive says that the steering is right.
@@ -187,22 +168,20 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle, beside: Sizes)
     ----------
     coarse : the finding, by which the drive is repaired.
     drive, car : with it.
-    beside : sizes of other faults that are estimated with it, where to begin.
     """
     assert coarse.repair is not None
-    factor = coarse.repair.factor["delta_f"]
-    stretches = stretches_of(drive, car, longest=LONGEST, pieces=PIECES)
+    factor, deviation = coarse.repair.factor["delta_f"], math.nan
     for _ in range(ROUNDS):
-        balance = Balance(stretches, car)
-        if len(balance) < FEWEST:
+        search = prepared(drive, car)
+        if search is None:
             return coarse
-        fit = Fitter(balance).fit([FACTOR, *beside], beside)
-        moved, deviation = -fit.sizes[FACTOR], fit.deviation(FACTOR)
-        factor *= math.exp(moved)
-        if abs(moved) < SETTLED * deviation:
+        search.wide["steering_gain"] = WIDE
+        post = search.run()  # what distorts the motion distorts the ratio
+        gain, deviation = post["steering_gain"], post.sd("steering_gain")
+        factor *= 1.0 + gain
+        if abs(gain) < SETTLED * deviation:
             break
-        by = Repair(factor={"delta_f": math.exp(moved)})
-        stretches = tuple(by.apply(one, car)[0] for one in stretches)
+        drive, _ = Repair(factor={"delta_f": 1.0 + gain}).apply(drive, car)
     if abs(math.log(abs(factor))) < NEAR and factor > 0.0:
         return None
     exact = steering_finding(factor, coarse.confidence, deviation=deviation)

@@ -28,6 +28,7 @@ class Finding:
     text : one line for people: what, how much, and what else it may be.
     repair : what takes it out, None where nothing can.
     sure : whether the repair may be applied without being asked.
+    note : whether it is a number of the car that the drive says otherwise, which is no alarm.
 
     Raises
     ------
@@ -50,6 +51,7 @@ class Finding:
     text: str = ""
     repair: Repair | None = None
     sure: bool = False
+    note: bool = False
 
     def __post_init__(self) -> None:
         for name in ("confidence", "group"):
@@ -65,8 +67,8 @@ class Finding:
 
     @property
     def matters(self) -> bool:
-        """Whether it is more likely than not that something is wrong."""
-        return self.alarm >= MATTERS
+        """Whether it is more likely than not that something is wrong with the log."""
+        return self.alarm >= MATTERS and not self.note
 
     @property
     def percent(self) -> str:
@@ -89,5 +91,6 @@ class Finding:
             "alarm": self.alarm,
             "text": self.text,
             "sure": self.sure,
+            "note": self.note,
             "repair": None if self.repair is None else self.repair.tables(),
         }

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from models.recordings import Repair
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 SEDAN = 2.7  # m, wheelbase of whose size the numbers are
 DEGREES = math.degrees(1.0)  # in a rad
@@ -21,224 +21,180 @@ OPPOSITES = {  # of what a size says, where it is negative
     " late ": " early ",
     "too much": "too little",
     " ahead of ": " behind ",
-    " swings out ": " swings in ",
     " to the left": " to the right",
     "too far back": "too far forward",
     "push more at speed, as by a downforce": "push less at speed, as by a lift",
 }
-POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "time": 0.5, "rate": -0.5}
-
-
-def grown(grows: str, vehicle: Vehicle) -> float:
-    """Return the size of something of a car over that of a sedan.
-
-    Parameters
-    ----------
-    grows : with what: one of `POWERS`, by powers of the wheelbase.
-    vehicle : the car.
-    """
-    return float((vehicle.wheelbase / SEDAN) ** POWERS[grows])
+POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "rate": -0.5}
+NOTES = ("center_of_gravity", "yaw_inertia", "downforce")  # of the car: never an alarm, never sure
 
 
 def usual_inertia(vehicle: Vehicle) -> tuple[float, float]:
-    """Return from what to what I_z/(m l_f l_r) of cars of a size goes.
-
-    Parameters
-    ----------
-    vehicle : the car.
-    """
+    """Return from what to what I_z/(m l_f l_r) of cars of a size goes."""
     return (SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]), INERTIA[1]
 
 
 def similar_inertia(vehicle: Vehicle) -> float:
-    """Return m l_f l_r, the yaw inertia of two points on the axles [kg m^2].
-
-    Parameters
-    ----------
-    vehicle : the car.
-    """
+    """Return m l_f l_r, the yaw inertia of two points on the axles [kg m^2]."""
     return vehicle.mass * vehicle.l_f * vehicle.l_r
 
 
 class Suspect(NamedTuple):
     """A number that may be wrong.
 
-    key : of its size in `balance.Sizes`.   code, channel, unit : as in `Finding`;
-    channels of one device are joined by "+".
-    plausible : standard deviation of what is believed [SI], of a sedan.   least : what nobody need
-    mend, and what no model of this size tells from a tire.   grows : with the size of a car.
-    signed : whether it may be negative.   text : with {size} and {deviation} in `shown`, {origin}
-    of a number of the car.
-    shown : unit of the text.   per_unit : of the text per SI unit.   price : gain of J that it must
-    bring beside that of every suspect, where it easily explains what is none.
+    parameter : of `motion.parameters` that tells it, or "a_y." and what an accelerometer has.
+    code, channel, unit : as in `Finding`.   wide : standard deviation of what it may be, of the
+    parameter, of a sedan.   least : what nobody need mend, and what no model of this size tells
+    from a tire.   grows : both with the size of a car.   text : with {size} in `shown`, {origin}
+    of a number of the car.   shown : unit of the text.   per_unit : of the text per SI unit.
+    price : gain that it must bring beside that of every suspect, where tires easily do the same.
     """
 
-    key: str
+    parameter: str
     code: str
     channel: str
     unit: str
-    plausible: float
+    wide: float
     least: float
     grows: str
-    signed: bool
     text: str
-    shown: str
+    shown: str = ""
     per_unit: float = 1.0
     price: float = 0.0
 
-    def scale(self, vehicle: Vehicle) -> float:
-        """Return what `plausible` and `least` are multiplied by for a car.
-
-        Parameters
-        ----------
-        vehicle : the car.
-        """
-        return grown(self.grows, vehicle)
-
     @property
-    def is_factor(self) -> bool:
-        """Whether its size in `Sizes` is the logarithm of a factor."""
-        return self.code in ("factor", "yaw_inertia")
+    def parameters(self) -> tuple[str, ...]:
+        """Parameters of the model that it moves; none of an accelerometer."""
+        if self.channel == "a_y":
+            return ()
+        pair = self.code == "downforce"
+        return ("downforce_f", "downforce_r") if pair else (self.parameter,)
 
-    def is_late_as(self, other: "Suspect") -> bool:
-        """Return whether both say that the same channel is late, by a delay and by a low pass.
+    def scaled(self, value: float, vehicle: Vehicle) -> float:
+        """Return `wide` or `least` of a car."""
+        return float(value * (vehicle.wheelbase / SEDAN) ** POWERS[self.grows])
 
-        Parameters
-        ----------
-        other : another suspect.
-        """
-        return self.channel == other.channel and {self.code, other.code} == {"delay", "lag"}
+    def size(self, value: float) -> float:
+        """Return the size of a finding of a value of its parameter."""
+        match self.code:
+            case "factor" if self.channel != "a_y":
+                return 1.0 / (1.0 + value)
+            case "factor":
+                return 1.0 + value
+            case "yaw_inertia":
+                return math.exp(-value)
+            case "velocity_sensor_angle":
+                return -math.atan(value)
+            case "bank":
+                return math.asin(min(max(value, -1.0), 1.0))
+        return -value if self.parameter == "steering_zero" else value
 
     def repair(self, size: float, vehicle: Vehicle) -> Repair | None:
-        """Return what takes it out, None for what no repair does.
-
-        Parameters
-        ----------
-        size : as in `Sizes`.
-        vehicle : as it was told.
-        """
+        """Return what takes a size out, None for what no repair does."""
         numbers: dict[str, Any] = {self.code: size}
         match self.code:
-            case "bank" | "downforce" | "velocity_sensor_z":
+            case "bank" | "downforce":
                 return None
             case "factor":
-                numbers = {"factor": {self.channel: math.exp(-size)}}
+                numbers = {"factor": {self.channel: 1.0 / size}}
             case "offset" | "delay" | "lag":
+                if self.code == "lag" and not size > 0.0:
+                    return None
                 numbers = {self.code: dict.fromkeys(self.channel.split("+"), size)}
             case "yaw_inertia":
-                numbers = {"vehicle": {"yaw_inertia": vehicle.yaw_inertia * math.exp(-size)}}
+                numbers = {"vehicle": {"yaw_inertia": vehicle.yaw_inertia / size}}
             case "center_of_gravity":
                 right = {"l_f": vehicle.l_f - size, "l_r": vehicle.l_r + size}
                 numbers = {"vehicle": right}
         return Repair(**numbers)
 
-    def leaves_a_car(self, size: float, vehicle: Vehicle) -> bool:
-        """Return whether the car without the fault is one, be the told one or not.
-
-        What no car has was not told wrongly: something else is wrong, or beyond the model.
-
-        Parameters
-        ----------
-        size : as in `Sizes`.
-        vehicle : as it was told.
-        """
+    def possible(self, size: float, vehicle: Vehicle) -> bool:
+        """Return whether a device can have such a size, and the car without it be a car."""
         match self.code:
+            case "lag":
+                return size > 0.0
             case "center_of_gravity":
                 return CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < CENTER[1]
             case "yaw_inertia":
                 least, most = usual_inertia(vehicle)
-                right = vehicle.yaw_inertia * math.exp(-size)
-                return least < right / similar_inertia(vehicle) < most
+                return least < vehicle.yaw_inertia / size / similar_inertia(vehicle) < most
         return True
 
     def words(self, size: float, deviation: float, vehicle: Vehicle) -> str:
-        """Return it in words.
-
-        Parameters
-        ----------
-        size, deviation : as in `Sizes`.
-        vehicle : as it was told.
-        """
+        """Return it in words."""
         text = self.text
-        if self.is_factor:
-            size, deviation = math.exp(size), math.exp(size) * deviation
-        elif size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
+        if size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
             size, text = -size, text.replace(said, OPPOSITES[said])
         shown = f"{size * self.per_unit:.3g} ± {abs(deviation) * self.per_unit:.2g}{self.shown}"
         return text.format(size=shown, origin=vehicle.origin(self.code))
 
 
-def _channels() -> tuple[Suspect, ...]:
+WORDS = {  # of a channel, the parameter of its factor, and its price
+    "v_x": ("v_x", "v_x_factor", 3.0),
+    "v_y": (
+        "v_y",
+        "",
+        0.0,
+    ),  # to shrink it makes its noise smaller, which looks like a better model
+    "r": ("the yaw rate", "r_gain", 3.0),
+    "delta_f": ("the steering angle", "steering_gain", 0.0),
+    "a_y": ("the lateral acceleration", "a_y.factor", 0.0),
+}
+DEVICES = {"v_y": "v_y", "r": "r", "delta_f": "steering", "a_y": "a_y."}
+TURNING = Suspect(
+    "r_delay", "delay", "r+a_y", "s", 0.12, 0.004, "",
+    "the yaw rate and the lateral acceleration, of one device, are {size} late against the "
+    "other channels", " ms", 1e3,
+)  # fmt: skip
+
+
+def _of_channels() -> tuple[Suspect, ...]:
     offsets = (
-        ("v_y", "m/s", 0.4, 0.02, "speed", "v_y reads {size} too much", " m/s", 1.0),
-        ("r", "rad/s", 0.03, 0.002, "rate", "the yaw rate reads {size} too much", " rad/s", 1.0),
-        ("a_y", "m/s^2", 0.7, 0.05, "", "the lateral acceleration reads {size} too much",
-         " m/s²", 1.0),
-        ("delta_f", "rad", 0.03, 0.0015, "", "the steering angle reads {size} too much",
-         "°", DEGREES),
-    )  # fmt: skip
+        ("v_y_bias", "v_y", "m/s", 0.4, 0.02, "speed", " m/s", 1.0),
+        ("r_bias", "r", "rad/s", 0.03, 0.002, "rate", " rad/s", 1.0),
+        ("a_y.offset", "a_y", "m/s^2", 0.7, 0.05, "", " m/s²", 1.0),
+        ("steering_zero", "delta_f", "rad", 0.03, 0.0015, "", "°", DEGREES),
+    )
     found = [
-        Suspect(f"offset.{name}", "offset", name, unit, plausible, least, grows, True, text,
-                shown, per_unit)
-        for name, unit, plausible, least, grows, text, shown, per_unit in offsets
+        Suspect(parameter, "offset", name, unit, wide, least, grows,
+                f"{WORDS[name][0]} reads {{size}} too much", shown, per_unit)
+        for parameter, name, unit, wide, least, grows, shown, per_unit in offsets
     ]  # fmt: skip
-    words = {
-        "v_x": "v_x",
-        "v_y": "v_y",
-        "r": "the yaw rate",
-        "delta_f": "the steering angle",
-        "a_y": "the lateral acceleration",
-    }
-    for name in ("v_y", "r", "delta_f", "a_y"):
-        found.append(Suspect(
-            f"delay.{name}", "delay", name, "s", 0.12, 0.004, "", True,
-            f"{words[name]} is {{size}} late against the other channels", " ms", 1e3,
-        ))  # fmt: skip
-        found.append(Suspect(
-            f"lag.{name}", "lag", name, "s", 0.15, 0.004, "", False,
-            f"{words[name]} lags behind a low pass of {{size}}", " ms", 1e3,
-        ))  # fmt: skip
-    found.append(Suspect(
-        "delay.r+a_y", "delay", "r+a_y", "s", 0.12, 0.004, "", True,
-        "the yaw rate and the lateral acceleration, of one device, are {size} late against the "
-        "other channels", " ms", 1e3,
-    ))  # fmt: skip
+    for name, device in DEVICES.items():
+        stem, words = device if device.endswith(".") else f"{device}_", WORDS[name][0]
+        # Force follows steering by relaxation and sway: what is left of them is no delay.
+        least, grows = (0.008, "speed") if name == "delta_f" else (0.004, "")
+        found += [
+            Suspect(f"{stem}delay", "delay", name, "s", 0.12, least, grows,
+                    f"{words} is {{size}} late against the other channels", " ms", 1e3),
+            Suspect(f"{stem}lag", "lag", name, "s", 0.15, least, grows,
+                    f"{words} lags behind a low pass of {{size}}", " ms", 1e3),
+        ]  # fmt: skip
+    smallest = {"v_x": 0.01, "r": 0.01, "delta_f": 0.012, "a_y": 0.01}
     found += [
-        Suspect(f"factor.{name}", "factor", name, "", plausible, least, "", True,
-                f"{words[name]} reads {{size}} times the right value", "")
-        for name, plausible, least in (
-            ("v_x", 0.15, 0.01), ("v_y", 0.2, 0.015), ("r", 0.15, 0.01), ("delta_f", 0.2, 0.012),
-            ("a_y", 0.15, 0.01),
-        )
+        Suspect(parameter, "factor", name, "", 0.2, smallest[name], "",
+                f"{words} reads {{size}} times the right value", price=price)
+        for name, (words, parameter, price) in WORDS.items()
+        if parameter
     ]  # fmt: skip
     return tuple(found)
 
 
 SUSPECTS = (
-    *_channels(),
-    Suspect("velocity_sensor_angle", "velocity_sensor_angle", "v_y", "rad", 0.02, 0.0012, "", True,
+    *_of_channels(),
+    Suspect("v_y_angle", "velocity_sensor_angle", "v_y", "rad", 0.03, 0.0012, "",
             "the velocity sensor is turned by {size} to the left", "°", DEGREES),
-    Suspect("velocity_sensor_x", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length", True,
+    Suspect("v_y_lever", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length",
             "the velocity is measured {size} ahead of the center of gravity", " m"),
-    Suspect("velocity_sensor_z", "velocity_sensor_z", "v_y", "m/(m/s^2)", 0.008, 0.001, "length",
-            True, "v_y is measured where the body swings out by {size} for each g, as on a roof",
-            " cm", 100.0 * GRAVITY, 6.0),
-    Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
-            True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
-    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.1, "length", True,
+    Suspect("a_y.place", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
+            "the acceleration is measured {size} ahead of the center of gravity", " m"),
+    Suspect("cg_shift", "center_of_gravity", "", "m", 0.2, 0.1, "length",
             "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
-    Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.05, "", True,
-            "the {origin} yaw inertia is {size} times the right one", ""),
-    Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
+    Suspect("ln_inertia", "yaw_inertia", "", "", 0.5, 0.1, "",
+            "the {origin} yaw inertia is {size} times the right one"),
+    Suspect("bank", "bank", "", "rad", 0.03, 0.003, "",
             "the road falls by {size} to the left, or wind pushes so", "°", DEGREES),
-    Suspect("downforce", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "", True,
+    Suspect("downforce_f", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "",
             "the tires push more at speed, as by a downforce of {size}",
-            " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),
+            " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2, 1.0),
 )  # fmt: skip
-NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
-    "relaxation.front": (0.17, 0.11, ""),  # wheelbases; cars on the road have up to 0.4
-    "relaxation.rear": (0.17, 0.11, ""),
-    "sway": (0.005, 0.004, "length"),  # m of contact patch per m/s² of acceleration
-    "roll_delay": (0.06, 0.05, "time"),  # s, of the roll behind the acceleration
-    "tilt": (0.0, 2.0, ""),  # of the roll of the body over its most, see `balance.tilted`
-}

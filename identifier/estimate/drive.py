@@ -4,7 +4,9 @@ The balance is linear in its signals but for slip: the same zero-phase mean over
 nothing and takes noise away.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ MOST_A_X = 18.0  # m/s²
 BANK_MEAN = 1.0  # [s]: roads bank slowly
 LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is a bank in full
 MOST_ROLL = 0.08  # per g, by which a body rolls outwards
+LATE = (1, 2, 3)  # columns of v_y, r and δ_f
 EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
 
 
@@ -37,6 +40,7 @@ class Drive:
     rates : d/dt of v_y, r and δ_f, (n, 3).
     counts : samples that count, (n,).
     every : samples of the recording that make one of these.
+    begins : first samples of its stretches, rising, (k,).
     """
 
     dt: float
@@ -44,10 +48,17 @@ class Drive:
     rates: Array
     counts: NDArray[np.bool_]
     every: int
+    begins: tuple[int, ...] = (0,)
 
     @classmethod
     def of(
-        cls, recording: Recording, vehicle: Vehicle, part: slice = ALL, *, replay: bool = False
+        cls,
+        recording: Recording,
+        vehicle: Vehicle,
+        part: slice = ALL,
+        *,
+        replay: bool = False,
+        fastest: float = FASTEST,
     ) -> "Drive":
         """Return a recording with a v_y as the estimate reads it.
 
@@ -55,9 +66,10 @@ class Drive:
         ----------
         part : samples that are read.
         replay : whether each sample is asked about, down to the lowest speed; else those that
-            come faster than 100 Hz are averaged, and slow ones do not count.
+            come faster than `fastest` are averaged, and slow ones do not count.
+        fastest : shortest interval of samples that are not averaged [s].
         """
-        every = 1 if replay else max(1, round(FASTEST / recording.dt))
+        every = 1 if replay else max(1, round(fastest / recording.dt + 1e-6))
         slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
@@ -72,7 +84,34 @@ class Drive:
             if one.stop - one.start >= every
         ]
         signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return cls(dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every)
+        ends = np.cumsum([len(some) for some, _ in pieces])
+        return cls(
+            dt=dt,
+            signals=signals,
+            rates=rates,
+            counts=signals[:, -1] > 0.0,
+            every=every,
+            begins=(0, *(int(k) for k in ends[:-1])),
+        )
+
+    def on_time(self, delays: Sequence[float]) -> "Drive":
+        """Return the drive with late signals read later, and their rates there.
+
+        Parameters
+        ----------
+        delays : of v_y, r and the front steering angle [s], (3,); at the end of a stretch a late
+            signal keeps its last value.
+        """
+        signals, rates = self.signals.copy(), self.rates.copy()
+        edges = (*self.begins, len(signals))
+        for k, (column, delay) in enumerate(zip(LATE, delays, strict=True)):
+            if delay == 0.0:
+                continue
+            for begin, end in pairwise(edges):
+                at = np.arange(end - begin)
+                for values in (signals[begin:end, column], rates[begin:end, k]):
+                    values[:] = np.interp(at + delay / self.dt, at, values)
+        return replace(self, signals=signals, rates=rates)
 
 
 def _piece(

@@ -70,10 +70,6 @@ ALIKE = {  # standard deviation of front less rear
 }
 # At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
 SHARED_ERROR = 0.5
-FAULTS = (  # what no log leaves open but one that shows it
-    "v_y_delay", "steering_delay", "r_bias", "r_delay", "v_x_factor", "cg_shift", "ln_inertia",
-    "bank",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

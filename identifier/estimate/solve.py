@@ -8,6 +8,7 @@ Gauss-Newton with Levenberg's damping and active bounds.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far 
 LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 SHORTEST_MEMORY, LONGEST_MEMORY = 0.25, 8.0  # T [s]
 ITERATIONS = 25
+DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
 
 
@@ -44,12 +46,22 @@ class Problem:
     drives : of one car, with the same sensors.
     vehicle : the car.
     priors : which parameters move.
+    every : whether slopes over all parameters are at hand, for `under` other priors.
     """
 
-    def __init__(self, drives: Sequence[Drive], vehicle: Vehicle, priors: Priors) -> None:
+    def __init__(
+        self,
+        drives: Sequence[Drive],
+        vehicle: Vehicle,
+        priors: Priors,
+        *,
+        every: bool = False,
+    ) -> None:
         self.drives, self.vehicle, self.priors = drives, vehicle, priors
         self.index = np.flatnonzero(priors.moves)
-        self._scan = motion_scan(tuple(NAMES[k] for k in self.index))
+        columns = np.arange(len(NAMES)) if every else self.index
+        self._columns = np.searchsorted(columns, self.index)
+        self._scan = motion_scan(tuple(NAMES[k] for k in columns))
         self._car = car_numbers(vehicle)
         self._strides = [max(1, round(STRIDE / one.dt)) for one in drives]
         self._kept = [
@@ -57,13 +69,40 @@ class Problem:
             for one, stride in zip(drives, self._strides, strict=True)
         ]
         self.lengths = [kept.size for kept in self._kept]
-        sizes, weights = [], []
+        sizes, weights, forces = [], [], []
         for one, stride, kept in zip(drives, self._strides, self._kept, strict=True):
             v_x, r = one.signals[::stride][kept][:, [0, 2]].T
-            sizes.append(np.hypot(ERROR, RELATIVE * np.abs(v_x * r) / GRAVITY))
+            forces.append(np.abs(v_x * r) / GRAVITY)
+            sizes.append(np.hypot(ERROR, RELATIVE * forces[-1]))
             weights.append(np.full(kept.size, one.dt * stride))
         self.size = np.concatenate(sizes)
         self.weight = np.concatenate(weights)
+        self.force = np.concatenate(forces)  # of an axle in steady cornering [static loads]
+
+    def under(self, priors: Priors) -> "Problem":
+        """Return the same under other priors, of a problem with slopes over `every` parameter."""
+        other = copy(self)
+        other.priors, other.index = priors, np.flatnonzero(priors.moves)
+        other._columns = other.index
+        return other
+
+    def weighted(self, some: Array) -> "Problem":
+        """Return the same with weights of the residuals, (m,)."""
+        other = copy(self)
+        other.weight = self.weight * some
+        return other
+
+    def halves(self) -> tuple[Array, Array]:
+        """Return which residuals are of the first half of all force, and of the second, (m,)."""
+        so_far = np.cumsum(self.force**2)
+        first = (so_far <= 0.5 * so_far[-1]).astype(float)
+        return first, 1.0 - first
+
+    def missed(self, p: Array) -> Array:
+        """Return the share of the force that the balance misses at each axle, (2,)."""
+        e = self.residuals(p).e * self.size[:, None]
+        share: Array = np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
+        return share
 
     def residuals(self, p: Array) -> Residuals:
         """Return what the balance misses, and its slopes."""
@@ -76,7 +115,7 @@ class Problem:
                 ports=("missed", "missed_slopes"),
             )
             e.append(out["missed"][kept])
-            slopes.append(out["missed_slopes"][kept])
+            slopes.append(out["missed_slopes"][kept][..., self._columns])
         size = self.size[:, None]
         with np.errstate(invalid="ignore", over="ignore"):
             return Residuals(
@@ -133,6 +172,11 @@ def car_numbers(vehicle: Vehicle) -> Array:
 
 
 def _arguments(one: Drive, p: Array, car: Array, tangent: int = 0) -> dict[str, Array]:
+    """Return the ports of the model; late signals are read on time, the rest of a delay is 0."""
+    late = p[DELAYS]
+    if late.any():
+        one, p = one.on_time(late), p.copy()
+        p[DELAYS] = 0.0
     more = {"tangent": np.zeros(tangent)} if tangent else {}
     return {
         "state": np.zeros(len(CARRIED)),
@@ -174,20 +218,20 @@ def estimate(
     """
     priors = Priors.of(vehicle) if priors is None else priors
     problem = Problem(drives, vehicle, priors)
-    starts = _starts(problem) if begin is None else [begin]
-    found = [_descend(problem, start) for start in starts]
+    begins = starts(problem) if begin is None else [begin]
+    found = [descend(problem, start) for start in begins]
     return min(found, key=lambda one: one.cost)
 
 
-def _starts(problem: Problem) -> list[Array]:
+def starts(problem: Problem) -> list[Array]:
     """Return the parameters to begin with: the prior's mean, and offsets that straights show."""
     mean = problem.priors.mean
     signals = np.concatenate([one.signals[one.counts] for one in problem.drives])
     v_x, v_y, r, delta = signals[:, :4].T
     straight = np.abs(v_x * r) < 0.03 * GRAVITY
-    starts = [mean.copy()]
+    begins = [mean.copy()]
     if np.count_nonzero(straight) <= 50:
-        return starts
+        return begins
     b, zero = float(np.median(v_y[straight])), float(np.median(delta[straight]))
     fast = float(np.median(v_x[straight]))
     usual = OF_CAR["v_y_bias"].sd * float(np.sqrt(problem.vehicle.wheelbase / SEDAN))
@@ -196,24 +240,37 @@ def _starts(problem: Problem) -> list[Array]:
             one = mean.copy()
             one[INDEX["steering_zero"]] = -zero
             one[INDEX["v_y_bias"]], one[INDEX["v_y_angle"]] = bias, angle
-            starts.append(one)
-    return [np.clip(one, problem.priors.low, problem.priors.high) for one in starts]
+            begins.append(one)
+    return [np.clip(one, problem.priors.low, problem.priors.high) for one in begins]
 
 
-def _descend(problem: Problem, start: Array) -> Posterior:
-    """Return the optimum that is found from a start."""
+def descend(
+    problem: Problem,
+    start: Array,
+    memory: Array | None = None,
+    iterations: int = ITERATIONS,
+    enough: float = ENOUGH,
+) -> Posterior:
+    """Return the optimum that is found from a start.
+
+    Parameters
+    ----------
+    start : parameters to begin with (p,).
+    memory : T [s], (2,), where it is held, so that costs can be compared; None estimates it.
+    iterations : at most.
+    enough : improvement below which it ends [nats].
+    """
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
     P = priors.information[np.ix_(index, index)]
     p, damping = start.copy(), 1e-3
     now = problem.residuals(p)
-    T = problem.memory(now.e)
-    iterations = 0
-    for iterations in range(1, ITERATIONS + 1):
+    T, count = problem.memory(now.e) if memory is None else memory, 0
+    for count in range(1, iterations + 1):
         S2 = problem.scale(now.e)
-        T = np.sqrt(T * problem.memory(now.e)) if iterations > 1 else T
+        T = np.sqrt(T * problem.memory(now.e)) if count > 1 and memory is None else T
         cost = problem.misfit(now.e, S2, T) + priors.cost(p)
-        H, gradient = _normal(problem, now, S2, T)
+        H, gradient = normal(problem, now, S2, T)
         H = H + P
         gradient = gradient + (priors.information @ (p - priors.mean))[index]
         better = None
@@ -231,10 +288,10 @@ def _descend(problem: Problem, start: Array) -> Posterior:
             break
         p, now, gained = better
         damping = max(damping / 5.0, 1e-6)
-        if gained < ENOUGH and iterations > 3:
+        if gained < enough and (count > 3 or memory is not None):
             break
-    S2, T = problem.scale(now.e), problem.memory(now.e)
-    data, _ = _normal(problem, now, S2, T)
+    S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
+    data, _ = normal(problem, now, S2, T)
     cost = problem.misfit(now.e, S2, T) + priors.cost(p)
     cost += float((0.5 * np.log(S2) * problem.weight.sum() / T).sum())
     return Posterior(
@@ -246,11 +303,11 @@ def _descend(problem: Problem, start: Array) -> Posterior:
         scale=np.sqrt(S2),
         memory=T,
         cost=cost,
-        iterations=iterations,
+        iterations=count,
     )
 
 
-def _normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
+def normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
     n = at.slopes.shape[2]
     H, gradient = np.zeros((n, n)), np.zeros(n)

@@ -1,7 +1,8 @@
 """Lateral motion of a car from its signals, one sample a step, with slopes over the parameters.
 
 Signals, after the sensors' errors are taken out:
-v_y = v_y,m(t + τ) - b - β v_x - x_s r,   δ = (1 + g) δ_m + δ0.
+v_y = v_y,m(t + τ) - b - β v_x - x_s r,   δ = (1 + g) δ_m(t + τ_δ) + δ0,
+r = (1 + g_r) r_m(t + τ_r) - b_r,   v_x = (1 + g_x) v_x,m;  behind a low pass x = x_m + T x_m'.
 Slip, i = f, r:   α_i = δ_i - atan((v_y ± l_i r)/v_x) + k_i (-ρ'/(ω² v_x)),
 sway:   ρ'' = ω² (a - ρ) - 2 ζ ω ρ',   a = g Σ share_i φ_i.
 Relaxation:   x_i' = (v_x/σ_i)(α_i - x_i),   σ_i = s_i max(φ_i'(x_i), 0.02 C_i) + 0.001 L, solved
@@ -19,6 +20,7 @@ Slopes run along by the chain rule from stage to stage (forward differentiation)
 few inputs, so that no stage but the last knows all parameters.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -42,6 +44,12 @@ RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
 Columns = tuple[str, ...]
 SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_x", "bank", "road", "on")
 RATES = ("v_y_rate", "r_rate", "delta_rate")  # of late signals, by which a delay is told
+SENSED = ("v_x", "v_y", "r", "delta_f", *RATES)
+SENSORS = (
+    "v_x_factor", "v_y_bias", "v_y_angle", "v_y_lever", "v_y_delay", "v_y_lag",
+    "r_bias", "r_gain", "r_delay", "r_lag",
+    "steering_zero", "steering_gain", "steering_delay", "steering_lag",
+)  # fmt: skip
 CARRIED = (
     "x_f", "x_r", "alpha_f", "alpha_r", "slope_f", "slope_r", "force_f", "force_r",
     "rho", "rate", "z_f", "z_r", "xi_f", "xi_r", "u_f", "u_r",
@@ -208,25 +216,29 @@ def _step(
     return after, out
 
 
+def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+    """Return v_x, v_y, r and δ_f without the sensors' errors, as numbers or as symbols.
+
+    Parameters
+    ----------
+    signals : as logged, those of `SENSED`.
+    p : parameters, those of `SENSORS`.
+    """
+    v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate = signals
+    (factor, b, beta, x_s, late_v, lag_v, b_r, gain_r, late_r, lag_r,
+     zero, gain, late, lag) = p  # fmt: skip
+    true_v_x = v_x * (1 + factor)
+    true_r = (1 + gain_r) * (r + (late_r + lag_r) * r_rate) - b_r
+    true_v_y = v_y + (late_v + lag_v) * v_y_rate - b - beta * true_v_x - x_s * true_r
+    true_delta = (1 + gain) * (delta + (late + lag) * delta_rate) + zero
+    return true_v_x, true_v_y, true_r, true_delta
+
+
 def _sensors(signals: dict[str, Dual], p: dict[str, Dual]) -> tuple[Dual, Dual, Dual, Dual]:
     """Return v_x, v_y, r and δ_f without the sensors' errors."""
-    names = ("v_x", "v_y", "r", "delta_f", "v_y_rate", "r_rate", "delta_rate")
-    v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate = (ca.SX.sym(name) for name in names)
-    of = (
-        "v_x_factor", "v_y_bias", "v_y_angle", "v_y_lever", "v_y_delay", "r_bias", "r_delay",
-        "steering_zero", "steering_gain", "steering_delay",
-    )  # fmt: skip
-    factor, b, beta, x_s, late, r_b, r_late, zero, gain, delta_late = (ca.SX.sym(n) for n in of)
-    true_v_x = v_x * (1 + factor)
-    true_r = r + r_late * r_rate - r_b
-    true_v_y = v_y + late * v_y_rate - b - beta * true_v_x - x_s * true_r
-    true_delta = (1 + gain) * (delta + delta_late * delta_rate) + zero
-    stage = Stage(
-        [v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate,
-         factor, b, beta, x_s, late, r_b, r_late, zero, gain, delta_late],
-        [true_v_x, true_v_y, true_r, true_delta],
-    )  # fmt: skip
-    found = stage([signals[name] for name in names] + [p[name] for name in of])
+    logged, errors = ([ca.SX.sym(name) for name in names] for names in (SENSED, SENSORS))
+    stage = Stage([*logged, *errors], list(true_signals(logged, errors)))
+    found = stage([signals[name] for name in SENSED] + [p[name] for name in SENSORS])
     return found[0], found[1], found[2], found[3]
 
 
@@ -242,7 +254,9 @@ def _sway(
     """Return ρ', ρ and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
     names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
     rho, rate, f_f, f_r, C_f, C_r = (ca.SX.sym(name) for name in names)
-    k_f, k_r, ln_sway, shift, speed, yaw = (ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw"))
+    k_f, k_r, ln_sway, shift, speed, yaw = (
+        ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw")
+    )
     L = car.l_f + car.l_r
     front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
     omega = car.omega * ca.exp(ln_sway)
@@ -336,24 +350,25 @@ def _axle(
     curve = Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
     value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
     # Load and ellipse.
-    phi0, height, brake, drive, cg, f, speed = (
-        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "f", "v")
+    phi0, height, brake, drive, cg, down, f, speed = (
+        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "down", "f", "v")
     )
     other = (car.l_r + cg) if front else (car.l_f - cg)
     shifted = (-height if front else height) * L / other * f
     press = car.press_f if front else car.press_r
-    load = 1 + shifted + press * speed**2
+    load = 1 + shifted + (press + down) * speed**2
     load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
     use = ca.if_else(f > 0, drive, brake) * f
     left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
     a_x = Dual(signals["a_x"].value / GRAVITY, signals["a_x"].slopes)
-    (force,) = Stage([phi0, height, brake, drive, cg, f, speed], [phi0 * load * left])(
+    (force,) = Stage([phi0, height, brake, drive, cg, down, f, speed], [phi0 * load * left])(
         [
             value,
             p["load_transfer"],
             p[f"braking_{axle}"],
             p[f"driving_{axle}"],
             p["cg_shift"],
+            p[f"downforce_{axle}"],
             a_x,
             v_x,
         ]
@@ -371,9 +386,7 @@ def _axle(
     mean = (1 - fall) / (RATE * dt)
     z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
     z = ca.if_else(first > 0, 0, z)
-    bank = Dual(
-        signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes
-    )
+    bank = Dual(signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
     balance = Stage(
         [z0, xi0, u0, F0, angle, ln_I, push, vx, vy, yaw, cg], [z, xi, u, across, RATE * z]
     )

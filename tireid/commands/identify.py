@@ -59,7 +59,7 @@ from tireid.commands.options import (
     seed_of,
     told_map,
 )
-from tireid.diagnoses import add_repair, doctor_text, write_repair
+from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify
 from tireid.output import (
@@ -206,6 +206,7 @@ def run(options: argparse.Namespace) -> int:
         progress.begin(JUDGING)
         if network is not None:
             verdict = judge_prediction(network, histories[0].recording)
+            verdict = with_doctor(verdict, diagnosis, repair)
             progress.begin(DRAWING)
             replays, figures = write_network_results(
                 folder, options.network, law, network, histories, verdict, options.curves
@@ -217,7 +218,7 @@ def run(options: argparse.Namespace) -> int:
             for t in freeze_times:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = learnt.verdict(freeze_times[-1])
+            verdict = with_doctor(learnt.verdict(freeze_times[-1]), diagnosis, repair)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
             figures = write_results(
                 folder,

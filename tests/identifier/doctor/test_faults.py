@@ -1,0 +1,390 @@
+"""Planted faults are found with their sizes, none on a clean drive, and what is unseen is said."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.doctor_cases import KINDS, planted
+from benchmarks.everyday_drives import drawn_everyday
+from identifier.doctor import Finding, examine
+from identifier.doctor.faults import Search, prepared
+from identifier.doctor.pieces import stretches_of
+from identifier.doctor.suspects import NOTES, SUSPECTS
+from identifier.estimate import Drive
+from models.faults import Late, Misaligned, SensorFault, Together
+from models.recordings import Repair
+from models.vehicle import GRAVITY, sedan
+from tests.identifier.conftest import areas_of, pressed
+from tireid.diagnoses import NAMES
+
+# Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
+SIZED = {
+    "offset v_y": 0.02,
+    "offset r": 0.002,
+    "offset a_y": 0.05,
+    "offset delta_f": 0.001,
+    "factor v_x": 0.01,
+    "factor r": 0.01,
+    "factor delta_f": 0.05,
+    "delay r": 0.002,
+    "delay delta_f": 0.012,
+    "delay a_y": 0.002,
+    "misaligned": 0.0017,
+    "velocity sensor": 0.1,
+    "accelerometer": 0.1,
+    "bank": 0.005,
+}
+
+
+def found_in(log, car):
+    """Findings of a log."""
+    return examine(log, car).findings
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """A minute of a sedan with a slalom in it: the car as told, a log, and the exact drive."""
+    drive = drawn_everyday("sedan", "slalom", 1)
+    log = drive.log(np.random.default_rng([1, 1]))
+    return drive.car.told, replace(log, axle_force=None), drive.exact
+
+
+def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
+    car, log, _ = driven
+    said = examine(log, car)
+    assert said.findings == ()
+    assert all("would not be seen" in line for line in said.unseen)
+    assert len(said.unseen) < 3
+
+
+@pytest.mark.parametrize("kind", SIZED)
+def test_a_planted_fault_is_named_first_or_second_with_its_size(driven, kind):
+    car, log, _ = driven
+    fault = planted(kind, car, np.random.default_rng(5))
+    found = found_in(fault.case.log(log), fault.case.car(car))[:2]
+    right = [
+        one for one in found if one.code == fault.code and fault.channel in one.channel.split("+")
+    ]
+    assert right, f"{fault.case}: {[one.text for one in found]}"
+    assert abs(right[0].size - fault.size) < SIZED[kind]
+    assert right[0].confidence > 0.2
+    assert (right[0].repair is None) == (kind == "bank")
+
+
+def roll_of(exact, degrees_per_g):
+    """The roll of a body, a mass on spring and damper: its angle, and how fast it turns."""
+    omega, damping, gain = 2.0 * math.pi * 1.6, 0.35, math.radians(degrees_per_g) / GRAVITY
+    roll = rate = 0.0
+    angle, rates = np.empty((2, len(exact)))
+    for k, a_y in enumerate(exact.a_y):
+        angle[k], rates[k] = roll, rate
+        rate += exact.dt * (omega**2 * (gain * a_y - roll) - 2.0 * damping * omega * rate)
+        roll += exact.dt * rate
+    return angle, rates
+
+
+def rolling(exact, log, degrees_per_g):
+    """The log of an accelerometer that rolls with the body."""
+    angle, _ = roll_of(exact, degrees_per_g)
+    shown = exact.a_y * np.cos(angle) + GRAVITY * np.sin(angle)
+    return replace(log, a_y=shown + log.a_y - exact.a_y)
+
+
+@pytest.mark.parametrize("degrees_per_g", [0.0, 2.0, 4.0, 6.0])
+def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_g):
+    car, log, exact = driven
+    assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.28, 1.4])
+def test_a_scale_that_no_roll_explains_is_named_beside_it(driven, factor):
+    car, log, exact = driven
+    shown = rolling(exact, log, 4.0)
+    found = found_in(replace(shown, a_y=factor * shown.a_y), car)
+    assert (found[0].code, found[0].channel) == ("factor", "a_y")
+    assert found[0].size == pytest.approx(factor, rel=0.1)
+
+
+def test_downforce_is_a_note_and_none_is_missing_where_it_is_told():
+    log, car = pressed(0.3, np.random.default_rng(3))
+    found = found_in(log, car)
+    assert [one.code for one in found] == ["downforce"]
+    assert found[0].note and not found[0].matters and not found[0].sure
+    assert found[0].size * (100.0 / 3.6) ** 2 == pytest.approx(0.3, rel=0.4)
+    assert found_in(log, replace(car, **areas_of(car, 0.3))) == ()
+    assert found_in(*pressed(0.0, np.random.default_rng(3))) == ()
+
+
+def test_every_kind_of_fault_has_a_suspect():
+    codes = {(one.code, one.channel) for one in SUSPECTS} | {("factor", "v_y")}  # not sought
+    car = drawn_everyday("sedan", "slalom", 1).car.told
+    for kind in KINDS:
+        fault = planted(kind, car, np.random.default_rng(0))
+        assert (fault.code, fault.channel) in codes
+
+
+def test_two_faults_at_once_are_both_found(driven):
+    car, log, _ = driven
+    faults = Together(
+        faults=(
+            Late(channels=("a_y",), delay=0.06),
+            SensorFault(channel="delta_f", kind="biased", size=0.02),
+        )
+    )
+    codes = {(one.code, one.channel): one.size for one in found_in(faults.apply(log), car)}
+    assert codes["delay", "a_y"] == pytest.approx(0.06, abs=0.003)
+    assert codes["offset", "delta_f"] == pytest.approx(0.02, abs=0.002)
+
+
+def test_an_inertial_unit_that_is_late_is_one_fault(driven):
+    car, log, _ = driven
+    found = found_in(Late(channels=("r", "a_y"), delay=0.09).apply(log), car)
+    one = next(one for one in found if one.code == "delay")
+    assert one.channel == "r+a_y"
+    assert one.size == pytest.approx(0.09, abs=0.005)
+    assert one.repair == Repair(delay={"r": one.size, "a_y": one.size})
+
+
+def test_a_repair_of_what_was_found_leaves_a_log_in_which_nothing_is_found(driven):
+    car, log, _ = driven
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    (found, *_) = found_in(late, car)
+    assert (found.code, found.channel, found.sure) == ("delay", "r", True)
+    repaired, same = found.repair.apply(late, car)
+    assert not [one for one in found_in(repaired, same) if one.matters]
+
+
+def test_what_is_alike_at_constant_speed_is_named_beside_it(driven):
+    """v_y off by 3 % of the speed: a bias, or a sensor that is turned."""
+    car, log, _ = driven
+    slow = replace(log, v_x=np.full(len(log), float(np.median(log.v_x))))
+    turned = Misaligned(angle=0.03).apply(replace(log, v_x=slow.v_x, a_y=None))
+    first, second = found_in(turned, car)[:2]
+    codes = {(one.code, one.channel) for one in (first, second)}
+    assert codes == {("velocity_sensor_angle", "v_y"), ("offset", "v_y")}
+    assert not first.sure
+    assert "cannot tell it from" in first.text
+
+
+def test_a_number_of_the_car_is_a_note_and_neither_an_alarm_nor_sure(driven):
+    car, log, _ = driven
+    inertia = planted("yaw inertia", car, np.random.default_rng(5)).case.car(car)
+    (found, *_) = found_in(log, replace(inertia, estimated=("yaw_inertia",)))
+    assert found.code == "yaw_inertia" and found.code in NOTES
+    assert found.note and not found.sure and not found.matters
+    right = found.repair.on(inertia)
+    assert right.yaw_inertia == pytest.approx(car.yaw_inertia, rel=0.25)
+    assert found.to_dict()["note"] is True
+
+
+def test_what_leaves_no_car_is_not_believed(driven):
+    car, _, _ = driven
+    by_code = {one.code: one for one in SUSPECTS}
+    center, inertia, lag = (by_code[code] for code in ("center_of_gravity", "yaw_inertia", "lag"))
+    assert center.possible(0.1, car) and not center.possible(0.9 * car.l_f, car)
+    assert inertia.possible(1.3, car) and not inertia.possible(8.0, car)
+    assert lag.possible(0.1, car) and not lag.possible(-0.1, car)
+
+
+# When a repair is sure.
+
+
+def searched(log, car):
+    """The search of a log, and the estimate that it ends with."""
+    search = prepared(log, car)
+    return search, search.run()
+
+
+def test_a_model_of_the_repaired_log_explains_the_half_that_did_not_teach_it(driven):
+    """The force missed of each half: without the fault, with it, and with another in its place."""
+    car, log, _ = driven
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    search, post = searched(late, car)
+    first = search.found[0].first
+    assert first.suspect.parameter == "r_delay" and search.found[0].sure
+    parts = search.problem.halves()
+    assert (parts[0] + parts[1] == 1.0).all()
+    force = search.problem.force**2
+    assert parts[0] @ force == pytest.approx(parts[1] @ force, rel=0.05)
+    told = search.left_out(post, search.wide, parts)
+    plain = Search(problem=search.problem, accelerometer=None)
+    without = plain.left_out(plain.nominal(), {}, parts)
+    assert (told < without).all()
+
+
+def test_what_does_not_help_the_other_half_is_not_sure(driven, monkeypatch):
+    car, log, _ = driven
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    monkeypatch.setattr(Search, "left_out", lambda *_, **__: np.array([0.1, 0.1]))
+    found = found_in(late, car)[0]
+    assert (found.code, found.channel, found.sure) == ("delay", "r", False)
+
+
+def test_a_rival_that_helps_as_much_takes_the_sureness(driven):
+    """Two suspects of one gain: the drive does not tell which of them it is."""
+    car, log, _ = driven
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    search, _ = searched(late, car)
+    best = search.found[0].first
+    search.wide, search.mean = {}, {}
+    base = search.nominal()
+    rival = best._replace(gain=best.gain - 1.0)
+    assert search.stands(best, None, base)
+    assert not search.stands(best, rival, base)
+    same = best._replace(gain=best.gain - 20.0)
+    assert not search.stands(best, same, base), "the rival's repair is as good as this"
+
+
+@pytest.mark.parametrize("between", [2, 3])
+def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driven, between):
+    car, log, _ = driven
+    t = np.linspace(log.t[0], log.t[-1], between * (len(log) - 1) + 1)
+    names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+    signals = {name: np.interp(t, log.t, getattr(log, name)) for name in names}
+    assert found_in(replace(log, t=t, **signals), car) == ()
+
+
+@pytest.mark.parametrize(
+    ("parameter", "word"),
+    [("r_delay", "early"), ("r_bias", "too little"), ("v_y_lever", "behind"),
+     ("cg_shift", "too far forward"), ("bank", "to the right")],
+)  # fmt: skip
+def test_what_is_negative_is_said_the_other_way_round(parameter, word):
+    suspect = next(one for one in SUSPECTS if one.parameter == parameter)
+    assert word not in suspect.words(0.1, 0.01, sedan())
+    said = suspect.words(-0.1, 0.01, sedan())
+    assert word in said and "-" not in said
+
+
+def test_a_yaw_inertia_that_the_file_leaves_out_was_estimated_and_not_told():
+    suspect = next(one for one in SUSPECTS if one.code == "yaw_inertia")
+    assert suspect.words(1.35, 0.1, sedan()).startswith("the told yaw inertia is 1.35")
+    left_out = replace(sedan(), estimated=("yaw_inertia",))
+    assert suspect.words(1.35, 0.1, left_out).startswith("the estimated yaw inertia is 1.35")
+
+
+def test_a_log_that_no_fault_explains_has_none_and_says_so(driven):
+    """The steering is what a servo was told, which went another way."""
+    car, log, _ = driven
+    said = examine(replace(log, delta_f=log.delta_f[::-1].copy()), car)
+    assert said.findings == ()
+    assert "front axle" in said.unseen[0] and "commanded" in said.unseen[0]
+
+
+def test_what_a_straight_drive_cannot_tell_is_said(driven):
+    car, log, _ = driven
+    names = ("v_y", "r", "delta_f", "a_y")
+    straight = replace(log, **{name: 0.003 * getattr(log, name) for name in names})
+    said = examine(straight, car)
+    assert said.findings == ()
+    assert any(line.startswith("center of gravity") for line in said.unseen)
+
+
+def test_a_drive_that_never_drives_is_not_asked(driven):
+    car, log, _ = driven
+    said = examine(replace(log, v_x=0.01 * log.v_x), car)
+    assert said.findings == ()
+    assert "hardly drives" in said.unseen[0]
+
+
+def test_a_long_log_is_looked_at_where_it_is_lively(driven):
+    car, log, _ = driven
+    n = 10 * len(log)
+    longer = replace(
+        log,
+        t=log.dt * np.arange(n),
+        **{
+            name: np.tile(getattr(log, name), 10)
+            for name in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+        },
+    )
+    parts = stretches_of(longer, car, longest=60.0, pieces=4)
+    assert len(parts) == 4
+    assert sum(part.duration for part in parts) == pytest.approx(60.0, abs=0.1)
+    turning = math.sqrt(sum(np.mean(part.r**2) for part in parts) / 4.0)
+    assert turning > math.sqrt(np.mean(log.r**2))
+    assert stretches_of(log, car, longest=61.0, pieces=4) == (log,)
+
+
+@pytest.mark.parametrize("n", range(6000, 6006))
+def test_a_log_that_is_hardly_longer_than_what_is_looked_at_is_cut_all_the_same(driven, n):
+    """A minute at 100 Hz and some samples: parts then are as long as what is taken of them."""
+    car, log, _ = driven
+    fine = np.linspace(0.0, 59.0, n)
+    names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+    signals = {name: np.interp(fine, log.t, getattr(log, name)) for name in names}
+    minute = replace(log, t=0.01 * np.arange(n), **signals)
+    parts = stretches_of(minute, car, longest=60.0, pieces=4)
+    if minute.duration <= 60.0:
+        assert parts == (minute,)
+    else:
+        assert [len(part) for part in parts] == [1500] * 4
+
+
+def test_nothing_is_made_of_the_jump_over_a_gap(driven):
+    car, log, _ = driven
+    n = len(log)
+    kept = np.r_[0 : n // 3, n // 3 + 700 : n // 3 + 750, n // 2 : n]
+    broken = log.taken(kept)
+    assert len(broken.breaks) == 2
+    parts = stretches_of(broken, car, longest=61.0, pieces=4)
+    assert [len(part) for part in parts] == [n // 3, n - n // 2]  # half a second is left out
+    assert not any(part.breaks for part in parts)
+    assert found_in(broken, car) == ()
+    late = Late(channels=("r",), delay=0.08).apply(log).taken(kept)
+    assert found_in(late, car)[0].size == pytest.approx(0.08, abs=0.006)
+
+
+@pytest.mark.parametrize("suspect", SUSPECTS, ids=lambda one: one.parameter)
+def test_a_suspect_repairs_what_it_says(suspect, driven):
+    car, log, _ = driven
+    size = suspect.size(0.5 * suspect.wide)
+    repair = suspect.repair(size, car)
+    assert (repair is None) == (suspect.code in ("bank", "downforce"))
+    if repair is not None:
+        assert repair
+        repair.apply(log, car)
+    assert "±" in suspect.words(size, 0.1 * size, car)
+
+
+def test_a_late_signal_is_read_on_time_within_each_stretch(driven):
+    car, log, exact = driven
+    n = len(log)
+    late = Late(channels=("v_y", "r"), delay=0.1).apply(exact)
+    kept = np.r_[0 : n // 2, n // 2 + 50 : n]
+    drive = Drive.of(late.taken(kept), car)
+    right = Drive.of(exact.taken(kept), car)
+    assert drive.begins == (0, n // 2)
+    read = drive.on_time((0.1, 0.1, 0.0))
+    inside = np.r_[100 : n // 2 - 100, n // 2 + 100 : n - 200]
+    for signals in ("signals", "rates"):
+        columns = slice(1, 3) if signals == "signals" else slice(0, 2)
+        one, other = (getattr(x, signals)[inside, columns] for x in (read, right))
+        np.testing.assert_allclose(one, other, atol=0.02 * np.abs(other).max())
+    np.testing.assert_array_equal(read.signals[:, 0], drive.signals[:, 0])
+    np.testing.assert_array_equal(read.signals[:, 3], drive.signals[:, 3])
+
+
+def test_a_line_of_the_accelerometer_tells_what_is_wrong_with_it(driven):
+    car, log, _ = driven
+    wrong = replace(log, a_y=1.3 * log.a_y + 0.5)
+    search = prepared(Late(channels=("a_y",), delay=0.05).apply(wrong), car)
+    base = search.nominal()
+    wide = {"a_y.offset": 1.0, "a_y.factor": 0.5, "a_y.delay": 0.2}
+    b, factor, late, *_ = search.accelerometer.line(base.p, wide).numbers
+    assert 1.0 / factor == pytest.approx(1.3, rel=0.03)
+    assert b / factor == pytest.approx(0.5, abs=0.05)
+    assert late == pytest.approx(0.05, abs=0.005)
+
+
+def test_a_finding_that_is_sure_has_a_repair():
+    with pytest.raises(ValueError, match="must have a repair"):
+        Finding(code="delay", confidence=1.0, sure=True)
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        Finding(code="delay", confidence=1.2)
+
+
+def test_every_suspect_has_a_name_in_words():
+    assert {one.code for one in SUSPECTS if "_" in one.code} <= set(NAMES)
