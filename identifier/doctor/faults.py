@@ -42,12 +42,14 @@ class Rules:
     """Limits of the search, chosen on random cars of the plant.
 
     interval : of samples that are looked at [s], of a sedan.
-    longest, pieces : s that are looked at, and from how many parts of a longer log.
+    longest, pieces : s that are looked at of a log, and from how many parts of a longer one.
+    logs, log : most logs that are looked at as long, and what a stretch must last to be one [s].
     shortest : s that must be driven.
     margin : s at both ends of a stretch that do not count, as a delay may need them.
     gain : of J that a fault must bring [nats].
     state : the same over the value zero, of what the nominal estimate has as a state.
     telling : deviations, with the least size in them, that a size must have.
+    against : nats by which the accelerometer may speak against a fault.
     alike : gain within which two cannot be told apart.
     fitted, most : suspects that are fitted in a round, and faults that are taken in.
     steps, enough : of Gauss-Newton for each, and the gain of a step that ends it.
@@ -62,11 +64,14 @@ class Rules:
     interval: float = 0.02
     longest: float = 60.0
     pieces: int = 4
+    logs: int = 3
+    log: float = 10.0
     shortest: float = 5.0
     margin: float = 0.4
     gain: float = 12.0
     state: float = 8.0
     telling: float = 2.5
+    against: float = 4.0
     alike: float = 4.0
     fitted: int = 4
     most: int = 3
@@ -124,7 +129,7 @@ class Accelerometer:
     ) -> None:
         self.drives, L = drives, vehicle.wheelbase
         roll = 0.008 * float(np.sqrt(L / SEDAN))  # s, by which weight follows it
-        self.mean = np.array([0.0, 0.955, 0.0, 0.0, 0.0])  # a body rolls by 0 to 6 degrees per g
+        self.mean = np.array([0.0, 0.97, 0.0, 0.0, 0.0])  # a body rolls by 0 to 6 degrees per g
         self.usual = np.array([0.04, 0.03, roll, 0.012 * L, 1e-6])
         self.memory = 0.0
         self.size: Array | None = None
@@ -235,6 +240,7 @@ class Candidate(NamedTuple):
     """A suspect that was fitted beside what is there: its value, deviation and gain of J.
 
     shown : how much it brings over the value zero; of what is no state of the estimate, `gain`.
+    felt : of the gain what the accelerometer says; negative where it speaks against it.
     """
 
     suspect: Suspect
@@ -242,6 +248,7 @@ class Candidate(NamedTuple):
     deviation: float
     gain: float
     shown: float
+    felt: float
     post: Posterior | None
 
 
@@ -354,7 +361,7 @@ class Search:
             gains[one.parameter] = before - change, 0.0
         line = self.line(base.p, self.wide)
         for one in self.left(of_model=True) if line is not None else []:
-            if one.parameter not in (*SENSORS, "bank"):
+            if one.parameter not in (*SENSORS, "bank") or one.code == "lag":
                 continue
             k, width = INDEX[one.parameter], one.scaled(one.wide, self.vehicle)
             size = np.zeros(base.p.size)
@@ -394,16 +401,18 @@ class Search:
             k = OF_A_Y.index(one.parameter)
             value = _value(one, after)
             gain = before.cost - after.cost
-            return Candidate(one, value, float(after.deviations[k]), gain, gain, None)
+            return Candidate(one, value, float(after.deviations[k]), gain, gain, gain, None)
         problem = self.problem.under(self.priors(wide))
         start = base.p.copy()
         start[INDEX[one.parameter]] += begin
         post = descend(problem, start, base.memory, RULES.steps, RULES.enough)
         gain = base.cost - post.cost - one.price
         value, sd = post[one.parameter], post.sd(one.parameter)
+        felt = 0.0
         if before is not None and one.code != "downforce":
-            post, sd, more = self.both(post, one.parameter)
-            value, gain = post[one.parameter], gain + before.cost - more
+            post, sd, line, moved = self.both(post, one.parameter)
+            value, felt = post[one.parameter], before.cost - line
+            gain += felt - moved
         if one.code == "downforce":
             shares = np.array(self.vehicle.axle_loads) / self.vehicle.weight
             value = float(shares @ [post[name] for name in one.parameters])
@@ -411,10 +420,10 @@ class Search:
         if base.sd(one.parameter) > 0.0:
             least = one.scaled(one.least, self.vehicle)
             shown = max(gain, 0.5 * value**2 / (sd**2 + least**2))
-        return Candidate(one, value, sd, gain, shown, post)
+        return Candidate(one, value, sd, gain, shown, felt, post)
 
-    def both(self, post: Posterior, name: str) -> tuple[Posterior, float, float]:
-        """Return an estimate moved along a parameter to where a_y fits too; sd and J that adds.
+    def both(self, post: Posterior, name: str) -> tuple[Posterior, float, float, float]:
+        """Return an estimate moved along a parameter to where a_y fits too; its sd and both J.
 
         The balance is a parabola of the parameter there, the others moving with it.
         """
@@ -429,7 +438,8 @@ class Search:
 
         step, curvature, best = descended(cost, sd)
         moved = replace(post, p=post.p + step * along)
-        return moved, 1.0 / math.sqrt(curvature), best
+        bent = 0.5 * (step / sd) ** 2
+        return moved, 1.0 / math.sqrt(curvature), best - bent, bent
 
     def candidates(self, base: Posterior, at: Residuals) -> list[Candidate]:
         """Return the suspects that may be believed beside what is there, the best first."""
@@ -462,7 +472,7 @@ class Search:
         telling = abs(one.value) > RULES.telling * math.hypot(one.deviation, least)
         most = 3.5 * one.suspect.scaled(one.suspect.wide, self.vehicle)
         possible = one.suspect.possible(one.suspect.size(one.value), self.vehicle)
-        return telling and possible and abs(one.value) < most
+        return telling and possible and abs(one.value) < most and one.felt > -RULES.against
 
     def run(self) -> Posterior:
         """Take in one fault after the other; return the estimate with all of them."""
@@ -503,28 +513,22 @@ class Search:
 
         Each half is asked about a fault that the other half was fitted on.
         """
+        suspect, wide = best.suspect, self.widened(best.suspect)
         lead = best.shown - (rival.gain if rival is not None else 0.0)
-        deviation = math.hypot(
-            best.deviation, best.suspect.scaled(best.suspect.least, self.vehicle)
-        )
-        if (
-            best.shown < RULES.sure
-            or lead < RULES.ahead
-            or abs(best.value) < RULES.clear * deviation
-            or best.suspect.code in NOTES
-        ):
+        deviation = math.hypot(best.deviation, suspect.scaled(suspect.least, self.vehicle))
+        clear = abs(best.value) > RULES.clear * deviation and suspect.code not in NOTES
+        # Factors of v_x and r change what the accelerometer must show: it has to agree.
+        agreed = best.felt > (RULES.ahead if suspect.price else -1.0)
+        if best.shown < RULES.sure or lead < RULES.ahead or not (clear and agreed):
             return False
-        if best.post is None:
+        if best.post is None:  # of the accelerometer: it changes no tire
             return True
         parts = self.problem.halves()
-        state = best.gain < RULES.gain
-        without = base if not state else None
-        told = self.left_out(best.post, self.widened(best.suspect), parts)
-        plain = (
-            self.left_out(without, self.wide, parts)
-            if without is not None
-            else self.left_out(best.post, self.widened(best.suspect), parts, zero=best.suspect)
-        )
+        told = self.left_out(best.post, wide, parts)
+        if best.gain < RULES.gain:  # the nominal estimate has it as a state
+            plain = self.left_out(best.post, wide, parts, zero=suspect)
+        else:
+            plain = self.left_out(base, self.wide, parts)
         if not (told < (1.0 - RULES.better) * plain).any() or (told > 1.01 * plain).any():
             return False
         if rival is None or rival.post is None:
@@ -595,7 +599,11 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
 
 def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
     """Return the search of a drive, None where too little is driven."""
-    stretches = stretches_of(recording, vehicle, longest=RULES.longest, pieces=RULES.pieces)
+    whole = sum((one.stop - one.start) * recording.dt > RULES.log for one in recording.stretches)
+    logs = min(max(whole, 1), RULES.logs)
+    stretches = stretches_of(
+        recording, vehicle, longest=logs * RULES.longest, pieces=logs * RULES.pieces
+    )
     has_a_y = recording.a_y is not None
     fastest = min(RULES.interval, RULES.interval * math.sqrt(vehicle.wheelbase / SEDAN) + 0.004)
 

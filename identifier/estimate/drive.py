@@ -4,7 +4,6 @@ The balance is linear in its signals but for slip: the same zero-phase mean over
 nothing and takes noise away.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -94,7 +93,7 @@ class Drive:
             begins=(0, *(int(k) for k in ends[:-1])),
         )
 
-    def on_time(self, delays: Sequence[float]) -> "Drive":
+    def on_time(self, delays: Array) -> "Drive":
         """Return the drive with late signals read later, and their rates there.
 
         Parameters

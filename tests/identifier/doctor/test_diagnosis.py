@@ -108,10 +108,11 @@ def test_a_unit_comes_before_the_offset_that_is_found_behind_it(driven):
     """Logged in degrees with 0.02 rad/s too much: the offset is told in rad/s, and taken off so."""
     car, log = driven
     biased = SensorFault(channel="r", kind="biased", size=0.02).apply(log)
-    found = diagnose(SensorFault(channel="r", kind="scaled", size=57.3).apply(biased), car)
-    assert [(one.code, one.channel) for one in found.findings] == [("unit", "r"), ("offset", "r")]
-    assert found.findings[1].size == pytest.approx(0.02, abs=0.002)
-    mended, _ = found.repair.apply(replace(biased, r=57.3 * biased.r), car)
+    found = diagnose(SensorFault(channel="r", kind="scaled", size=57.3).apply(biased), car).findings
+    assert [(one.code, one.channel) for one in found[:2]] == [("unit", "r"), ("offset", "r")]
+    assert found[1].size == pytest.approx(0.02, abs=0.002)
+    assert "bank" in found[1].text, "at one speed a road that is banked looks the same"
+    mended, _ = combined(found[:2]).apply(replace(biased, r=57.3 * biased.r), car)
     np.testing.assert_allclose(mended.r, log.r, atol=0.002)
 
 
