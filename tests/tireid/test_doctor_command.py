@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from identifier.doctor import Diagnosis, Finding
+from identifier.verdict import Verdict
 from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.pages import faults_of
 from tireid.cli import main
-from tireid.diagnoses import size_text, write_repair
+from tireid.diagnoses import size_text, with_doctor, write_repair
 
 RATIO = 14.6
 
@@ -138,3 +139,27 @@ def test_sizes_have_the_digits_that_their_deviations_leave():
     angle = Finding(code="offset", channel="delta_f", size=np.radians(1.0), unit="rad")
     assert size_text(angle) == "1 deg"
     assert size_text(Finding(code="straight")) == ""
+
+
+def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():
+    """A wrong unit refuses the answer, a size is noted, and what was repaired says nothing."""
+    unit, late, doubtful = (
+        Finding(code=code, channel="r", confidence=1.0, text=code, repair=repair, sure=sure)
+        for code, repair, sure in (
+            ("unit", Repair(factor={"r": 0.02}), True),
+            ("delay", Repair(delay={"r": 0.1}), True),
+            ("offset", Repair(offset={"r": 0.1}), False),
+        )
+    )
+    fine, nothing = Verdict(findings=(), numbers=(), measures={}), Repair()
+
+    def said(*findings, repair=nothing):
+        return with_doctor(fine, Diagnosis(name="log", findings=findings, unseen=()), repair)
+
+    assert said(doubtful) == fine
+    noted = said(late)
+    assert noted.valid and noted.lines[1] == "note: doctor: delay"
+    refused = said(late, unit)
+    assert not refused.valid
+    assert [one.text for one in refused.findings] == ["doctor: unit", "doctor: delay"]
+    assert said(late, unit, repair=late.repair) == fine
