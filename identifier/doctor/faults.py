@@ -83,7 +83,7 @@ class Rules:
     ahead: float = 6.0
     clear: float = 3.5
     better: float = 0.03
-    unexplained: float = 0.6
+    unexplained: float = 0.4
     untold: float = 0.6
 
 
