@@ -6,7 +6,7 @@ import sys
 import pytest
 
 SEDAN = "import tireid as ti; print(ti.sedan().name)"
-# A process of its own unpickles a car before anything else; `-c` has no file that it could run first.
+# The other process unpickles a car before it has imported anything of tireid.
 SPAWNED = """
 import dataclasses
 import tireid as ti
