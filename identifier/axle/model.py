@@ -200,6 +200,11 @@ class AxleModel(TireModel):
         """Whether the model can tell how sure it is: by its covariance."""
         return True
 
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of its band was found on parts of the drive that did not teach."""
+        return self.calibration is not None
+
     def with_calibration(self, calibration: BandCalibration | None) -> "AxleModel":
         """Return the model, its band calibrated.
 

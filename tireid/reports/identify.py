@@ -227,10 +227,9 @@ def band_sentence(model: TireModel) -> str:
         return ""
     at = model.force(known)
     shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
-    calibrated = getattr(model, "calibration", None) is not None
     how = (
         "its width was found on parts of the drive that had not taught the model, by the motion"
-        if calibrated
+        if model.band_calibrated
         else "the drive was too short to check its width, which is what learning believes"
     )
     return (
