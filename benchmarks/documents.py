@@ -8,7 +8,8 @@ number above it, in their order:
     script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
                      tireid_paper has those of the tables that a test computes again, house
                      what docs/house.py counts of the code, fault_table_before what
-                     fault_table.py measured at the commit that the file names
+                     fault_table.py measured at the commit that the file names, mpc_speed_before
+                     instructions of a step there, and at the end
     key              measured: the number is the recorded value, rounded as it is printed
     key*1e3          times a factor, where the document has another unit
     key~3            rounded to three significant digits, as in 60 800
@@ -45,6 +46,7 @@ COMMITTED = {
     "tireid_paper": ROOT / "tests" / "tireid" / "expected_tables.json",
     "house": ROOT / "docs" / "house.json",
     "fault_table_before": ROOT / "benchmarks" / "fault_table_before.json",
+    "mpc_speed_before": ROOT / "benchmarks" / "mpc_speed_before.json",
 }
 REASONS = ("input", "target", "definition", "formula", "paper", "standard", "version", "name")
 Values = Mapping[str, Mapping[str, float | int | str]]  # by script, by key
