@@ -39,6 +39,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "dither": [],
     "fleet": [],
     "guaranteed": [],
+    "guaranteed_faster": [],
     "road_friction": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],

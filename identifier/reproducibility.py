@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
 from identifier.run import History
-from identifier.tire_model import TireModel
+from identifier.tire_model import UNCALIBRATED, TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
@@ -226,7 +226,14 @@ class Prediction:
 
         None where the model has no band, or too little is driven; computed at each call, as part
         of the verdict.
+
+        Raises
+        ------
+        ValueError
+            Where the band of the model is not calibrated: its errors would look like friction.
         """
+        if self.model.has_band and not self.model.band_calibrated:
+            raise ValueError(f"friction() wants a calibrated band; this one is {UNCALIBRATED}")
         return self.verdict().friction
 
     def motion_text(self) -> str:

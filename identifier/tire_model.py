@@ -29,6 +29,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
+UNCALIBRATED = "what learning believes, not calibrated; `run.calibrated()` checks it on the drive"
 
 
 class TireFunctions(NamedTuple):
@@ -334,6 +335,14 @@ class TireModel(ABC):
         """Whether the model can tell how sure it is."""
         return False
 
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of `band` was found on parts of the drive that did not teach.
+
+        As of `History.calibrated`, where enough was driven; else it is what learning believes.
+        """
+        return False
+
     def with_calibration(self, calibration: "BandCalibration | None") -> "TireModel":
         """Return the model, its band calibrated; as it is where it has none.
 
@@ -427,7 +436,8 @@ class TireModel(ABC):
     ) -> tuple[float, float] | tuple[Array, Array] | None:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
 
-        None where the model cannot tell how sure it is.
+        None where the model cannot tell how sure it is; `band_calibrated` says whether it is so in
+        that share of cases, or as learning believes.
 
         Parameters
         ----------
@@ -585,6 +595,9 @@ class TireModel(ABC):
                 for fact in facts
             ),
         ]
+        if self.has_band:
+            how = "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
+            lines.append(f"band: {how}")
         if self.vehicle.estimates:
             lines.append(self.vehicle.estimates)
         return "\n".join(lines)

@@ -11,6 +11,8 @@ What is not used is not imported: each name is fetched where it is asked for.
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from tireid.home import find_own_packages
+
 if TYPE_CHECKING:
     from identifier.axle import AxleIdentifier
     from identifier.doctor import Diagnosis, diagnose
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
     from tireid.planning import plan
 
     __version__: str
+
+find_own_packages()
 
 _HOMES = {
     "AxleIdentifier": ("identifier.axle", "AxleIdentifier"),

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 from identifier.compare.work import Map, source_digest
+from models.extras import needs
 
 PATIENCE = 30.0  # s that the scheduler and the first worker may take to answer
 _ONE_AT_A_TIME = threading.Lock()  # CasADi's graphs must not be built by two threads of a worker
@@ -34,12 +35,12 @@ def cluster(address: str) -> Iterator[Map]:
     ClusterError
         Where the scheduler or a worker does not answer, or a worker has another version of tireid.
     ImportError
-        Where Dask is not installed; the message names the extra.
+        Where Dask is not installed; the message says how to install it.
     """
     try:
         dask: Any = importlib.import_module("distributed")
     except ImportError as error:
-        raise ImportError("--scheduler needs Dask: pip install 'tireid[cluster]'") from error
+        raise ImportError(needs("--scheduler", "Dask", "cluster")) from error
     try:
         client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -57,12 +58,17 @@ def _require_workers(client: Any, address: str) -> None:
     except TimeoutError as error:
         raise ClusterError(f"{address}: the scheduler has no workers") from error
     try:
-        versions = client.run(source_digest)
+        versions = client.run(_digest)
     except Exception as error:
         raise ClusterError(f"{address}: a worker cannot load tireid: {error}") from error
     other = sorted(worker for worker, digest in versions.items() if digest != source_digest())
     if other:
         raise ClusterError(f"{address}: worker {other[0]} has another version of tireid")
+
+
+def _digest() -> str:
+    """Return the digest by a function of tireid, which finds its own packages on a worker."""
+    return source_digest()
 
 
 def _map(

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from models.extras import needs
 from models.files import resolved
 from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
@@ -379,7 +380,7 @@ def _parquet() -> tuple[Any, Any]:
     try:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError:
-        raise ValueError("--curves parquet needs pyarrow: pip install tireid[parquet]") from None
+        raise ValueError(needs("--curves parquet", "pyarrow", "parquet")) from None
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:

@@ -45,7 +45,8 @@ class Regression:
         [`error`]: a smaller one could be theirs.
     moment : over which that force is meant [s]: noise is no force.
     sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
-    clip : largest error that counts in full [its standard deviation].
+    clip : largest error that counts in full, over the standard deviation that y is told to have
+        times `ErrorState.slow` [-].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
     rate : by which learning may change the force of a curve [static axle loads/s]; three times
         what a change of friction asks for.
@@ -218,7 +219,7 @@ def update(
 
 LARGEST_Q = 25.0  # one outlier alone is no alarm
 SLOW_Q = 4.0  # and the slow mean shall not follow a change
-MOST_SLOW = 4.0  # errors above twice what is told are no noise that learning may get used to
+MOST_SLOW = 4.0  # squared errors: above twice what is told they are no noise to get used to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -282,7 +283,8 @@ class ChangeNumbers(NamedTuple):
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast and slow mean of q [-]; recent peak of the measured force, which is a mean
+    """Columns (2,): fast mean of q [-]; slow mean of q, by which the variance of y is larger than
+    told, from 1 to 4 [-]; recent peak of the measured force, which is a mean
     of y over a moment [static axle loads].
     """
 

@@ -200,6 +200,11 @@ class AxleModel(TireModel):
         """Whether the model can tell how sure it is: by its covariance."""
         return True
 
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of its band was found on parts of the drive that did not teach."""
+        return self.calibration is not None
+
     def with_calibration(self, calibration: BandCalibration | None) -> "AxleModel":
         """Return the model, its band calibrated.
 
@@ -424,6 +429,7 @@ class AxleModel(TireModel):
         units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
         beyond = beyond_driven(alpha[:, None], self.driven_slip)
         rates = np.repeat(np.abs(rate)[:, None], 2, axis=1)
+        beyond = beyond + self.guarantee.too_fast(rates)
         low, high = self.guarantee.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
         return low * self._loads, high * self._loads
 
@@ -467,17 +473,19 @@ class AxleModel(TireModel):
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
         pressed = self.vehicle.load_ratio(recording.v_x)
         T *= pressed[..., None]
+        beyond = slip_beyond(slip, self.driven_slip, dt, stretches)
         if self.guarantee is None:
             rate = force_rate(T, (self.W[:1], self.W[1:]), dt, stretches)
         else:
             rate = force_rate(T, self.guarantee.corners, dt, stretches)
             v_x = np.maximum(recording.v_x, self.min_speed)
             rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
+            beyond += self.guarantee.too_fast(rate)
         v_y = 0.0 if recording.v_y is None else recording.v_y
         along = along_acceleration(recording.v_x, v_y * recording.r, dt, stretches)
         carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
         doubt = Doubt(
-            beyond=slip_beyond(slip, self.driven_slip, dt, stretches),
+            beyond=beyond,
             rate=rate,
             lost=grip_lost(along[:, None] * self.vehicle.mass / self._loads, carried),
         )

@@ -375,7 +375,8 @@ def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
 
     h : regressors (2, q).   e : y - h'w (2,).   counts : share of e that counts, after clipping.
     gains : K (2, q), 0 where nothing is learnt; of lag and offsets also while the watch rests.
-    told : standard deviation that y is told to have (2,), the slow mean of errors in it.
+    told : standard deviation that y is told to have (2,), without what the slow mean of squared
+    errors adds.
     watched : whether kept weights come back, and by how much they follow the learnt ones.
 
     Parameters

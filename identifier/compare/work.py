@@ -62,12 +62,25 @@ def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> 
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=_begin_process,
-        initargs=(prepare,),
+        initializer=exec,
+        initargs=(BEGIN, {"prepare": prepare}),
     )
 
 
-def _begin_process(prepare: Callable[[], None] | None) -> None:
+# A new process knows no module yet: tireid is its first, which finds its own packages.
+BEGIN = """import tireid
+from identifier.compare.work import begin_process
+begin_process(prepare)
+"""
+
+
+def begin_process(prepare: Callable[[], None] | None) -> None:
+    """Let this process, one of a pool, end with the one that made it.
+
+    Parameters
+    ----------
+    prepare : what it does first; None for nothing.
+    """
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if prepare is not None:
         prepare()

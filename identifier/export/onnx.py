@@ -26,6 +26,7 @@ from identifier.export.specialize import INPUTS, Signal
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
+from models.extras import needs
 from models.files import write_atomically
 
 # An ONNX graph, node by node: every value is a name, every operation returns that of its result.
@@ -38,7 +39,7 @@ IR_VERSION = 7  # of the file format that came with opset 13
 
 
 class MissingOnnxError(ImportError):
-    """The package onnx is not installed; `pip install tireid[onnx]` brings it."""
+    """The package onnx is not installed; the message says how to install it."""
 
 
 def onnx_package() -> Any:
@@ -52,9 +53,7 @@ def onnx_package() -> Any:
     try:
         import onnx
     except ImportError as error:
-        raise MissingOnnxError(
-            "writing ONNX needs the package onnx: pip install tireid[onnx]"
-        ) from error
+        raise MissingOnnxError(needs("writing ONNX", "the package onnx", "onnx")) from error
     return onnx
 
 

@@ -324,11 +324,13 @@ def printed(command: Sequence[str], folder: Path, wanted: Sequence[str]) -> dict
 class Cost(NamedTuple):
     """What a package costs on a processor.
 
-    flash : code and constants [bytes].   replay : what a replay tells.
+    compiler : what it says of itself.   flash : code and constants [bytes].
+    replay : what a replay tells.
     static_ram : data that may change and is not the caller's [bytes].
     """
 
     processor: str
+    compiler: str
     single: bool
     flash: int
     replay: Replay
@@ -350,12 +352,13 @@ def measure(package: Package, progress: Callable[[float], None] | None = None) -
     if missing_tools():
         return []
     name, samples = package.specialized.name, synthetic_samples(package.specialized)
-    costs = []
+    compiler, costs = compiler_version(CROSS_COMPILER), []
     for processor in PROCESSORS:
         for single in (True, False):
             size = size_on(processor, name, package.files, single=single)
             replay = replay_on(processor, name, package.files, samples, single=single)
-            costs.append(Cost(processor.name, single, size.flash, replay, size.static_ram))
+            cost = Cost(processor.name, compiler, single, size.flash, replay, size.static_ram)
+            costs.append(cost)
             if progress is not None:
                 progress(len(costs) / (2 * len(PROCESSORS)))
     return costs
@@ -382,7 +385,7 @@ def figures_text(costs: list[Cost]) -> str:
         for cost in costs
     )
     return (
-        f"{head}{rows}\n{compiler_version(CROSS_COMPILER)}, -O2; instructions\nand stack by "
+        f"{head}{rows}\n{costs[0].compiler}, -O2; instructions\nand stack by "
         f"{EMULATOR} over the samples of the self-test. Each instance has a state of its\nown; "
         "parameters may be shared, or lie in flash."
     )
@@ -400,7 +403,7 @@ def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
         {
             "processor": cost.processor,
             "precision": "float" if cost.single else "double",
-            "compiler": compiler_version(CROSS_COMPILER),
+            "compiler": cost.compiler,
             "flash_B": cost.flash,
             "ram_B": cost.ram,
             "static_ram_B": cost.static_ram,

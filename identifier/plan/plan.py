@@ -209,7 +209,12 @@ def make_plan(
     longest = longest_pass(tires, space)
     needed = FEWEST * swing_time(tires, space)
     if min(longest, time) < needed:
-        raise PlanError(_too_small(tires, space, min(longest, time), needed))
+        if longest >= needed:
+            raise PlanError(
+                f"{needed:.2g} s are needed to steer three times at {space.speed:g} m/s, "
+                f"the time is {time:g}"
+            )
+        raise PlanError(_too_small(tires, space, longest, needed))
     count = max(1, math.ceil(time / longest))
     if count > MOST_PASSES:
         raise PlanError(

@@ -112,9 +112,9 @@ def road_friction(
 ) -> RoadFriction | None:
     """Return the friction of a drive's road; None where nobody can tell.
 
-    Nobody can of a model without a band, and of a drive of fewer than eight brisk windows. More
-    friction is told of a model alone that learnt its grip. Of a long drive those parts are asked
-    that the verdict asks.
+    Nobody can of a model without a calibrated band, and of a drive of fewer than eight brisk
+    windows. More friction is told of a model alone that learnt its grip. Of a long drive those
+    parts are asked that the verdict asks.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def road_friction(
     """
     asked = portion(recording)
     band = model.half_band_of_curves(asked.recording)
-    if band is None:
+    if band is None or not model.band_calibrated:
         return None
     found = evidence(model, asked.recording, road)
     if found is None:

@@ -31,6 +31,7 @@ from models.recordings import Recording
 OVERLAPPING = 4  # moments that begin within the length of one
 RESERVE = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
 OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
+SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
 OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
@@ -155,8 +156,20 @@ def guaranteed(
         told=told is not None,
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
+        fastest=fastest(strips),
     )
     return carries.with_guarantee(guarantee)
+
+
+def fastest(strips: Strips) -> tuple[float, float]:
+    """Return the largest rate of the force that a drive shows, of both axles [static axle loads/s].
+
+    Parameters
+    ----------
+    strips : of the drive.
+    """
+    front, rear = np.maximum(strips.rate.max(axis=0), SLOWEST)
+    return float(front), float(rear)
 
 
 def estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import shown
+from models.extras import needs
 from models.logs.log import RecordingError
 
 LONGEST_REASON = 160  # characters
@@ -49,9 +50,7 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
             importlib.import_module(library)
             return importlib.import_module(module)
     except ImportError:
-        raise RecordingError(
-            f"{path}: reading {format} needs {library}: pip install tireid[{extra}]"
-        ) from None
+        raise RecordingError(needs(f"{path}: reading {format}", library, extra)) from None
 
 
 @contextmanager

@@ -41,7 +41,7 @@ typedef enum {
     TIREID_MPC_OFF_MAP = 5,         /* |v_y|, |r|, speed or curvature beyond the limits */
     TIREID_MPC_TOO_SLOW = 6,        /* slower than min_speed, now or ahead */
     TIREID_MPC_LATE = 7,            /* set by the caller: the command came after its time */
-    TIREID_MPC_BAD_CALL = 8         /* a null pointer, no angle: nothing was done */
+    TIREID_MPC_BAD_CALL = 8         /* a null pointer, no such angle: nothing was done */
 } tireid_mpc_status;
 
 typedef struct {
@@ -184,8 +184,10 @@ typedef struct {
 /* Begin with the wheels straight and no plan; faults are forgotten. */
 tireid_mpc_status tireid_mpc_init(tireid_mpc_state *state);
 
-/* Begin with the wheels at an angle [rad], at most 3.2, and no plan; faults are kept. */
-tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, tireid_mpc_real steering);
+/* Begin with the wheels at an angle [rad], at most params.max_steering to either side, and no plan;
+ * faults are kept. */
+tireid_mpc_status tireid_mpc_reset(
+    tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_real steering);
 
 /* Do ahead of a measurement what does not ask for it: shift the plan, linearize along it on the road that
  * is expected, factorize. Its step then does the first third of the stages anew, and a sweep. Of `expected` the road alone is

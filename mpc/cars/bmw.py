@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from models.extras import needs
 from models.tires import TireForces
 from models.vehicle import GRAVITY, Chassis, Vehicle
 
@@ -14,7 +15,7 @@ from models.vehicle import GRAVITY, Chassis, Vehicle
 
 
 class MissingCommonRoadError(ImportError):
-    """The package is not installed; `pip install tireid[commonroad]` brings it."""
+    """The package is not installed; the message says how to install it."""
 
 
 def require_commonroad() -> None:
@@ -29,8 +30,7 @@ def require_commonroad() -> None:
         importlib.import_module("vehiclemodels.parameters_vehicle2")
     except ImportError:
         raise MissingCommonRoadError(
-            "the CommonRoad cars need the package commonroad-vehicle-models: "
-            "pip install tireid[commonroad]"
+            needs("a CommonRoad car", "commonroad-vehicle-models", "commonroad")
         ) from None
 
 

@@ -132,9 +132,10 @@ def _replayed(
 
 
 class MpcCost(NamedTuple):
-    """What a package costs on a processor; flash: code and constants [bytes]."""
+    """What a package costs on a processor, built by a compiler; flash: code, constants [bytes]."""
 
     processor: str
+    compiler: str
     single: bool
     flash: int
     static_ram: int
@@ -158,11 +159,12 @@ def measure_mpc(package: MpcPackage) -> list[MpcCost]:
     """
     if missing_tools():
         return []
-    costs = []
+    compiler, costs = compiler_version(CROSS_COMPILER), []
     for single in (True, False):
         size = size_on(PROCESSOR, package.name, package.files, single=single)
         replay = replay_on_processor(package, single=single)
-        costs.append(MpcCost(PROCESSOR.name, single, size.flash, size.static_ram, replay))
+        cost = MpcCost(PROCESSOR.name, compiler, single, size.flash, size.static_ram, replay)
+        costs.append(cost)
     return costs
 
 
@@ -211,7 +213,7 @@ def mpc_figures_text(costs: Sequence[MpcCost], times: Times) -> str:
         for c in costs
     )
     return (
-        f"{head}{rows}\n{compiler_version(CROSS_COMPILER)}, -O2; instructions\nand stack by "
+        f"{head}{rows}\n{costs[0].compiler}, -O2; instructions\nand stack by "
         f"{EMULATOR} over {STEPS} measurements of the self-test. The bound on instructions is\n"
         f"`max_iterations` of the solver.\n\n{here}"
     )
@@ -229,7 +231,7 @@ def with_mpc_figures(manifest: str, costs: Sequence[MpcCost]) -> str:
         {
             "processor": cost.processor,
             "precision": "float" if cost.single else "double",
-            "compiler": compiler_version(CROSS_COMPILER),
+            "compiler": cost.compiler,
             "flash_B": cost.flash,
             "static_ram_B": cost.static_ram,
             "state_B": cost.replay.state,

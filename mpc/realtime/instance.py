@@ -347,7 +347,7 @@ class Instance:
         ----------
         steering : angle of the wheels [rad].
         """
-        return Status(self._library.mpc_reset(self._step[0], self._real(steering)))
+        return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))
 
 
 def pointer(array: NDArray[Any]) -> ctypes.c_void_p:

@@ -178,10 +178,11 @@ class Tracker:
         Raises
         ------
         ValueError
-            Where the angle is not finite, or beyond 3.2 rad.
+            Where the angle is not finite, or beyond `Limits.steering`.
         """
         if self.instance.reset(steering) != Status.OK:
-            raise ValueError(f"steering must be finite and at most 3.2 rad, it is {steering}")
+            most = self.problem.limits.steering
+            raise ValueError(f"steering must be finite and at most {most:g} rad, it is {steering}")
 
     def prepare(self, kappa: ArrayLike, v_x: ArrayLike) -> float:
         """Do ahead of the next measurement what does not ask for it; return the time it took [s].

@@ -119,13 +119,13 @@ def test_parquet_gives_the_same_as_csv(tmp_path: Path) -> None:
     assert "r must be finite, 1 of 60" in refusal(path)
 
 
-def test_parquet_without_pyarrow_names_the_extra(
+def test_parquet_without_pyarrow_says_how_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "log.parquet"
     path.write_bytes(b"PAR1")
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert "pip install tireid[parquet]" in refusal(path)
+    assert "needs pyarrow: pip install pyarrow (" in refusal(path)
 
 
 @pytest.mark.parametrize(

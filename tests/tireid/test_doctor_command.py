@@ -109,10 +109,12 @@ def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, 
     assert not (tmp_path / "out").exists()
 
 
-def test_nothing_sure_writes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
-    assert doctor(clinic, "good.csv", "--repair", tmp_path / "log.toml") == 0
+def test_nothing_sure_changes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
+    log_map = tmp_path / "log.toml"
+    assert doctor(clinic, "good.csv", "--repair", log_map) == 0
     assert "nothing is sure enough" in capsys.readouterr().out
-    assert not (tmp_path / "log.toml").exists()
+    assert LogMap.from_toml(log_map) == LogMap()
+    assert doctor(clinic, "good.csv", "--log", log_map) == 0  # the next command of docs/doctor.md
     (tmp_path / "mine.toml").write_text("mine")
     assert doctor(clinic, "bad.csv", "--repair", tmp_path / "mine.toml") == 2
     assert (tmp_path / "mine.toml").read_text() == "mine"

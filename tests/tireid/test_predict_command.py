@@ -18,7 +18,7 @@ from tireid.cli import main
 
 @pytest.fixture(scope="module")
 def model(logs, tmp_path_factory):
-    tire = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan()).freeze()
+    tire = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan()).calibrated()
     path = tmp_path_factory.mktemp("model") / "tire.json"
     tire.save(path)
     return path
@@ -170,6 +170,14 @@ def test_another_road_is_told_with_its_friction(model, tmp_path, capsys):
     table = np.genfromtxt(out / "friction.csv", delimiter=",", names=True)
     assert table["another"][table["t_s"] > road["first"] + 1.0].min() > 0.5
     assert "of the friction of the drive that taught" in capsys.readouterr().out
+
+
+def test_a_band_that_nobody_calibrated_tells_no_road(model, logs, tmp_path, capsys):
+    unchecked = tmp_path / "unchecked.json"
+    ti.TireModel.load(model).with_calibration(None).save(unchecked)
+    summary, _ = predicted(tmp_path / "out", unchecked, logs / "quick.csv")
+    assert summary["friction"] is None and not (tmp_path / "out" / "friction.csv").exists()
+    assert "friction: cannot be told, the band is what learning" in capsys.readouterr().out
 
 
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):

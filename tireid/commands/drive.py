@@ -191,7 +191,7 @@ def add_parser(commands: Any) -> None:
         choices=PLANTS,
         default=PLANTS[0],
         metavar="NAME",
-        help=f"what is driven: {', '.join(PLANTS)}; the last two need the extra commonroad "
+        help=f"what is driven: {', '.join(PLANTS)}; the last two need commonroad-vehicle-models "
         "(%(default)s)",
     )
     parser.add_argument(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from identifier.stored import load_model
+from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
@@ -42,7 +43,7 @@ def add_parser(commands: Any) -> None:
         help=COMMANDS["fleet"],
         description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
         "each log, and ask it: one model of many logs, where the next car starts, which car's "
-        "tires changed. Needs pip install 'tireid[fleet]'.",
+        f"tires changed. {needs('A store', 'libraries', 'fleet')}.",
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
     _add_learn(tasks)

@@ -13,7 +13,7 @@ from codegen.escape import visible
 from identifier.frozen import vehicle_numbers
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import UNCALIBRATED, TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__
@@ -258,6 +258,8 @@ def prediction_text(
     against = contradictions(model, prediction.recording)
     if against is not None:
         lines.append(contradiction_line(*against))
+    if model.has_band and not model.band_calibrated:
+        lines.append(f"friction: cannot be told, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
         lines.append(
             "friction: that of the drive that taught, as far as the tires show it"

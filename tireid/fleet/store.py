@@ -26,11 +26,11 @@ from codegen.arrays import Array
 from identifier.axle import AxleModel
 from identifier.axle.information import Information
 from identifier.frozen import vehicle_from
+from models.extras import needs
 from models.vehicle import Vehicle
 
 BUCKETS = 16
 FORMAT = "tireid fleet 1"
-INSTALL = "pip install 'tireid[fleet]'"
 
 
 class StoreError(ValueError):
@@ -53,7 +53,7 @@ def needed(name: str, what: str = "a fleet's store") -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise ImportError(f"{what} needs {name.partition('.')[0]}: {INSTALL}") from error
+        raise ImportError(needs(what, name.partition(".")[0], "fleet")) from error
 
 
 def file_of(log: str) -> str:

@@ -227,10 +227,9 @@ def band_sentence(model: TireModel) -> str:
         return ""
     at = model.force(known)
     shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
-    calibrated = getattr(model, "calibration", None) is not None
     how = (
         "its width was found on parts of the drive that had not taught the model, by the motion"
-        if calibrated
+        if model.band_calibrated
         else "the drive was too short to check its width, which is what learning believes"
     )
     return (
@@ -255,12 +254,14 @@ def guaranteed_sentence(model: TireModel) -> str:
     ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
     front, rear = given.bound.error
     late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
+    fast_front, fast_rear = given.fastest
     return (
         f"Guaranteed at the end of the known slip: a force of {ends[0]} / {ends[1]} static axle "
         "loads (front / rear), if no force of the drive or of another differs from the best curve "
         f"by more than {front:.3f} / {rear:.3f} static axle loads, and {late_front:.0f} / "
-        f"{late_rear:.0f} ms times how fast it changes; where slip is beyond that of the drive, by "
-        "as much more as slip is. That bound was "
+        f"{late_rear:.0f} ms times how fast it changes. Where slip is beyond that of the drive, "
+        f"or a force changes faster than there, by more than {fast_front:.1f} / {fast_rear:.1f} "
+        "static axle loads a second, the difference may be as much larger. That bound was "
         f"{'told' if given.told else 'estimated from the drive'}."
     )
 

@@ -313,6 +313,17 @@ def test_what_the_car_drives_or_brakes_with_may_be_missing_sideways(model):
     assert (carried / loads < 2.0).all()
 
 
+def test_the_bound_grows_with_a_rate_that_did_not_teach(model):
+    """Twice as fast as anything that taught: the error may be twice as large, beside τ ρ."""
+    given, axles = model.guarantee, ("front", "rear")
+    for i, axle in enumerate(axles):
+        as_taught = model.guaranteed_band(0.02, axle, rate=given.fastest[i])
+        twice = model.guaranteed_band(0.02, axle, rate=2.0 * given.fastest[i])
+        more = given.bound.error[i] + given.bound.lateness[i] * given.fastest[i]
+        more *= model.vehicle.axle_loads[i]
+        np.testing.assert_allclose(np.subtract(twice, as_taught), [-more, more], rtol=1e-9)
+
+
 def test_the_bound_grows_with_slip_that_did_not_teach(model):
     driven, wide = model.excitation[0, 0], ForceBound(error=(0.1, 0.1))
     np.testing.assert_allclose(
@@ -422,9 +433,10 @@ def test_a_cut_of_a_ball_is_as_small_as_a_search_finds(y, allowed):
 
 
 def test_an_empty_guarantee_is_refused():
+    told = {"bound": ForceBound(error=(1, 1)), "told": True, "speed": 9.0}
     with pytest.raises(ValueError, match="corners"):
-        Guarantee(
-            bound=ForceBound(error=(1, 1)), told=True, corners=(np.ones((0, 4)),) * 2, speed=9.0
-        )
+        Guarantee(**told, corners=(np.ones((0, 4)),) * 2, fastest=(1.0, 1.0))
+    with pytest.raises(ValueError, match="fastest force"):
+        Guarantee(**told, corners=(np.ones((1, 4)),) * 2, fastest=(1.0, 0.0))
     nowhere = HalfSpaces(np.array([[1.0], [-1.0]]), np.array([0.0, -1.0]))
     assert vertices(nowhere) is None

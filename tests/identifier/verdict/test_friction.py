@@ -67,6 +67,16 @@ def test_the_road_that_taught_is_told_as_such(tires, same):
     assert found.unexplained.max() < 0.5
 
 
+def test_a_band_that_nobody_calibrated_tells_no_friction(tires, wetter):
+    unchecked = tires.with_calibration(None)
+    assert tires.band_calibrated and not unchecked.band_calibrated
+    assert "band: calibrated on the drive" in tires.summary()
+    assert "not calibrated; `run.calibrated()`" in unchecked.summary()
+    with pytest.raises(ValueError, match=r"friction\(\) wants a calibrated band"):
+        predict(unchecked, wetter).friction()
+    assert predict(unchecked, wetter).verdict().friction is None
+
+
 def test_what_came_later_changes_nothing_that_was_told(tires, wetter):
     whole = road_friction(tires, wetter)
     part = road_friction(tires, wetter.between(0.0, DROP + 4.0))

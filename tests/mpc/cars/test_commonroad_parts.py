@@ -13,7 +13,7 @@ from mpc.cars.commonroad import friction_at
 
 needs_package = pytest.mark.skipif(
     importlib.util.find_spec("vehiclemodels") is None,
-    reason="needs commonroad-vehicle-models: pip install tireid[commonroad]",
+    reason="needs commonroad-vehicle-models",
 )
 
 
