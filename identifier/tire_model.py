@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
 from identifier.setup import Setup
@@ -298,6 +298,15 @@ class TireModel(ABC):
     def known_speeds(self) -> Array | None:
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
+
+    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        return np.zeros(t.shape, dtype=bool)
+
+    @property
+    def road_notes(self) -> tuple[str, ...]:
+        """What a drive that taught told of other roads, a line each."""
+        return ()
 
     def at_bounds(self) -> "tuple[Reached, ...]":
         """Return the learnt numbers that rest at their bounds."""

@@ -4,7 +4,7 @@ The balance is linear in its signals but for slip: the same zero-phase mean over
 nothing and takes noise away.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class Drive:
 
     Parameters
     ----------
+    t : time in the recording's own clock [s], (n,).
     dt : sampling interval [s].
     signals : columns as `motion.model.SIGNALS`, (n, 9).
     rates : d/dt of v_y, r and δ_f, (n, 3).
@@ -39,6 +40,7 @@ class Drive:
     every : samples of the recording that make one of these.
     """
 
+    t: Array
     dt: float
     signals: Array
     rates: Array
@@ -71,14 +73,21 @@ class Drive:
             for one in within
             if one.stop - one.start >= every
         ]
-        signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return cls(dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every)
+        t, signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        return cls(t=t, dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every)
+
+
+    def on(self, ln_m: Array | float) -> "Drive":
+        """Return the drive on roads of other frictions: ln of each over that of the curves."""
+        signals = self.signals.copy()
+        signals[:, 7] = ln_m
+        return replace(self, signals=signals)
 
 
 def _piece(
     recording: Recording, piece: slice, vehicle: Vehicle, every: int, dt: float, slowest: float
-) -> tuple[Array, Array]:
-    """Return signals and rates of a stretch; its first sample does not count."""
+) -> tuple[Array, Array, Array]:
+    """Return time, signals and rates of a stretch; its first sample does not count."""
     v_y = recording.needed("v_y")
 
     def thinned(signal: Array) -> Array:
@@ -106,7 +115,8 @@ def _piece(
         [v_x, v_y, r, delta_f, delta_r, a_x, bank, np.zeros_like(v_x), on.astype(float)]
     )
     rates = np.column_stack([gradient(signal, dt) for signal in (v_y, r, delta_f)])
-    return np.ascontiguousarray(signals), np.ascontiguousarray(rates)
+    t = thinned(recording.t)
+    return t, np.ascontiguousarray(signals), np.ascontiguousarray(rates)
 
 
 def gradient(signal: Array, dt: float) -> Array:

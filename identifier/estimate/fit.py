@@ -8,9 +8,10 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
-from identifier.estimate.model import FittedModel
+from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import Priors
+from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import estimate, simulate
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -51,11 +52,14 @@ def fit(
     beliefs = Priors.of(vehicle) if priors is None else priors
     total = sum(one.duration for one in recordings)
     done, reach, found = 0.0, Reach(), None
+    segments: list[Segment] = []
     for drives in _blocks(recordings, vehicle):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
         found = estimate(drives, vehicle, beliefs, begin)
+        found, roads = with_roads(drives, vehicle, beliefs, found)
+        segments += _segments(drives, roads)
         reach = reach.and_of(drives, found, vehicle)
         information = np.zeros_like(beliefs.information)
         information[np.ix_(found.index, found.index)] = found.information
@@ -69,13 +73,30 @@ def fit(
     model = FittedModel(
         vehicle=vehicle,
         p=found.p,
-        covariance=found.whole_covariance,
+        covariance=found.covariance,
         driven=reach.slip,
         speeds=reach.speeds,
         a_x=reach.a_x,
         missed=np.full(2, MISSED),
+        segments=tuple(segments),
     )
     return Fit(model, found)
+
+
+def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
+    """Return the segments on another road than that of the curves, by the drives' clocks."""
+    listed: list[Segment] = []
+    if roads is None:
+        return listed
+    for one, labels in zip(drives, roads.labels, strict=True):
+        edges = np.flatnonzero(np.diff(labels)) + 1
+        for part in np.split(np.arange(len(labels)), edges):
+            label = int(labels[part[0]])
+            if label:
+                ratio = float(np.exp(roads.ln_m[label - 1]))
+                begin, end = float(one.t[part[0]]), float(one.t[part[-1]])
+                listed.append(Segment(begin, end, ratio, ratio * float(roads.sd[label - 1])))
+    return listed
 
 
 class Reach(NamedTuple):

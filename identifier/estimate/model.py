@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -48,6 +48,15 @@ WARM = 300  # samples before a part of a long drive, over which lag and sway set
 LARGEST = 1e6  # of the numbers in a file
 
 
+class Segment(NamedTuple):
+    """A part of a drive on another road: from, to [s], its friction over that of the curves, sd."""
+
+    begin: float
+    end: float
+    ratio: float
+    sd: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class FittedModel(TireModel):
     """Axle forces of the forward model (`motion.model`) at estimated parameters.
@@ -61,6 +70,7 @@ class FittedModel(TireModel):
     speeds : least and largest speed of them [m/s], (2,).
     a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
     missed : share of the force by which drives of a car differ from one model, (2,).
+    segments : of the drives, on a road of another friction than that of the curves.
     """
 
     kind = "fit"
@@ -72,6 +82,7 @@ class FittedModel(TireModel):
     speeds: Array
     a_x: Array
     missed: Array
+    segments: tuple[Segment, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(NAMES)
@@ -270,6 +281,22 @@ class FittedModel(TireModel):
     def known_speeds(self) -> Array:
         """Least and largest speed [m/s] of the drives that taught, (2,)."""
         return self.speeds
+
+    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        found = np.zeros(t.shape, dtype=bool)
+        for one in self.segments:
+            found |= (t >= one.begin) & (t <= one.end)
+        return found
+
+    @property
+    def road_notes(self) -> tuple[str, ...]:
+        """What a drive that taught told of other roads, a line each."""
+        return tuple(
+            f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
+            f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given"
+            for one in self.segments
+        )
 
     def at_bounds(self) -> tuple[Reached, ...]:
         """Return the numbers of the tires that rest at the bounds of what tires have."""
@@ -498,7 +525,7 @@ class FittedModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle)
+        return replace(self, vehicle=vehicle, segments=())
 
     def at_friction(self, ratio: float) -> "FittedModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
@@ -511,7 +538,7 @@ class FittedModel(TireModel):
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
-        return replace(self, p=p, driven=ratio * self.driven)
+        return replace(self, p=p, driven=ratio * self.driven, segments=())
 
     def in_units(self) -> AxleModel:
         """Return the tires in the hidden units of the axle identifier, for C, FMU and tracker.
@@ -615,6 +642,7 @@ class FittedModel(TireModel):
             "speeds_m_s": self.speeds.tolist(),
             "a_x_m_s2": self.a_x.tolist(),
             "missed": self.missed.tolist(),
+            "segments": [one._asdict() for one in self.segments],
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
@@ -643,8 +671,12 @@ class FittedModel(TireModel):
         for name, value in (("parameters", p), *found.items()):
             if np.abs(value).max(initial=0.0) > LARGEST:
                 table.refuse(name, f"must hold numbers below {LARGEST:g}")
+        segments = tuple(
+            Segment(*(one.number(name) for name in Segment._fields))
+            for one in (table.tables("segments") if "segments" in table else [])
+        )
         try:
-            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, **found)
+            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, segments=segments, **found)
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:

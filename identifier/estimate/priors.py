@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.motion.parameters import INDEX, NAMES
+from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import Vehicle
 
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
@@ -44,7 +44,7 @@ OF_AXLES: dict[str, Belief] = {
     "curvature": Belief(0.0, 0.6, -4.0, 0.95, "", "beyond 0.95 the curve has no peak"),
     **{
         f"residual{j}": Belief(0.0, 0.08, -INF, INF, "", "what tires of one formula differ by")
-        for j in range(4)
+        for j in range(len(SLIPS))
     },
     "compliance": Belief(0.008, 0.008, 0.0, 0.1, "L", "relaxation of about a tenth wheelbase"),
     "sway_share": Belief(0.2, 0.3, 0.0, 1.0, "", "roll center low to high"),
@@ -70,6 +70,7 @@ ALIKE = {  # standard deviation of front less rear
 }
 # At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
 SHARED_ERROR = 0.5
+ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
 FAULTS = (  # what no log leaves open but one that shows it
     "v_y_delay", "steering_delay", "r_bias", "r_delay", "v_x_factor", "cg_shift", "ln_inertia",
     "bank",
@@ -133,6 +134,22 @@ class Priors:
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
             _couple(information, each, SHARED_ERROR)
         return cls(mean=mean, low=low, high=high, information=information, moves=moves)
+
+    def with_roads(self, count: int) -> "Priors":
+        """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
+        low, high = np.full(count, np.log(0.2)), np.full(count, np.log(2.2))
+        n = len(self.mean) + count
+        information = np.zeros((n, n))
+        information[: len(self.mean), : len(self.mean)] = self.information
+        extra = np.arange(len(self.mean), n)
+        information[extra, extra] = 1.0 / ANOTHER_ROAD**2
+        return Priors(
+            mean=np.concatenate([self.mean, np.zeros(count)]),
+            low=np.concatenate([self.low, low]),
+            high=np.concatenate([self.high, high]),
+            information=information,
+            moves=np.concatenate([self.moves, np.ones(count, dtype=bool)]),
+        )
 
     def cost(self, p: Array) -> float:
         """Return -ln of the prior's density over that at its mean [nats]."""

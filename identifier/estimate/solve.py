@@ -8,16 +8,19 @@ Gauss-Newton with Levenberg's damping and active bounds.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from numpy.typing import NDArray
+
+from codegen import Scan
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_CAR, SEDAN, Priors
 from identifier.motion.model import CARRIED, CarNumbers, motion_scan
-from identifier.motion.parameters import INDEX, NAMES
+from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
 
 STRIDE = 0.05  # [s] between residuals
@@ -25,8 +28,12 @@ ERROR, RELATIVE = 0.02, 0.04  # b: of a static load, and of the lateral accelera
 NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far off
 LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 SHORTEST_MEMORY, LONGEST_MEMORY = 0.25, 8.0  # T [s]
+LEAST_STIFF, STIFF_SD = 0.25, 0.1  # of C: slope at zero, and how firmly it is believed
 ITERATIONS = 25
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
+
+
+Labels: TypeAlias = Sequence[NDArray[np.intp]]
 
 
 class Residuals(NamedTuple):
@@ -44,12 +51,23 @@ class Problem:
     drives : of one car, with the same sensors.
     vehicle : the car.
     priors : which parameters move.
+    labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     """
 
-    def __init__(self, drives: Sequence[Drive], vehicle: Vehicle, priors: Priors) -> None:
-        self.drives, self.vehicle, self.priors = drives, vehicle, priors
-        self.index = np.flatnonzero(priors.moves)
-        self._scan = motion_scan(tuple(NAMES[k] for k in self.index))
+    def __init__(
+        self,
+        drives: Sequence[Drive],
+        vehicle: Vehicle,
+        priors: Priors,
+        labels: Labels | None = None,
+    ) -> None:
+        self.drives, self.vehicle, self.labels = drives, vehicle, labels
+        self.roads = 0 if labels is None else max(int(one.max()) for one in labels)
+        self.priors = priors.with_roads(self.roads) if self.roads else priors
+        self.index = np.flatnonzero(self.priors.moves)
+        moving = [NAMES[k] for k in self.index if k < len(NAMES)]
+        self.tires = len(moving)  # columns of slopes that are not of roads
+        self._scan = motion_scan((*moving, "ln_road"))
         self._car = car_numbers(vehicle)
         self._strides = [max(1, round(STRIDE / one.dt)) for one in drives]
         self._kept = [
@@ -65,18 +83,39 @@ class Problem:
         self.size = np.concatenate(sizes)
         self.weight = np.concatenate(weights)
 
-    def residuals(self, p: Array) -> Residuals:
-        """Return what the balance misses, and its slopes."""
+    def places(self, k: int) -> NDArray[np.intp]:
+        """Return which samples of a drive its residuals are at."""
+        found: NDArray[np.intp] = self._kept[k] * self._strides[k]
+        return found
+
+    def residuals(self, p: Array, road: float = 0.0) -> Residuals:
+        """Return what the balance misses, and its slopes.
+
+        Parameters
+        ----------
+        p : parameters, and behind them ln of the friction of other roads.
+        road : added to ln of all frictions.
+        """
         e, slopes = [], []
-        for one, stride, kept in zip(self.drives, self._strides, self._kept, strict=True):
+        ln_m = np.concatenate([[0.0], p[len(NAMES) :]]) + road
+        for k, one in enumerate(self.drives):
+            stride, kept = self._strides[k], self._kept[k]
+            roads = None if self.labels is None else self.labels[k]
+            driven = one if roads is None and not road else one.on(ln_m[0 if roads is None else roads])
             out = self._scan(
-                len(one.signals),
-                _arguments(one, p, self._car, self._scan.step.numel_in("tangent")),
+                len(driven.signals),
+                arguments(driven, p[: len(NAMES)], self._car, self._scan),
                 every=stride,
                 ports=("missed", "missed_slopes"),
             )
             e.append(out["missed"][kept])
-            slopes.append(out["missed_slopes"][kept])
+            J = out["missed_slopes"][kept]
+            of_road = J[:, :, -1:]
+            J = J[:, :, : self.tires]
+            if self.roads and roads is not None:
+                on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
+                J = np.concatenate([J, of_road * on[:, None, :]], axis=2)
+            slopes.append(J)
         size = self.size[:, None]
         with np.errstate(invalid="ignore", over="ignore"):
             return Residuals(
@@ -119,6 +158,12 @@ class Problem:
             S2 = np.maximum(self.weight @ (w * e**2) / total, LEAST_SCALE**2)
         return S2
 
+    def cost(self, e: Array, p: Array, T: Array) -> float:
+        """Return J of residuals at parameters when a second of them counts 1/T times [nats]."""
+        S2 = self.scale(e)
+        scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
+        return self.misfit(e, S2, T) + _beliefs(self.priors, p) + scales
+
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
         """Return Σ w/T ρ(e) [nats]."""
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
@@ -132,8 +177,11 @@ def car_numbers(vehicle: Vehicle) -> Array:
     return np.array(CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce))
 
 
-def _arguments(one: Drive, p: Array, car: Array, tangent: int = 0) -> dict[str, Array]:
-    more = {"tangent": np.zeros(tangent)} if tangent else {}
+def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
+    """Return the inputs of a compiled motion over a drive."""
+    more = {}
+    if "tangent" in scan.carry:
+        more = {"tangent": np.zeros(scan.step.numel_in("tangent"))}
     return {
         "state": np.zeros(len(CARRIED)),
         "was_on": np.zeros(1),
@@ -151,7 +199,7 @@ def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
     scan = motion_scan()
     return scan(
         len(one.signals),
-        _arguments(one, p, car_numbers(vehicle)),
+        arguments(one, p, car_numbers(vehicle), scan),
         ports=("force", "missed", "slip"),
     )
 
@@ -161,6 +209,8 @@ def estimate(
     vehicle: Vehicle,
     priors: Priors | None = None,
     begin: Array | None = None,
+    *,
+    labels: Labels | None = None,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
 
@@ -171,17 +221,19 @@ def estimate(
     priors : beliefs; None takes those of the car.
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights
         show v_y or steering off zero, also from there.
+    labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     """
     priors = Priors.of(vehicle) if priors is None else priors
-    problem = Problem(drives, vehicle, priors)
+    problem = Problem(drives, vehicle, priors, labels)
     starts = _starts(problem) if begin is None else [begin]
+    starts = [np.concatenate([one[: len(NAMES)], np.zeros(problem.roads)]) for one in starts]
     found = [_descend(problem, start) for start in starts]
     return min(found, key=lambda one: one.cost)
 
 
 def _starts(problem: Problem) -> list[Array]:
     """Return the parameters to begin with: the prior's mean, and offsets that straights show."""
-    mean = problem.priors.mean
+    mean = problem.priors.mean[: len(NAMES)]
     signals = np.concatenate([one.signals[one.counts] for one in problem.drives])
     v_x, v_y, r, delta = signals[:, :4].T
     straight = np.abs(v_x * r) < 0.03 * GRAVITY
@@ -197,7 +249,8 @@ def _starts(problem: Problem) -> list[Array]:
             one[INDEX["steering_zero"]] = -zero
             one[INDEX["v_y_bias"]], one[INDEX["v_y_angle"]] = bias, angle
             starts.append(one)
-    return [np.clip(one, problem.priors.low, problem.priors.high) for one in starts]
+    low, high = (bound[: len(NAMES)] for bound in (problem.priors.low, problem.priors.high))
+    return [np.clip(one, low, high) for one in starts]
 
 
 def _descend(problem: Problem, start: Array) -> Posterior:
@@ -212,17 +265,18 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     for iterations in range(1, ITERATIONS + 1):
         S2 = problem.scale(now.e)
         T = np.sqrt(T * problem.memory(now.e)) if iterations > 1 else T
-        cost = problem.misfit(now.e, S2, T) + priors.cost(p)
+        cost = problem.misfit(now.e, S2, T) + _beliefs(priors, p)
         H, gradient = _normal(problem, now, S2, T)
-        H = H + P
-        gradient = gradient + (priors.information @ (p - priors.mean))[index]
+        soft, soft_slopes = softness(p)
+        H = H + P + (soft_slopes.T @ soft_slopes)[np.ix_(index, index)]
+        gradient = gradient + (priors.information @ (p - priors.mean) + soft @ soft_slopes)[index]
         better = None
         for _ in range(8):
             step = _bounded(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
             trial = p.copy()
             trial[index] = np.clip(p[index] + step, low, high)
             then = problem.residuals(trial)
-            reached = problem.misfit(then.e, S2, T) + priors.cost(trial)
+            reached = problem.misfit(then.e, S2, T) + _beliefs(priors, trial)
             if reached < cost:
                 better = trial, then, cost - reached
                 break
@@ -235,19 +289,52 @@ def _descend(problem: Problem, start: Array) -> Posterior:
             break
     S2, T = problem.scale(now.e), problem.memory(now.e)
     data, _ = _normal(problem, now, S2, T)
-    cost = problem.misfit(now.e, S2, T) + priors.cost(p)
-    cost += float((0.5 * np.log(S2) * problem.weight.sum() / T).sum())
+    cost = problem.cost(now.e, p, T)
+    whole = np.zeros((len(p), len(p)))
+    whole[np.ix_(index, index)] = np.linalg.inv(data + P)
+    n, tires = len(NAMES), problem.tires
     return Posterior(
         vehicle=problem.vehicle,
-        p=p,
-        index=index,
-        information=data + P,
-        data_information=data,
+        p=p[:n],
+        covariance=whole[:n, :n],
+        index=index[:tires],
+        information=np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]),
+        roads=p[n:],
+        road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
         memory=T,
         cost=cost,
         iterations=iterations,
     )
+
+
+def _beliefs(priors: Priors, p: Array) -> float:
+    """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
+    soft, _ = softness(p)
+    return priors.cost(p) + 0.5 * float(soft @ soft)
+
+
+def softness(p: Array) -> tuple[Array, Array]:
+    """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
+
+    No tire has less than a quarter of C there: play in the steering looks so.
+
+    Returns
+    -------
+    (2,), in standard deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
+    """
+    found, slopes = np.zeros(2), np.zeros((2, p.size))
+    for i, axle in enumerate("fr"):
+        k = INDEX[f"ln_stiffness_{axle}"]
+        q = [INDEX[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
+        C = float(np.exp(p[k]))
+        added = float(np.sum(p[q] / np.array(SLIPS)))
+        lacks = (LEAST_STIFF - 1.0 - added / C) / STIFF_SD
+        if lacks > 0.0:
+            found[i] = lacks
+            slopes[i, k] = added / C / STIFF_SD
+            slopes[i, q] = -1.0 / (np.array(SLIPS) * C * STIFF_SD)
+    return found, slopes
 
 
 def _normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:

@@ -96,7 +96,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
         return _too_short(model)
     state = {} if history.design.whole else history.state_at(end)
     reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
-    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached)], whole)
+    roads = [Objection("another_road", None, text, False) for text in model.road_notes]
+    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *roads], whole)
 
 
 def judge_prediction(
@@ -126,7 +127,10 @@ def _asked(
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model.vehicle))
-    return None if found is None else Asked(model, part, found, own)
+    if own and found is not None:
+        other = model.on_another_road(recording.t[part.samples])
+        found = found.where(other[found.windows.starts] < 0.5)
+    return None if found is None or len(found.windows) < FEWEST else Asked(model, part, found, own)
 
 
 def _road(recording: Recording, vehicle: Vehicle) -> Array | None:

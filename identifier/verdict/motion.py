@@ -213,34 +213,14 @@ class Evidence:
         """Share of the measured force that is not explained, noise taken off, (2,)."""
         return clean_share(self.measured - self.modelled, self.measured, self.noise)
 
-    def without(self, first: int, last: int) -> "Evidence":
-        """Return the evidence without the windows from first to before last.
-
-        Parameters
-        ----------
-        first, last : among the windows.
-        """
-        kept = np.r_[0:first, last : len(self.windows)]
+    def where(self, kept: NDArray[np.bool_]) -> "Evidence":
+        """Return the evidence of some of the windows (m,)."""
         return replace(
             self,
             windows=replace(self.windows, starts=self.windows.starts[kept]),
             measured=self.measured[kept],
             modelled=self.modelled[kept],
         )
-
-    def worst_stretch(self, share: float) -> tuple[int, int]:
-        """Return the stretch of a share of the windows in which most is missed: first, past last.
-
-        Parameters
-        ----------
-        share : of the windows.
-        """
-        n = max(1, int(share * len(self.windows)))
-        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
-        missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
-        total = np.concatenate([[0.0], np.cumsum(missed)])
-        first = int(np.argmax(total[n:] - total[:-n]))
-        return first, first + n
 
 
 def clean_rms(signal: Array, noise: Array) -> Array:
