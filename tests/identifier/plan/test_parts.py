@@ -100,7 +100,7 @@ def equations(tires, k, planned):
 
 @pytest.mark.parametrize("k", [0, 4])
 def test_motion_and_sensitivities_are_those_of_an_integrator(tires, k, monkeypatch):
-    monkeypatch.setattr("identifier.plan.motion.STEP", 0.05 / 32)
+    monkeypatch.setattr("identifier.plan.motion.STEP", 0.05 / 16)
     t, entry = steps_of(tires, 2.0), Entry(np.array([3.0]), np.array([5.0]), np.array([0.2]))
     ours = simulate(tires, 0.1 * np.sin(4.0 * t)[:, None], SPEED, entry, NO_HOLD)
     start = np.zeros(14)
@@ -110,7 +110,7 @@ def test_motion_and_sensitivities_are_those_of_an_integrator(tires, k, monkeypat
     axles = [one[:, :, 0, k] for one in (ours.slip, ours.of_compliance, ours.of_share)]
     lanes = [one[:, 0, k] for one in (ours.v_y, ours.r, ours.X, ours.Y, ours.psi, ours.delta)]
     for mine, exact in zip([*lanes, *np.hstack(axles).T], [*theirs[:6], *theirs[8:]], strict=True):
-        np.testing.assert_allclose(mine, exact, atol=0.012 * np.ptp(exact))
+        np.testing.assert_allclose(mine, exact, atol=0.02 * np.ptp(exact))
 
 
 def test_the_covariance_is_the_sum_of_regressors_by_hand(tires, driven):
