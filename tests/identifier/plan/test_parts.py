@@ -242,6 +242,21 @@ def test_steerings_keep_rates_angles_and_margins_whatever_the_numbers(tires, dur
     np.testing.assert_allclose(straight, [-SPACE.margin, SPACE.margin])
 
 
+def test_a_guided_pass_comes_back_to_the_middle_by_no_more_than_may_be_steered(tires):
+    search = Search(tires=tires, space=SPACE, duration=9.0, guided=True)
+    numbers = np.zeros((2, search.swings + 2))
+    numbers[:, -2] = 0.9, -0.9  # it enters at a side
+    kept = search.motion(search.steerings(numbers))
+    free = replace(search, guided=False).motion(search.steerings(numbers))
+    np.testing.assert_allclose(free.Y, np.broadcast_to(free.Y[:1], free.Y.shape), atol=1e-9)
+    away = np.abs(kept.Y[[0, -1], :, 0] - 0.5 * SPACE.width)
+    assert (away[1] < 0.05 * away[0]).all() and (away[0] > 4.0).all()
+    blind = replace(search, space=replace(SPACE, held=False)).motion(search.steerings(numbers))
+    assert np.ptp(blind.asked[:, 0, :]) > 0.0 == np.ptp(blind.asked, axis=2).max()
+    rates = np.abs(np.diff(kept.asked[:, :, 0], axis=0)).max() / steps_of(tires, 1.0)[1]
+    assert rates <= SPACE.rate_limit * (1.0 + 1e-9) and np.abs(kept.asked).max() <= 0.5
+
+
 def test_no_swing_is_larger_than_a_bend_at_the_grip_and_its_slip(tires):
     search = Search(tires=tires, space=SPACE, duration=3.0, guided=False)
     bend = CAR.wheelbase * tires.grip[0].mean() * GRAVITY / SPEED**2
@@ -322,6 +337,8 @@ def test_rivals_have_the_frequency_and_room_that_are_said(tires):
     for maneuver, own in ((slalom_of(CAR, 8.0)(0.05), f), (slalom_of(CAR, 8.0, 0.9)(0.05), 0.9)):
         delta = maneuver.steering(t)[:, 0]
         np.testing.assert_allclose(delta, 0.05 * np.sin(2.0 * math.pi * own * t), atol=2e-3)
+        fastest = 0.05 * 2.0 * math.pi * own
+        assert fastest < maneuver.rate_limit < 1.1 * fastest
     random = random_of(CAR, 8.0, 2)(0.05)
     assert (random.frequency, random.seed) == (pytest.approx(1.5 * f), 2)
     assert random.rate_limit == pytest.approx(2.1 * math.pi * 1.5 * f * 0.05)
