@@ -83,8 +83,8 @@ def _split(name: str) -> tuple[str, str]:
     if held and (is_unit(held[1]) or "[" in name):
         return without_unit(name), held[1]
     for mark in (":", " / ", ", ", " in "):
-        bare, found, unit = name.rpartition(mark)
-        if found and is_unit(unit) and unit.strip() not in _EMPTY:
+        bare, there, unit = name.rpartition(mark)
+        if there and is_unit(unit) and unit.strip() not in _EMPTY:
             return bare.strip(), unit.strip()
     if _LENKRAD.search(name):
         return name, ""

@@ -329,6 +329,9 @@ def test_a_plan_tells_its_progress_and_what_it_found(found, tires):
     assert rehearsal.side_slip == pytest.approx(np.abs(np.arctan2(log.v_y, log.v_x)).max())
     assert abs(rehearsal.clearance - plan.clearance) < 1.0
     assert log.t[-1] == pytest.approx(4.0)
+    felt = np.gradient(log.v_y, log.t) + log.v_x * log.r
+    assert np.corrcoef(felt, log.a_y)[0, 1] > 0.99 and not log.delta_r.any()
+    assert np.corrcoef(log.axle_force.sum(axis=1), log.a_y)[0, 1] > 0.99
 
 
 def test_rivals_have_the_frequency_and_room_that_are_said(tires):

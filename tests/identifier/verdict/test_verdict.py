@@ -15,7 +15,7 @@ from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge_prediction
-from identifier.verdict.causes import CAUSES, Suspect, _least
+from identifier.verdict.causes import CAUSES, PATIENCE, Suspect, _least
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import (
     Windows,
@@ -225,6 +225,10 @@ def test_the_size_of_a_cause_is_doubled_and_then_bent_to_the_least():
         assert (found, left) == (pytest.approx(size), pytest.approx(1.0))
     assert _least(lambda x: 1.0 + abs(x), 1.0, bias)[0] == pytest.approx(0.0, abs=0.02)
     far, _ = _least(lambda x: -x, 0.0, bias)
+    asked = []
+    _least(lambda x: asked.append(x) or 2.0, 1.0, bias)
+    apart = [one for one in asked if abs(one) > 1e-9]
+    assert len(apart) == 2 * PATIENCE, "what only gets worse is not asked for ever"
     assert 0.5 * bias.most < far <= bias.most
 
 
