@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.doctor.samples import CERTAIN, sample_findings
+from identifier.doctor.samples import CERTAIN, _rounded_alike, sample_findings
 from models.recordings import Recording
 
 DT = 0.01
@@ -100,6 +100,16 @@ def test_samples_that_are_lost_are_counted_from_the_first_on(noisy):
     found = only(changed(base, "v_x", [500, 501, 900, 901, 902], 0.0))
     assert (found.code, found.channel, found.size) == ("dropout", "v_x", 5.0)
     assert "for 5 of 3000 samples, first at 5 s" in found.text and found.confidence == CERTAIN
+
+
+def test_one_sample_that_is_zero_is_no_dropout(noisy):
+    assert sample_findings(changed(noisy, "v_x", 500, 0.0)) == []
+
+
+@pytest.mark.parametrize("step", [0.5, 1.0, 1.5])
+def test_rounding_makes_as_many_neighbors_alike_as_is_said(step):
+    signal = step * np.round(np.random.default_rng(2).standard_normal(100_000) / step)
+    assert _rounded_alike(signal) == pytest.approx(np.mean(np.diff(signal) == 0.0), rel=0.1)
 
 
 def test_single_samples_far_off_are_spikes(noisy):

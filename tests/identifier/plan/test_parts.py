@@ -308,6 +308,22 @@ def test_costs_are_the_errors_of_passes_and_more_than_1_beyond_a_limit(tires):
     np.testing.assert_allclose(taken.course(taken.t[[0, -1]])[:, 0], taken.motion.X[[0, -1], 0, 0])
 
 
+@pytest.mark.parametrize(("rate", "asked_for"), [(1.0, 21), (0.9999, 21), (0.99, 31)])
+def test_a_search_ends_when_twenty_generations_gain_less_than_a_percent(
+    tires, monkeypatch, rate, asked_for
+):
+    costs = []
+
+    def told(_, numbers):
+        costs.append(0.9 * rate ** len(costs))
+        return costs[-1] + 0.01 * np.arange(len(numbers))
+
+    monkeypatch.setattr(search_module, "GENERATIONS", 30)
+    monkeypatch.setattr(Search, "costs", told)
+    Search(tires=tires, space=SPACE, duration=2.0, guided=False).best(np.random.default_rng(0))
+    assert len(costs) == asked_for
+
+
 def test_a_plan_tells_its_progress_and_what_it_found(found, tires):
     plan, shares = found
     assert shares == sorted(shares) and 0.0 < shares[0] < 0.2 and 0.9 < shares[-1] <= 1.2
