@@ -37,7 +37,7 @@ UNKNOWN = 120.0  # s, for tests that were not traced
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw, plant, run and judge; return 1 below the ratchet.
+    """Draw, plant, run and judge; return 1 where too few are caught.
 
     Parameters
     ----------

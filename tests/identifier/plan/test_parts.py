@@ -14,7 +14,7 @@ from identifier.plan import PlanError, PlausibleTires, Space, hold_of, make_plan
 from identifier.plan import search as search_module
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
 from identifier.plan.motion import LEAST_SLOPE, NO_HOLD, Entry, Hold, simulate, steps_of
-from identifier.plan.plan import _rated, random_of, slalom_of
+from identifier.plan.plan import _rated, longest_pass, random_of, slalom_of
 from identifier.plan.search import (
     CALM,
     REAR,
@@ -368,6 +368,15 @@ def test_rivals_have_the_frequency_and_room_that_are_said(tires):
     assert rated.width == pytest.approx(2.0 * body.side, abs=0.01)
     way = SPEED * steps_of(tires, 2.0)[-1]
     assert rated.length == pytest.approx(way + body.ahead + body.behind, abs=0.01)
+
+
+def test_a_car_turns_where_a_circle_at_four_fifths_of_its_share_has_room(tires):
+    body = body_of(tires)
+    radius = 8.0**2 / (0.8 * SPACE.share * tires.grip.min() * GRAVITY)
+    wide = 2.0 * (math.hypot(radius + body.side, body.ahead) + SPACE.margin)
+    for share, endless in ((1.001, True), (0.999, False)):
+        space = replace(SPACE, speed=8.0, length=100.0, width=share * wide)
+        assert (longest_pass(tires, space) == math.inf) is endless
 
 
 def test_an_area_is_large_enough_when_it_is_as_large_as_was_asked(tires):
