@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.doctor.samples import CERTAIN, _rounded_alike, sample_findings
+from identifier.doctor.samples import CERTAIN, _is_late, _rounded_alike, sample_findings
 from models.recordings import Recording
 
 DT = 0.01
@@ -191,3 +191,12 @@ def test_a_channel_without_a_sensor_is_told_and_not_asked_further(noisy):
     assert (
         found.size == pytest.approx(noisy.duration) and "a_y is 0.25 m/s^2 throughout" in found.text
     )
+
+
+def test_samples_are_late_where_those_of_r_and_another_channel_are_alike():
+    assert _is_late("r", {"r": 0.05, "delta_f": 0.04}, DT)
+    assert _is_late("delta_f", {"r": 0.05, "delta_f": 0.04, "v_y": 0.2}, DT)
+    for size in (0.02, 0.2):
+        assert not _is_late("r", {"r": 0.05, "delta_f": size}, DT)
+    assert not _is_late("v_y", {"v_y": 0.05, "a_y": 0.05}, DT), "without r"
+    assert not _is_late("r", {"r": 0.006, "delta_f": 0.006}, DT), "within a sample"
