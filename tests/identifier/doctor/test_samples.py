@@ -113,10 +113,10 @@ def test_rounding_makes_as_many_neighbors_alike_as_is_said(step):
 
 
 def test_single_samples_far_off_are_spikes(noisy):
-    at = np.array([400, 1100, 2000, 2600])
-    spiky = changed(noisy, "r", at, noisy.r[at] + [1.0, -1.0, 1.0, 1.0])
+    at = np.array([400, 1100, 2000])
+    spiky = changed(noisy, "r", at, noisy.r[at] + [1.0, -1.0, 1.0])
     found = only(spiky)
-    assert (found.code, found.channel, found.size) == ("spikes", "r", 4.0)
+    assert (found.code, found.channel, found.size) == ("spikes", "r", 3.0)
     assert "first at 4 s" in found.text
     two = changed(noisy, "r", at[:2], noisy.r[at[:2]] + 1.0)
     assert sample_findings(two) == [], "two are none"

@@ -406,7 +406,7 @@ def test_plausible_cars_have_brush_tires_softer_stiffer_and_grippier_by_a_third(
         for a, c in enumerate(stiffness):
             u = np.minimum(c * np.tan(slips) / (3.0 * 0.8 * share), 1.0)
             brush = 0.8 * share * (3.0 * u - 3.0 * u**2 + u**3)
-            np.testing.assert_allclose(ours[:, a], brush, atol=0.035)
+            np.testing.assert_allclose(ours[:, a], brush, atol=0.05)
     lag = CAR.require_chassis().steering_lag
     np.testing.assert_allclose(tires.steering_lag, lag * np.array([1, 0.7, 1.3, 1.3, 0.7, 1.3, 1]))
     told = PlausibleTires.told(CAR, 0.8, steering_lag=0.1)
