@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import find_compiler
+from codegen.writing import write_file
 from identifier.export.package import Package, build_package, readme
 from identifier.export.processor import Cost, figures_text, measure, with_figures
 from identifier.method import CannotFreezeError, Method
@@ -241,7 +242,7 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
 def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
+        write_file(folder / path, text)
 
 
 def _write_onnx(

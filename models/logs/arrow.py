@@ -99,7 +99,9 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
 
 
 def words(cells: Any) -> Words:
-    """Return cells of any type as words, "" where one is missing.
+    """Return cells of any type as the distinct words of them, "" where one is missing.
+
+    What a dictionary keeps once is never written out row by row.
 
     Parameters
     ----------
@@ -107,11 +109,13 @@ def words(cells: Any) -> Words:
     """
     import pyarrow
 
-    if pyarrow.types.is_dictionary(cells.type):
-        cells = cells.dictionary_decode()
-    coded = cells.dictionary_encode(null_encoding="encode")
-    names = ["" if one is None else str(one) for one in coded.dictionary.to_pylist()]
-    return Words(names, whole_numbers(coded.indices, 0))
+    if not pyarrow.types.is_dictionary(cells.type):
+        cells = cells.dictionary_encode()
+    codes = whole_numbers(cells.indices, -1)
+    used, first, where = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # a dictionary may hold words in another order, and more of them
+    found = [None if k < 0 else cells.dictionary[int(k)].as_py() for k in used[order]]
+    return Words(["" if one is None else str(one) for one in found], np.argsort(order)[where])
 
 
 def doubles(cells: Any) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
 from identifier.methods import REFERENCE, certify
@@ -315,7 +316,7 @@ def _with_estimates(text: str, vehicle: Vehicle) -> str:
 
 def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
     write_json(folder / NUMBERS, numbers)
-    (folder / TEXT).write_text(f"{text}\n", encoding="utf-8")
+    write_file(folder / TEXT, f"{text}\n")
 
 
 def _say_written(options: argparse.Namespace) -> None:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from codegen.writing import naming, write_file
 from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
@@ -236,9 +237,7 @@ def write_comparison(
     numbers = comparison_numbers(comparison)
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
-    (folder / "tables.txt").write_text(
-        comparison_text(comparison) + pair_tables(comparison), encoding="utf-8"
-    )
+    write_file(folder / "tables.txt", comparison_text(comparison) + pair_tables(comparison))
     _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
     if comparison.sweeps:
         _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
@@ -420,7 +419,7 @@ def _words(values: Mapping[str, float]) -> str:
 
 
 def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with naming(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.writing import naming
 from identifier.axle import AxleModel
 from identifier.axle.information import Information
 from identifier.frozen import vehicle_from
@@ -423,7 +424,7 @@ class Store:
         fs, _ = self._place
         fs.makedirs(posixpath.dirname(path), exist_ok=True)
         scratch = f"{path}.part"
-        with fs.open(scratch, "wb") as file:
+        with naming(path), fs.open(scratch, "wb") as file:
             file.write(buffer.getvalue())
         fs.mv(scratch, path)
 
