@@ -61,8 +61,19 @@ from tireid.report import (
     write_report,
 )
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.reports.identify import identify_headlines, identify_warnings, learnt_blocks
-from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
+from tireid.reports.identify import (
+    curve_drawing,
+    identify_headlines,
+    identify_warnings,
+    learnt_blocks,
+)
+from tireid.verdicts import (
+    missed_headline,
+    number_headlines,
+    verdict_headline,
+    verdict_section,
+    verdict_warnings,
+)
 
 # The demo's report: what was driven, learnt, frozen and predicted, in order.
 
@@ -102,6 +113,8 @@ def demo_report(
         summary=SUMMARY,
         numbers=[
             verdict_headline(verdict),
+            *missed_headline(verdict),
+            *number_headlines(verdict),
             *identify_headlines(model, runs, story.default.frozen[FREEZE]),
             *drive_numbers(driven),
         ],
@@ -109,7 +122,7 @@ def demo_report(
         sections=[
             verdict_section(verdict),
             drive_section(driven, folder),
-            _learn(figures["identify"], model),
+            _learn(figures["identify"], model, verdict),
             _predict(story),
             package_section(shipped),
             Section(
@@ -127,7 +140,7 @@ def demo_report(
     )
 
 
-def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
+def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> Section:
     return Section(
         heading="What was learnt",
         blocks=[
@@ -144,6 +157,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
                 "from motion alone; what was never excited keeps what is believed of any tire."
             ),
+            curve_drawing(figures, verdict),
             *learnt_blocks("the default method", model, figures)[1:],
             drawing(
                 figures["forces"],
