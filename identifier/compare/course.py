@@ -85,7 +85,7 @@ class Course:
     def measure(self) -> str:
         """What errors are, in words."""
         by = ", means over 0.3 s by the motion" if self.by_motion else ""
-        return f"axle force RMSE{by}"
+        return f"RMSE of the axle force{by}"
 
     def _windows(self, recording: Recording) -> Windows:
         return Windows.of(recording, max(self.min_speed, BRISK * self.vehicle.froude_speed))

@@ -87,7 +87,7 @@ def summary_table(comparison: Comparison) -> str:
     comparison : the methods.
     """
     n, lines = len(comparison.names), summary_rows(comparison)
-    measure = comparison.course.measure.capitalize().replace("rmse", "RMSE")
+    measure = comparison.course.measure
     title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
     return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
 

@@ -50,9 +50,8 @@ def write_compare_report(
     }
     blocks: list[Block] = [
         Table(
-            caption=f"{course.measure}, front / rear, in percent of the rms force (and N), "
-            f"mean over {len(comparison.names)} recordings."
-            + "".join(f" {line}." for line in remarks),
+            caption=f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
+            f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in remarks),
             header=rows[0],
             rows=rows[1:],
         )
