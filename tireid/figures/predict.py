@@ -1,5 +1,8 @@
 """A stored model beside the motion of a drive: the force that it shows, and the road's friction."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -21,6 +24,13 @@ from tireid.figures.style import (
     styled,
 )
 
+POINTS: Mapping[str, Any] = {
+    "linestyle": "",
+    "marker": ".",
+    "markersize": 3.0,
+    "rasterized": True,
+}
+
 
 @styled
 def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
@@ -36,15 +46,14 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
     unit = force_unit_of(measured)
     figure = new_figure(PAGE, 3.0)
     panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[2.0, 1.0])
-    points = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
     for axle, name in enumerate(AXLES):
         upper, lower = panels[:, axle]
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
-        upper.plot(shown.t, seen, color=BLACK, label="shown by the motion", **points)
-        upper.plot(shown.t, said, color=ORANGE, label="model", **points)
+        upper.plot(shown.t, seen, color=BLACK, label="shown by the motion", **POINTS)
+        upper.plot(shown.t, said, color=ORANGE, label="model", **POINTS)
         upper.set(title=name)
         lower.axhline(0.0, color=BLACK, linewidth=0.6)
-        lower.plot(shown.t, said - seen, color=ORANGE, **points)
+        lower.plot(shown.t, said - seen, color=ORANGE, **POINTS)
         label_time(lower, shown.t)
     panels[0, 0].set_ylabel(f"mean force [{unit.name}]")
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")

@@ -11,7 +11,18 @@ from identifier.reproducibility import Prediction
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
-from tireid.report import Block, Headline, Paragraph, Report, Section, Table, printed, write_report
+from tireid.report import (
+    Block,
+    Cell,
+    Headline,
+    Marked,
+    Paragraph,
+    Report,
+    Section,
+    Table,
+    printed,
+    write_report,
+)
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.reports.identify import (
     asked_warnings,
@@ -52,7 +63,7 @@ def write_predict_report(
     command : as it was typed.
     """
     model, recording = prediction.model, prediction.recording
-    notes = [*stored_warning(source), *asked_warnings(model, recording)]
+    notes: list[str | Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
     found: list[Block] = [*_errors(prediction)]
     found += [Paragraph(text=printed(line)) for line in told.splitlines()]
     captions = {
@@ -121,7 +132,7 @@ def _errors(prediction: Prediction) -> list[Block]:
     error, size = prediction.against_truth, prediction.true_force
     if error is None or size is None:
         return []
-    rows = [
+    rows: list[list[Cell]] = [
         [axle, newtons, PERCENT * newtons / force if force > 0.0 else None]
         for axle, newtons, force in (
             ("front", error.front, size.front),
