@@ -11,7 +11,7 @@ from identifier.verdict import Number, Verdict
 from identifier.verdict.verdict import MOST_MISSED, PERCENT
 from tireid.output import text_table
 from tireid.progress import complain
-from tireid.report import Block, Headline, Marked, Paragraph, Section, Table, Tone, printed
+from tireid.report import Block, Cell, Headline, Marked, Paragraph, Section, Table, Tone, printed
 
 HEADER = ("", "front", "is", "rear", "is")
 
@@ -184,7 +184,7 @@ def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
 
 def verdict_section(verdict: Verdict) -> Section:
     """Return the section of a report that holds a verdict; its findings are the warnings above."""
-    rows = [
+    rows: list[list[Cell]] = [
         [title, *(marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
         for title, by_axle in numbers_by_title(verdict).items()
     ]
