@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, judge_prediction
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -362,6 +362,7 @@ def run(options: argparse.Namespace) -> None:
         verdicts = {name: part.learnt.verdict(FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in parts.items():
+            model = part.learnt.freeze(FREEZE)
             figures[name] = write_results(
                 folders[name],
                 part.law,
@@ -369,6 +370,7 @@ def run(options: argparse.Namespace) -> None:
                 part.others,
                 part.frozen,
                 verdicts[name],
+                {one.recording.name: judge_prediction(model, one.recording) for one in part.others},
             )
         operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(
