@@ -68,9 +68,8 @@ class Exported:
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
-        estimates = [step.vehicle.estimates] if step.vehicle.estimates else []
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
-        return "\n".join([*lines, *self.told, *estimates, reads, *told, wrote])
+        return "\n".join([*lines, *self.told, reads, *told, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"

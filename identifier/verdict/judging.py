@@ -1,6 +1,5 @@
 """Judging a run, and a model that is asked about a drive."""
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -11,7 +10,7 @@ from identifier.axle import AxleIdentifier
 from identifier.method import Method
 from identifier.reproducibility import motion_error
 from identifier.run import History, identify
-from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
+from identifier.tire_model import AXLES, TireModel
 from identifier.verdict.causes import CAUSES, OF_ROAD, Ask, Cause, Mended, Suspect, suspects
 from identifier.verdict.friction import RoadFriction, road_friction
 from identifier.verdict.motion import (
@@ -26,15 +25,20 @@ from identifier.verdict.motion import (
     noise_variance,
 )
 from identifier.verdict.parts import asked_run, taught_elsewhere, without_v_y
-from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings, is_off_center
-from identifier.verdict.verdict import WITHOUT_V_Y, Number, Objection, Verdict
+from identifier.verdict.rules import Drive, findings, is_off_center
+from identifier.verdict.verdict import (
+    MOST_MISSED,
+    PERCENT,
+    WITHOUT_V_Y,
+    Number,
+    Objection,
+    Verdict,
+    WindowForces,
+)
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
 from models.vehicle import Vehicle
 
-STRETCH = 0.3  # share of the windows that may be missed in one piece
-REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
-CONFINED = 0.6  # and of what is missed with the piece
 ROADS = 3  # stretches of another friction that are told one by one
 TINY = 1e-9  # of a force, squared [static axle loads²]
 GEOMETRY, PRESS = "center_of_gravity", "downforce"
@@ -83,7 +87,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
         )
         for one in history.design.reached(history.vehicle, history.state_at(run.end))
     ]
-    return _verdict(drive, [*findings(drive), *reached, *_asked_of(asked, whole)])
+    listed = [*findings(drive), *reached, *_asked_of(asked, whole)]
+    return _verdict(drive, listed, whole.t[asked.samples])
 
 
 def judge_prediction(
@@ -113,7 +118,7 @@ def judge_prediction(
         return _too_short(model)
     friction = road_friction(model, recording, road) if another_road else None
     listed = [*findings(drive), *_roads(friction), *_asked_of(asked, recording)]
-    return replace(_verdict(drive, listed), friction=friction)
+    return replace(_verdict(drive, listed, recording.t[asked.samples]), friction=friction)
 
 
 def _roads(found: RoadFriction | None) -> list[Objection]:
@@ -163,21 +168,14 @@ def _looked_at(
 ) -> Drive | None:
     """Return what the rules look at; None where too little is driven.
 
-    One stretch may be missed, as before a sensor has settled, where all the rest is explained: it
-    is left out, and noted.
+    A stretch that `Evidence.but_a_stretch` leaves out is noted.
     """
     recording = asked.recording
-    found = evidence(model, recording, road)
-    notes: tuple[Objection, ...] = ()
-    if found is None:
+    whole = evidence(model, recording, road)
+    if whole is None:
         return None
-    if not (found.missed <= REST_MISSED).all():
-        first, last = found.worst_stretch(STRETCH)
-        rest = found.without(first, last)
-        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * found.missed.max())).all()
-        if len(rest.windows) >= FEWEST and confined:
-            notes = (_stretch(found, rest, clock[asked.samples], first, last),)
-            found = rest
+    found, left_out = whole.but_a_stretch()
+    notes = () if left_out is None else (_stretch(whole, found, clock[asked.samples], *left_out),)
     listed: tuple[Suspect, ...] = ()
     if not ((found.missed <= MOST_MISSED).all() or without_v_y(asked)):
         listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle, causes)
@@ -219,8 +217,8 @@ def _ask(tires: Tires, windows: Windows, road: Array | None) -> Ask:
     return ask
 
 
-def _verdict(drive: Drive, listed: list[Objection]) -> Verdict:
-    """Return the verdict of what was found."""
+def _verdict(drive: Drive, listed: list[Objection], clock: Array) -> Verdict:
+    """Return the verdict of what was found; the clock is that of the drive's samples [s]."""
     listed.sort(key=lambda finding: not finding.refuses)
     found, model, recording = drive.found, drive.model, drive.recording
     motion = motion_error(
@@ -242,23 +240,21 @@ def _verdict(drive: Drive, listed: list[Objection]) -> Verdict:
     missed = dict(zip(AXLES, found.missed, strict=True))
     numbers = tuple(
         Number(
-            *one._replace(sd=_doubt(one, float(missed[one.axle]))),
+            *one.with_missed(float(missed[one.axle])),
             valid=one.learnt and not refused & {None, one.axle},
         )
         for one in model.estimates()
     )
     blind = WITHOUT_V_Y if recording.logged_v_y is None else ()
-    return Verdict(findings=tuple(listed), numbers=numbers, measures=measures, blind=blind)
-
-
-def _doubt(one: Estimate, missed: float) -> float | None:
-    """Return the standard deviation of a number: of a force, with the share that is missed of it.
-
-    The recursion knows of noise only; what its curves cannot say is in what they miss.
-    """
-    if one.sd is None or one.title not in (STIFFNESS, GRIP):
-        return one.sd
-    return math.hypot(one.sd, missed * one.value)
+    starts, n = found.windows.starts, found.windows.n
+    middle = 0.5 * (clock[starts] + clock[starts + n])
+    return Verdict(
+        findings=tuple(listed),
+        numbers=numbers,
+        measures=measures,
+        blind=blind,
+        shown=WindowForces(middle, found.measured, found.modelled),
+    )
 
 
 def _pair(values: Array | None) -> tuple[float, ...] | None:

@@ -21,6 +21,9 @@ from models.vehicle import GRAVITY, Vehicle
 WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
+STRETCH = 0.3  # share of the windows that may be missed in one piece
+REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
+CONFINED = 0.6  # and of what is missed with the piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,6 +230,21 @@ class Evidence:
             measured=self.measured[kept],
             modelled=self.modelled[kept],
         )
+
+    def but_a_stretch(self) -> "tuple[Evidence, tuple[int, int] | None]":
+        """Return what a model is judged by, and which windows are left out of it: first, past last.
+
+        One stretch may be missed, as before a sensor has settled, where all the rest is explained:
+        it is left out. None is where all is explained, or more than one stretch is missed.
+        """
+        if (self.missed <= REST_MISSED).all():
+            return self, None
+        first, last = self.worst_stretch(STRETCH)
+        rest = self.without(first, last)
+        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * self.missed.max())).all()
+        if len(rest.windows) >= FEWEST and confined:
+            return rest, (first, last)
+        return self, None
 
     def worst_stretch(self, share: float) -> tuple[int, int]:
         """Return the stretch of a share of the windows in which most is missed: first, past last.

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.measured import printed_unit, printed_value
 from identifier.tire_model import AXLES, RELAXATION, TireModel
 from identifier.verdict.causes import TELLING, Suspect
 from identifier.verdict.motion import Evidence, lateral_noise
-from identifier.verdict.verdict import Objection
+from identifier.verdict.verdict import MOST_MISSED, PERCENT, Objection
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
-MOST_MISSED = 0.12  # share of the force, rms, that the frozen model may miss at an axle
 MOST_MISSED_ELSEWHERE = 0.6  # and one that a part of the drive did not teach, of that part
 MOST_APART = 0.25  # online from frozen, over the later half of the drive
 LEAST_FORCE = 0.1  # static axle loads: less is no force to learn from
@@ -32,7 +32,6 @@ CENTER = (-0.065, 0.12)  # of the wheelbase: where right cars seem to have their
 # forward and back of the told one; the body rolls, which looks like a center farther back
 CERTAIN = 0.3  # share of what is missed (squared) that another center of gravity must explain,
 NOTICED = 0.011  # and the share of the force (rms) that this must be
-PERCENT = 100.0
 
 
 class Drive(NamedTuple):
@@ -83,7 +82,7 @@ def _no_force(drive: Drive) -> Iterator[Objection]:
     ):
         if none:
             said = (
-                "what is printed is what was told, not learnt; drive a slalom"
+                "what is printed is not identifiable from this drive; drive a slalom"
                 if drive.learns
                 else "whether the model is right cannot be seen here"
             )
@@ -160,6 +159,10 @@ def _unknown(drive: Drive) -> Iterator[Objection]:
             )
 
 
+def _stiff(C: float) -> str:
+    return f"{printed_value(C, None, 'N/rad')} {printed_unit('N/rad')}"
+
+
 def _stiffness(drive: Drive) -> Iterator[Objection]:
     vehicle = drive.model.vehicle
     loads = np.array(vehicle.axle_loads)
@@ -173,7 +176,7 @@ def _stiffness(drive: Drive) -> Iterator[Objection]:
             yield Objection(
                 "no_tire",
                 axle,
-                f"a cornering stiffness of {C:.3g} N/rad is {each:.2g} static loads per rad, "
+                f"a cornering stiffness of {_stiff(C)} is {each:.2g} static loads per rad, "
                 f"tires have {STIFFNESS[0]:g} to {STIFFNESS[1]:g}: the axle was not learnt, or "
                 "signs, units or the vehicle file are wrong",
                 True,
@@ -184,7 +187,7 @@ def _stiffness(drive: Drive) -> Iterator[Objection]:
             yield Objection(
                 "far_from_told",
                 axle,
-                f"a cornering stiffness of {C:.3g} N/rad against {before:.3g} {origin}: "
+                f"a cornering stiffness of {_stiff(C)} against {_stiff(before)} {origin}: "
                 + (swapped if origin == "told" else f"an estimate that was far off, {swapped}"),
                 False,
             )

@@ -212,7 +212,7 @@ def run(options: argparse.Namespace) -> int:
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
         certificate = replace(certificate, properties=certificate.properties + along.properties)
-    text = _with_estimates(method_text(name, certificate, vehicle, driving), vehicle)
+    text = method_text(name, certificate, vehicle, driving)
     numbers = {
         "method": name,
         "conditions": {field: getattr(driving, field) for field in OF_ALL},
@@ -297,7 +297,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
-    text = _with_estimates("\n".join(texts), vehicle)
+    text = "\n".join(texts)
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
@@ -308,10 +308,6 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
     return FAILS if certificate.verdict == "fail" or passed else DONE
-
-
-def _with_estimates(text: str, vehicle: Vehicle) -> str:
-    return "\n".join(part for part in (text, vehicle.estimates) if part)
 
 
 def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:

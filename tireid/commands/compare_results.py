@@ -1,6 +1,7 @@
 """The files of `tireid compare`: compare.json, whose keys are stable, tables, CSV and figures.
 
-compare.json: recordings (samples, duration, rms_force_N); methods: by name online_N by recording,
+compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or motion: mean forces
+over 0.3 s that the motion shows); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
 recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
 methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio; left_out: by
@@ -87,7 +88,8 @@ def summary_table(comparison: Comparison) -> str:
     comparison : the methods.
     """
     n, lines = len(comparison.names), summary_rows(comparison)
-    title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
+    measure = comparison.course.measure
+    title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
     return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
 
 
@@ -283,6 +285,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             }
             for recording in course.recordings
         },
+        "judged_by": "motion" if course.by_motion else "truth",
         "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
         "left_out": dict(comparison.left_out),
         "floors": {

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from identifier.stored import load_model
+from identifier.tire_model import STIFFNESS
 from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
@@ -380,13 +381,14 @@ def _merge(options: argparse.Namespace) -> int:
 def _table(groups: list[Merged]) -> str:
     rows = [["group", "logs", "learning", "stiffness front, rear", "known to"]]
     for one in groups:
-        C, known = one.model.cornering_stiffness / 1e3, one.model.known_slip * 57.29578
+        known = one.model.known_slip * 57.29578
+        C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
         rows.append(
             [
                 one.name,
                 str(one.logs),
                 f"{one.told.seconds / 60.0:.1f} min",
-                f"{C[0]:.3g}, {C[1]:.3g} kN/rad",
+                f"{C[0]}, {C[1]} kN/rad",
                 f"{known[0]:.1f}, {known[1]:.1f} deg",
             ]
         )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from identifier.tire_model import STIFFNESS
 from tireid import __version__
 from tireid.figures.fleet import curves_figure, stiffness_figure, watch_figure
 from tireid.fleet.merge import Merged
@@ -162,10 +163,9 @@ def _alarm_row(alarm: Alarm) -> list[str | float | None]:
 def _groups_table(groups: Sequence[Merged]) -> Table:
     rows: list[list[str | float | None]] = []
     for one in groups:
-        C, known = one.model.cornering_stiffness / 1e3, np.degrees(one.model.known_slip)
-        rows.append(
-            [one.name, one.logs, one.told.seconds / 60.0, *map(float, (*C, *known))]
-        )  # fmt: skip
+        known = map(float, np.degrees(one.model.known_slip))
+        C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
+        rows.append([one.name, one.logs, one.told.seconds / 60.0, *C, *known])
     return Table(
         caption=f"Merged models{_first(len(rows))}.",
         header=["group", "logs", "learning [min]", "stiffness front [kN/rad]", "rear [kN/rad]",

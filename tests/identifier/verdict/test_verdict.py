@@ -96,6 +96,8 @@ def test_a_verdict_is_plain_data(good):
     assert {"findings", "numbers", "measures", "unseen"} < set(data)
     assert good.lines[0] == "verdict: valid"
     assert "mass" in good.lines[-2]
+    front, rear = (100.0 * share for share in good.measures["force_missed"])
+    assert f"{front:.1f} / {rear:.1f} % (front / rear, limit 12 %)" in good.lines[1]
 
 
 def test_what_is_measured_is_the_true_force(whole):
@@ -245,7 +247,7 @@ def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
     assert not verdict.valid
     assert codes(verdict) == {"no_force"}
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
-    assert {number.state for number in tires} == {"told, not learnt"}
+    assert {number.state for number in tires} == {"not identifiable from this drive"}
     assert not [number for number in verdict.numbers if number.valid]
 
 
