@@ -34,7 +34,7 @@ BUCKETS = 16
 FORMAT = "tireid fleet 2"
 BATCH = 512  # rows that are read at once
 SMALL = 1 << 22  # bytes of a file that is fetched as one
-SETTLED = 1 << 25, 1000  # bytes and files of what pends that are sorted at once
+HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
 WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "oci", "memory"}  # see _put
 INSTALL = "pip install 'tireid[fleet]'"
 
@@ -483,18 +483,26 @@ class Store:
 
     def settle(self) -> None:
         """Sort what pends into its buckets."""
-        fs, _ = self._place
-        for files in _rounds(self._sizes("pending")):
-            new = needed("pyarrow").concat_tables(
-                [self._table(path, size) for path, size in files.items()]
-            )
-            by_bucket: dict[str, list[int]] = {}
-            for k, row in enumerate(_rows_of(new.select(INDEX))):
-                by_bucket.setdefault(row.bucket, []).append(k)
-            sizes = self._sizes("logs")
-            for bucket, some in sorted(by_bucket.items()):
-                self._sort(bucket, sizes, [new.take(some)])
-            fs.rm(list(files))
+        paths, tables = [], []
+        for path, size in self._sizes("pending").items():
+            paths.append(path)
+            tables.append(self._table(path, size))
+            if len(paths) == AT_ONCE or sum(table.nbytes for table in tables) > HELD:
+                self._settle(paths, tables)
+                paths, tables = [], []
+        if paths:
+            self._settle(paths, tables)
+
+    def _settle(self, paths: Sequence[str], tables: Sequence[Any]) -> None:
+        """Sort files that pend into their buckets."""
+        new = needed("pyarrow").concat_tables(tables)
+        by_bucket: dict[str, list[int]] = {}
+        for k, row in enumerate(_rows_of(new.select(INDEX))):
+            by_bucket.setdefault(row.bucket, []).append(k)
+        sizes = self._sizes("logs")
+        for bucket, some in sorted(by_bucket.items()):
+            self._sort(bucket, sizes, [new.take(some)])
+        self._place[0].rm(list(paths))
 
     def drop(self, rows: Sequence[LogRow]) -> None:
         """Take rows out; none may pend.
@@ -563,19 +571,6 @@ def _order(row: LogRow) -> tuple[str, ...]:
     return row.log, row.run, row.setting, row.content
 
 
-def _rounds(sizes: Mapping[str, int]) -> Iterator[dict[str, int]]:
-    """Yield files in portions that memory holds."""
-    most, count = SETTLED
-    some: dict[str, int] = {}
-    for path, size in sizes.items():
-        if some and (sum(some.values()) + size > most or len(some) == count):
-            yield some
-            some = {}
-        some[path] = size
-    if some:
-        yield some
-
-
 def _named_in(where: str) -> list[str]:
     """Return the columns that a condition may ask for: what is heavy only where it names it."""
     return [name for name in COLUMNS if name not in HEAVY or name in where.lower()]
@@ -585,7 +580,7 @@ def _answered(table: Any, taken: Array, where: str, source: str) -> Array:
     """Return which rows that are taken fulfill a condition."""
     pyarrow = needed("pyarrow")
     some = table.filter(pyarrow.array(taken))
-    some = some.append_column("_row", pyarrow.array(np.flatnonzero(taken)))
+    some = some.append_column("_row", pyarrow.array(np.flatnonzero(taken).tolist()))
     rows = selected(some, f"SELECT _row FROM logs WHERE ({where}\n)", source).column(0).to_pylist()
     fulfilled = np.zeros_like(taken)
     fulfilled[rows] = True
