@@ -13,7 +13,8 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from models.logs import arrow, text
+from models.logs import text
+from models.logs.arrow import columns_of
 from models.logs.door import open_log
 from models.logs.foreign import one_line
 from models.logs.growing import Growing
@@ -347,5 +348,5 @@ def test_no_thread_of_pyarrow_is_left_with_bytes_of_pythons(tmp_path):
     block = path.read_bytes().partition(b"\n")[2]
     before = sys.getrefcount(block)
     for _ in range(200):
-        assert arrow.columns_of(block, layout, dict.fromkeys((0, 1), Kind.NUMBER)) is not None
+        assert columns_of(block, layout, dict.fromkeys((0, 1), Kind.NUMBER)) is not None
         assert sys.getrefcount(block) == before
