@@ -23,7 +23,8 @@ from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import reference_of
 from identifier.axle.prior import fiala_weights
 from identifier.stored import load_model
-from models.recordings import read_recording
+from identifier.verdict import judge_prediction
+from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import cluster
@@ -358,6 +359,42 @@ class StoppedError(Exception):
     pass
 
 
+def test_a_row_tells_how_its_log_was_driven_and_what_was_learnt(store, logs):
+    row = next(one for one in Store(store).rows() if one.log.endswith("quick.csv"))
+    log = read_recording(logs / "quick.csv")
+    a_y = [v * r for v, r in zip(log.v_x, log.r, strict=True)]
+    assert row.a_y_rms == pytest.approx(math.sqrt(sum(one * one for one in a_y) / len(a_y)))
+    assert row.a_y_most == pytest.approx(max(map(abs, a_y)))
+    assert row.v_x_mean == pytest.approx(sum(log.v_x) / len(log.v_x))
+    assert (row.v_x_most, row.steering_most) == (max(log.v_x), max(map(abs, log.delta_f)))
+    assert row.seconds == log.t[-1] - log.t[0] and row.estimated_v_y is False
+    model = row.frozen
+    for i, axle in enumerate(("front", "rear")):
+        assert getattr(row, f"stiffness_{axle}") == model.cornering_stiffness[i]
+        assert getattr(row, f"grip_{axle}") == pytest.approx(sum(model.W[i]))
+        assert getattr(row, f"relaxation_{axle}") == model.relaxation_length[i]
+        assert getattr(row, f"known_{axle}") == model.known_slip[i]
+    assert (np.reshape(row.excitation, (2, 9)) == model.excitation).all()
+    judged = judge_prediction(model, log, another_road=False)
+    assert row.valid is judged.valid and len(row.findings) == len(judged.findings)
+    assert [row.missed_front, row.missed_rear] == list(judged.measures["force_missed"])
+    assert all(one.code in told for one, told in zip(judged.findings, row.findings, strict=True))
+    assert row.part_begin == [0.0] and 3.0 < row.part_seconds[0] < row.seconds
+
+
+def test_a_log_without_v_y_a_full_verdict_and_a_date_of_its_file(garage, monkeypatch):
+    monkeypatch.chdir(garage / "one")
+    log = replace(read_recording("logs/0.csv"), v_y=None)
+    Path("logs").rename("before")
+    write_recording(log, "without.csv")
+    os.utime("without.csv", (1.7e9, 1.7e9))
+    assert main(["fleet", "learn", "*.csv", "--vehicle", "car.toml", "--out", "s", "--jobs", "1",
+                 "--judge", "full"]) == 0  # fmt: skip
+    (row,) = Store("s").rows()
+    assert row.estimated_v_y is True and row.valid is not None and not row.error
+    assert (row.date, row.vehicle, row.tires) == ("2023-11-14T22:13:20+00:00", sedan().name, "")
+
+
 def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bytes(tmp_path, monkeypatch):
     tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
     telling = Telling(log_map=learning.LogMap())
@@ -504,6 +541,8 @@ def test_a_question_in_sql_chooses_rows_and_sees_nothing_else(store):
     pytest.importorskip("duckdb", reason="needs DuckDB: pip install 'tireid[fleet]'")
     rows = Store(store).rows(where="vehicle = 'red' AND error = ''")
     assert {row.vehicle for row in rows} == {"red"} and len(rows) == 2 * DAYS
+    some = Store(store).rows(("log",), where="len(part_seconds) = 1 AND model LIKE '%axle%'")
+    assert len(some) == 4 * DAYS and {row.model for row in some} == {""}
     for wrong in ("nobody > 3", "log IN (SELECT content FROM read_text('cars/red.toml'))"):
         with pytest.raises(StoreError, match=r"all: "):
             Store(store).rows(where=wrong)

@@ -577,14 +577,23 @@ def _named_in(where: str) -> list[str]:
 
 
 def _answered(table: Any, taken: Array, where: str, source: str) -> Array:
-    """Return which rows that are taken fulfill a condition."""
-    pyarrow = needed("pyarrow")
+    """Return which rows that are taken fulfill a condition; DuckDB sees nothing but them."""
+    pyarrow, duckdb = needed("pyarrow"), needed("duckdb", "a question in SQL")
     some = table.filter(pyarrow.array(taken))
     some = some.append_column("_row", pyarrow.array(np.flatnonzero(taken).tolist()))
-    rows = selected(some, f"SELECT _row FROM logs WHERE ({where}\n)", source).column(0).to_pylist()
+    connection = duckdb.connect(":memory:")
+    try:
+        connection.register("logs", some)
+        connection.execute("SET enable_external_access = false")
+        connection.execute(f"SELECT _row FROM logs WHERE ({where}\n)")
+        rows = [row for (row,) in connection.fetchall()]
+    except duckdb.Error as error:
+        raise StoreError(f"{source}: {' '.join(str(error).split())}") from error
+    finally:
+        connection.close()
     fulfilled = np.zeros_like(taken)
     fulfilled[rows] = True
-    return fulfilled & taken
+    return fulfilled
 
 
 def _rows_of(table: Any) -> Iterator[LogRow]:
@@ -610,32 +619,3 @@ def schema() -> Any:
     kinds |= {name: pyarrow.string() for name in WORDS}
     listed = [pyarrow.field(name, kinds.get(name, pyarrow.float64())) for name in COLUMNS]
     return pyarrow.schema(listed, metadata={"format": FORMAT})
-
-
-def selected(table: Any, question: str, source: str) -> Any:
-    """Return what DuckDB answers, as an Arrow table; it sees nothing but the table `logs`.
-
-    Parameters
-    ----------
-    table : an Arrow table.
-    question : in SQL.
-    source : of the table, for errors.
-
-    Raises
-    ------
-    StoreError
-        Where the question is not right.
-    """
-    duckdb = needed("duckdb", "a question in SQL")
-    connection = duckdb.connect(":memory:")
-    try:
-        connection.register("logs", table)
-        connection.execute("SET enable_external_access = false")
-        answer = connection.sql(question)
-        if answer is None:
-            raise StoreError(f"{source}: the question must be one that SELECTs")
-        return answer.to_arrow_table() if hasattr(answer, "to_arrow_table") else answer.arrow()
-    except duckdb.Error as error:
-        raise StoreError(f"{source}: {' '.join(str(error).split())}") from error
-    finally:
-        connection.close()
