@@ -4,7 +4,7 @@
 
 speed    500 logs of 60 s, CSV, by `tireid fleet learn`: everyday drives, each some times over, with
          as many empty lines behind as make them different.
-hours    60 h in Parquet files of an hour, the same drives in each; 1000 h are told from them.
+hours    30 h in Parquet files of an hour, the same drives in each; 1000 h are told from them.
 store    100 000 rows that differ, of 50 cars: `tireid fleet merge` and what it holds, beside what
          it holds of 1000.
 merge    random cars of four classes, six drives each: information of drives against that of all of
@@ -59,10 +59,10 @@ from tireid.fleet.watch import Watch, Watching, watch
 
 PARTS = ("speed", "hours", "store", "merge", "prior", "watch", "cluster")
 LOGS, MINUTE = 500, 60.0
-HOURS, DRIVEN_HOURS = 1000, 60
+HOURS, DRIVEN_HOURS = 1000, 30
 ROWS, FEW, ROW_CARS = 100_000, 1000, 50
 DISTINCT = 20  # drives that logs are made of
-DRIVEN = 40  # cars of the watched fleet that are driven
+DRIVEN = 24  # cars of the watched fleet that are driven
 CARS, AFTER = 500, 120  # cars, minutes of each after its baseline
 BASELINE, LATER, SOFTER, FAULTY = 20, 20, 12, 6  # minutes that are driven of a car
 LOSES = 5  # one of so many cars loses stiffness,

@@ -395,6 +395,62 @@ def test_a_log_without_v_y_a_full_verdict_and_a_date_of_its_file(garage, monkeyp
     assert (row.date, row.vehicle, row.tires) == ("2023-11-14T22:13:20+00:00", sedan().name, "")
 
 
+def test_logs_at_an_address_are_known_by_what_their_file_system_says(garage, logs, monkeypatch):
+    from fsspec.implementations.memory import MemoryFileSystem
+
+    monkeypatch.chdir(garage / "one")
+    fs, text = MemoryFileSystem(), (logs / "quick.csv").read_bytes()
+    telling, store = Telling(log_map=learning.LogMap(), judging="none"), Store("store")
+
+    def learnt_now():
+        tasks, left = find_logs(
+            ["memory://drives/*/*.csv"], "car.toml", "{tires}/{date}-*.csv", "memory://drives"
+        )
+        assert list(left) == ["wet/last.csv"]
+        return learn_fleet(tasks, telling, store, map).learnt
+
+    try:
+        fs.pipe_file("/drives/wet/2026-03-01T10:00-a.csv", text)
+        fs.pipe_file("/drives/wet/last.csv", text)
+        assert (learnt_now(), learnt_now()) == (1, 0)
+        fs.pipe_file("/drives/wet/2026-03-01T10:00-a.csv", text[:-1] + b" ")  # of the same size
+        assert learnt_now() == 1
+        rows = store.rows()
+        assert {row.log for row in rows} == {"wet/2026-03-01T10:00-a.csv"} and len(rows) == 2
+        assert (rows[0].tires, rows[0].date, rows[0].size) == ("wet", "2026-03-01T10:00", len(text))
+        assert json.loads(rows[0].tags) == {"tires": "wet", "date": "2026-03-01T10:00"}
+        (task,), _ = find_logs(["memory://drives/wet/last.csv"], "car.toml")
+        assert task.log == task.address == fs.unstrip_protocol("/drives/wet/last.csv")
+        assert task.date == fs.info("/drives/wet/last.csv")["created"].isoformat(timespec="seconds")
+    finally:
+        fs.rm("/drives", recursive=True)
+    silent = {"name": "a", "size": 3, "type": "file"}
+    assert learning._stamp("http://host/a", silent) == ""
+    told = [{**silent, "ETag": "x"}, {**silent, "ETag": "y"}, {**silent, "LastModified": "x"}]
+    stamps = {learning._stamp("s3://host/a", one) for one in [*told, {**told[0], "size": 4}]}
+    assert len(stamps) == 4 and "" not in stamps
+
+
+def test_a_store_is_sorted_in_rounds_and_emptied_row_by_row(store, tmp_path, monkeypatch):
+    rows, whole, parts = Store(store).rows(), Store(str(tmp_path / "a")), Store(str(tmp_path / "b"))
+    for out in (whole, parts):
+        for row in rows:
+            out.keep([row])
+        monkeypatch.setattr(storing, "AT_ONCE", 2 if out is parts else 1000)
+        out.settle()
+    assert digest(tmp_path / "a") == digest(tmp_path / "b") == digest(store)
+    parts.drop(rows[:3])
+    assert parts.rows() == rows[3:]
+    parts.drop(rows[3:])
+    assert not parts.exists and not list((tmp_path / "b" / "logs").iterdir())
+
+
+def test_few_logs_are_shared_into_as_many_portions_and_many_by_eight():
+    sizes = {n: [len(one) for one in learning._portions(range(n))] for n in (0, 5, 40, 500)}
+    assert sizes[0] == [] and sizes[5] == [1] * 5 and sizes[40] == [2] * 20
+    assert set(sizes[500][:-1]) == {8} and sum(sizes[500]) == 500
+
+
 def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bytes(tmp_path, monkeypatch):
     tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
     telling = Telling(log_map=learning.LogMap())
@@ -687,6 +743,7 @@ def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatc
     assert "{vehicle} is no tag" in said(*learn, CAR)
     assert "each name once" in said(*learn, "cars/red.toml", "--tags", "{a}/{a}.csv")
     assert "at least 10 s" in said(*learn, "cars/red.toml", "--part", "1")
+    assert "does not lie under --root cars" in said(*learn, "cars/red.toml", "--root", "cars")
     assert "is no store" in said("merge", str(tmp_path / "nothing"))
     assert "no such file" in said(*learn, "cars/green.toml")
     (tmp_path / "x").mkdir()
