@@ -251,10 +251,10 @@ def _stamp(address: str, info: Mapping[str, Any]) -> str:
         told: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
     else:
         some = {key.replace("_", "").lower(): value for key, value in info.items()}
-        told = [str(some[key]) for key in CHANGES if some.get(key)]
+        told = [(key, str(some[key])) for key in CHANGES if some.get(key)]
         if not told:
             return ""
-        told.append(info.get("size"))
+        told.append(("size", info.get("size")))
     return hashlib.blake2b(repr(told).encode(), digest_size=8).hexdigest()
 
 
