@@ -17,7 +17,9 @@ from tireid.fleet.merge import MergeError, fleet_prior, key_of, merge, sizes, us
 from tireid.fleet.store import LogRow, Store, information_columns
 from tireid.fleet.watch import Alarm, Watching, watch
 
-pytest.importorskip("pyarrow", reason="needs a store: pip install 'tireid[fleet]'")
+pyarrow = pytest.importorskip("pyarrow", reason="needs a store: pip install 'tireid[fleet]'")
+pytest.importorskip("fsspec", reason="needs a store: pip install 'tireid[fleet]'")
+parquet = pytest.importorskip("pyarrow.parquet")
 
 CAR = replace(sedan(), chassis=None)
 DESIGN = AxleIdentifier.for_vehicle(CAR, dt=0.01)
@@ -75,10 +77,26 @@ def test_what_parts_tell_comes_back_from_a_store(tmp_path):
         row == replace(row_of(0, parts), findings=[])
         and len(row.matrix) == 2 * 2 * Q * (Q + 1) // 2
     )
+    path = tmp_path / "store" / "logs" / row.bucket
+    table = parquet.read_table(path)
+    for name in ("tires", "findings"):  # as another program may leave them
+        empty = pyarrow.nulls(1, table.schema.field(name).type)
+        table = table.set_column(table.column_names.index(name), name, empty)
+    parquet.write_table(table, path)
+    assert store.rows() == [replace(row, tires="", findings=())]
     for one, back in zip(parts, row.parts, strict=True):
         for name in ("matrix", "vector", "square"):
             assert (getattr(back, name) == getattr(one, name)).all()
         assert (back.samples, back.seconds) == (one.samples, one.seconds)
+
+
+def test_logs_are_spread_over_sixteen_files_and_the_runs_of_one_lie_together():
+    rows = [row_of(k, []) for k in range(200)]
+    assert len({row.bucket for row in rows}) == 16
+    for row in rows[:9]:
+        others = [replace(row, **more) for more in ({"run": "2"}, {"setting": "x"}, {"log": "y"})]
+        assert {one.bucket for one in others} == {row.bucket}
+    assert len({replace(row, content="").bucket for row in rows}) == 16
 
 
 def test_sums_are_exact_in_any_order_and_in_any_portions():

@@ -602,7 +602,7 @@ def _rows_of(table: Any) -> Iterator[LogRow]:
 
 def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row of Arrow as the arguments of `LogRow`."""
-    empty = {**dict.fromkeys(LISTS, ()), **dict.fromkeys(WORDS, "")}
+    empty = {**dict.fromkeys((*LISTS, "findings"), ()), **dict.fromkeys(WORDS, "")}
     return {name: empty.get(name) if value is None else value for name, value in row.items()}
 
 
