@@ -303,6 +303,8 @@ def test_the_watch_sums_log_likelihood_ratios_of_page(driven):
         (2, (-0.01, -0.01, 0.3), False, "wear, or a slow leak"),
         (0, (-0.1, -0.09, 0.0), True, "both axles alike: other tires, or another load"),
         (0, (-0.1, -0.09, 0.0), False, "both axles alike: wear, or tire pressure"),
+        (0, (-0.1, -0.071, 0.0), False, "both axles alike: wear, or tire pressure"),
+        (1, (-0.071, -0.1, 0.0), False, "both axles alike: wear, or tire pressure"),
         (1, (-0.1, -0.06, 0.0), True, "other tires or a loss of pressure"),
         (0, (-0.1, -0.02, 0.0), False, "wear, or a slow leak"),
         (0, (-0.02, -0.021, 0.0), True, "other tires or a loss of pressure"),
