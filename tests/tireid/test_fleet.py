@@ -389,11 +389,14 @@ def test_a_log_without_v_y_a_full_verdict_and_a_date_of_its_file(garage, monkeyp
     write_recording(log, "without.csv")
     os.utime("without.csv", (1.7e9, 1.7e9))
     shutil.copy("before/1.csv", "with.csv")
-    assert main(["fleet", "learn", "*.csv", "--vehicle", "car.toml", "--out", "s", "--jobs", "1",
-                 "--judge", "full"]) == 0  # fmt: skip
+    assert learns("without.csv", "none") == 0
+    (alone,) = Store("none").rows()
+    assert (alone.error, alone.valid) == ("", None)
+    assert learns("*.csv", "s", "--judge", "full") == 0
     other, row = Store("s").rows()
     assert (other.estimated_v_y, row.estimated_v_y) == (False, True)
     assert None not in (other.valid, row.valid) and not row.error
+    assert row.model == alone.model
     assert (row.date, row.vehicle, row.tires) == ("2023-11-14T22:13:20+00:00", sedan().name, "")
 
 
@@ -408,12 +411,13 @@ def test_logs_at_an_address_are_known_by_what_their_file_system_says(garage, log
         tasks, left = find_logs(
             ["memory://drives/*/*.csv"], "car.toml", "{tires}/{date}-*.csv", "memory://drives"
         )
-        assert list(left) == ["wet/last.csv"]
+        assert list(left) == ["wet/0.csv", "wet/last.csv"]
         return learn_fleet(tasks, telling, store, map).learnt
 
     try:
         fs.pipe_file("/drives/wet/2026-03-01T10:00-a.csv", text)
-        fs.pipe_file("/drives/wet/last.csv", text)
+        for name in ("0", "last"):
+            fs.pipe_file(f"/drives/wet/{name}.csv", text)
         assert (learnt_now(), learnt_now()) == (1, 0)
         fs.pipe_file("/drives/wet/2026-03-01T10:00-a.csv", text[:-1] + b" ")  # of the same size
         assert learnt_now() == 1
