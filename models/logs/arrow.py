@@ -44,6 +44,18 @@ def is_used(path: Path) -> bool:
     return "pyarrow" in sys.modules or path.stat().st_size > WORTH
 
 
+def _of_arrow(block: bytes) -> Any:
+    """Return bytes in memory of pyarrow's own.
+
+    Its threads may drop them last, while Python ends: of what is Python's that aborts the program.
+    """
+    import pyarrow
+
+    held = pyarrow.allocate_buffer(len(block))
+    np.frombuffer(held, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
+    return held
+
+
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
 
@@ -64,7 +76,7 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
     }
     try:
         table = pyarrow.csv.read_csv(
-            pyarrow.BufferReader(block),
+            pyarrow.BufferReader(_of_arrow(block)),
             pyarrow.csv.ReadOptions(
                 column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
             ),

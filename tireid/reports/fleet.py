@@ -10,12 +10,14 @@ from identifier.tire_model import STIFFNESS
 from tireid import __version__
 from tireid.figures.fleet import curves_figure, stiffness_figure, watch_figure
 from tireid.fleet.merge import Merged
-from tireid.fleet.store import LogRow
+from tireid.fleet.store import INDEX, LogRow
 from tireid.fleet.watch import Alarm, Watch
 from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import REPORT, drawing
 
 LISTED = 200  # rows of a table
+COLUMNS = (*INDEX, "vehicle", "date", "seconds", "valid", "findings", "stiffness_front",
+           "stiffness_rear")  # fmt: skip
 DRAWN = 6  # cars with an alarm that are drawn
 
 READ_STIFFNESS = (
@@ -76,8 +78,8 @@ def write_fleet_report(
         Section(heading="What changed", blocks=watch_blocks(watched)),
     ]
     if errors or refused:
-        why = {row.log: row.error for row in errors}
-        why |= {row.log: f"not valid: {', '.join(row.findings)}" for row in refused}
+        why = {row.name: row.error for row in errors}
+        why |= {row.name: f"not valid: {', '.join(row.findings)}" for row in refused}
         listed = list(why.items())
         table = Table(
             caption=f"Logs that were left out{_first(len(listed))}.",
