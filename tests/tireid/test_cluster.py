@@ -133,7 +133,7 @@ def test_a_worker_of_threads_is_told_how_to_start_as_processes(tmp_path, capsys)
 def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
     address, logs, tmp_path, monkeypatch, capsys
 ):
-    pytest.importorskip("pyarrow", reason="needs a store: pip install 'tireid[fleet]'")
+    pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
     for name in ("slalom", "quick"):
         (tmp_path / f"{name}.csv").write_bytes((logs / f"{name}.csv").read_bytes())
     replace(sedan(), chassis=None).to_toml(tmp_path / "car.toml")

@@ -17,8 +17,8 @@ from tireid.fleet.merge import MergeError, fleet_prior, key_of, merge, sizes, us
 from tireid.fleet.store import LogRow, Store, information_columns
 from tireid.fleet.watch import Alarm, Watching, watch
 
-pyarrow = pytest.importorskip("pyarrow", reason="needs a store: pip install 'tireid[fleet]'")
-pytest.importorskip("fsspec", reason="needs a store: pip install 'tireid[fleet]'")
+pyarrow = pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
+pytest.importorskip("fsspec", reason="needs pyarrow and fsspec")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 CAR = replace(sedan(), chassis=None)
