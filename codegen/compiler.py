@@ -19,6 +19,8 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from codegen.writing import write_file
+
 # Where compiled code is kept between runs: what is found there, this user put there.
 #
 # What is loaded runs with all rights of who loads it. So the folder and the file must belong to
@@ -90,7 +92,7 @@ def keep(stem: str, ending: str, content: bytes) -> Path:
     file = folder / f"{stem}.{_digest(content)}{ending}"
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         part = Path(scratch) / file.name
-        part.write_bytes(content)
+        write_file(part, content)
         part.chmod(0o600)
         part.replace(file)  # atomic: two processes may keep the same file at once
     return file
@@ -259,7 +261,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         c_file, built = Path(scratch) / f"{name}.c", Path(scratch) / name
-        c_file.write_text(source, encoding="utf-8")
+        write_file(c_file, source)
         command = [*words, str(c_file), "-o", str(built), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode != 0:

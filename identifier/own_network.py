@@ -15,6 +15,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from codegen.writing import write_file
 from identifier.frozen import (
     FORMAT,
     FrozenModelError,
@@ -97,7 +98,7 @@ def _imported(content: bytes) -> ca.Function:
         raise UnusableNetworkError(f"reading ONNX needs CasADi {needed}, this is {version}")
     with tempfile.TemporaryDirectory(prefix="tireid-") as folder:
         path = Path(folder) / "network.onnx"
-        path.write_bytes(content)
+        write_file(path, content)
         try:
             graph = ca.GraphBuilder(str(path), {})
             names = [*graph.name_in(), *graph.name_out()]

@@ -5,6 +5,7 @@ F = +C α. Axle forces are lateral, in the frame of the body, left positive.
 """
 
 import json
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from os import PathLike
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
+from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
 from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
@@ -55,8 +57,8 @@ class Fact(NamedTuple):
 
     @property
     def words(self) -> list[str]:
-        """The values in four digits, 127000 as such and not as 1.27e+05."""
-        return [f"{float(f'{value:.4g}'):.10g}" for value in self.values]
+        """The values in three digits, 127000 as such and not as 1.27e+05."""
+        return [printed_value(float(value), None, self.unit) for value in self.values]
 
 
 class Estimate(NamedTuple):
@@ -73,6 +75,25 @@ class Estimate(NamedTuple):
     unit: str
     told: float | None
     learnt: bool
+
+    @property
+    def words(self) -> str:
+        """Value and standard deviation in three digits, and whether the drive left it open."""
+        value = printed_value(self.value, self.sd, self.unit)
+        return value if self.learnt else f"{value} ({NOT_IDENTIFIABLE})"
+
+    def with_missed(self, share: float) -> "Estimate":
+        """Return the number with the share that is missed of a force in its standard deviation.
+
+        The recursion knows of noise only; what its curves cannot say is in what they miss.
+
+        Parameters
+        ----------
+        share : of the force of its axle, rms [-].
+        """
+        if self.sd is None or self.title not in (STIFFNESS, GRIP):
+            return self
+        return self._replace(sd=math.hypot(self.sd, share * self.value))
 
 
 class Reached(NamedTuple):
@@ -340,6 +361,13 @@ class TireModel(ABC):
         raise ValueError(f"forces of a {type(self).__name__} are no curves of slip")
 
     @property
+    def force_missed(self) -> Array | None:
+        """Share [-] of the force that the motion of the drive that taught shows and the model
+        misses, rms, white noise taken off, (2,); None where nobody looked: `calibrated` does.
+        """
+        return None
+
+    @property
     def has_band(self) -> bool:
         """Whether the model can tell how sure it is."""
         return False
@@ -352,14 +380,17 @@ class TireModel(ABC):
         """
         return False
 
-    def with_calibration(self, calibration: "BandCalibration | None") -> "TireModel":
+    def with_calibration(
+        self, calibration: "BandCalibration | None", force_missed: Array | None = None
+    ) -> "TireModel":
         """Return the model, its band calibrated; as it is where it has none.
 
         Parameters
         ----------
         calibration : None takes errors to be as learning is told.
+        force_missed : of the drive that taught, (2,); None where nobody looked.
         """
-        del calibration
+        del calibration, force_missed
         return self
 
     def spread_by_range(
@@ -586,24 +617,35 @@ class TireModel(ABC):
         )
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
-        lines = [Fact(STIFFNESS, self.stiffness, "N/rad")]
-        if self.known_slip is not None:
-            lines.append(Fact("known up to a slip of", np.degrees(self.known_slip), "deg"))
-        return tuple(lines)
+        """Return what `summary` says beside the estimates."""
+        if self.known_slip is None:
+            return ()
+        return (Fact("known up to a slip of", np.degrees(self.known_slip), "deg"),)
 
     def summary(self) -> str:
-        """Return what was learnt, in a few lines."""
-        facts = self.facts()
-        width = max(len(fact.title) for fact in facts)
-        lines = [
-            f"{type(self).__name__} of {self.vehicle.name!r}",
-            f"{'':{width}}  {'front':>10}  {'rear':>10}",
-            *(
-                "  ".join([f"{fact.title:{width}}", *(f"{v:>10}" for v in fact.words), fact.unit])
-                for fact in facts
-            ),
-        ]
+        """Return what was learnt, in a few lines; ± is one standard deviation.
+
+        It begins with the share of the force that the model misses where that is known: of a
+        model of `calibrated`, also stored and read again. Without, ± knows of noise only.
+        """
+        missed = self.force_missed
+        rows = [["", *AXLES]]
+        if missed is not None:
+            fact = Fact("force missed in the drive that taught", 100.0 * missed, "%")
+            rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
+        by_title: dict[str, dict[str, str]] = {}
+        for one in self.estimates():
+            share = 0.0 if missed is None else float(missed[AXLES.index(one.axle)])
+            title = f"{one.title} [{printed_unit(one.unit)}]"
+            by_title.setdefault(title, {})[one.axle] = one.with_missed(share).words
+        rows += [[title, *(cells.get(axle, "") for axle in AXLES)]
+                 for title, cells in by_title.items()]  # fmt: skip
+        rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in self.facts()]
+        widths = [max(len(row[k]) for row in rows) for k in range(3)]
+        lines = [f"{type(self).__name__} of {self.vehicle.name!r}"]
+        for row in rows:
+            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            lines.append("  ".join(cells).rstrip())
         if self.has_band:
             how = "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
             lines.append(f"band: {how}")
@@ -679,14 +721,14 @@ class TireModel(ABC):
         return load_model(Path(path))
 
     def __repr__(self) -> str:
-        front, rear = self.stiffness
+        front, rear = Fact(STIFFNESS, self.stiffness, "N/rad").words
         known = (
             ""
             if self.known_slip is None
             else ", known to {:.1f} / {:.1f} deg".format(*np.degrees(self.known_slip))
         )
         name = f"{type(self).__name__} of {self.vehicle.name!r}"
-        return f"<{name}: stiffness {front:.4g} / {rear:.4g} N/rad{known}>"
+        return f"<{name}: stiffness {front} / {rear} kN/rad{known}>"
 
 
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:

@@ -56,6 +56,51 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
         )
 
 
+def swells(size: float, packed: float) -> bool:
+    """Return whether data unpack to what no log packs to.
+
+    Parameters
+    ----------
+    size : unpacked, as memory holds it [bytes].
+    packed : as the file holds them [bytes].
+    """
+    return size > SWOLLEN_FROM and size > SWELLS * packed
+
+
+def most_unpacked(packed: float) -> int:
+    """Return how many bytes a part of a log that is unpacked whole may have at most.
+
+    Parameters
+    ----------
+    packed : as of `swells`.
+    """
+    return int(min(1e6 * limits().block, max(SWOLLEN_FROM, SWELLS * packed)))
+
+
+def require_dense(
+    refusal: type[ValueError], where: str, size: float, packed: float, what: str
+) -> None:
+    """Refuse data that swell as no log does.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    where : file, begins the message.
+    size, packed : as of `swells`.
+    what : swells, in the plural.
+
+    Raises
+    ------
+    ValueError
+        Of that class.
+    """
+    if swells(size, packed):
+        raise refusal(
+            f"{where}: {what} must be a log, they swell to {size / max(packed, 1):.0f} times their "
+            f"size, above {SWELLS}; unpack the file first if it is one"
+        )
+
+
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
     """Refuse what is no regular file, and files that are too large.
 
@@ -136,11 +181,8 @@ def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[byt
                 return
             size += len(part)
             _require_size(path, refusal, size, limit)
-            if zipped and size > SWOLLEN_FROM and size > SWELLS * raw.tell():
-                raise refusal(
-                    f"{path}: gzip data must be a log, they swell to {size / raw.tell():.0f} times "
-                    f"their size, above {SWELLS}; unpack the file first if it is one"
-                )
+            if zipped:
+                require_dense(refusal, str(path), size, raw.tell(), "gzip data")
             yield part
 
 

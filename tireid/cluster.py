@@ -1,7 +1,9 @@
 """Work spread over a Dask cluster: the same functions, on as many machines as have workers.
 
 Every worker must have this very version of tireid, which is checked. Results come in any order. A
-worker that is lost is made good for by the scheduler; what several workers died of is told of.
+worker that is lost is made good for by the scheduler; what several workers died of is told of. Of
+the threads of a worker one works: CasADi's graphs must not be built by two at once. Which workers
+have more is said, and how to start processes instead.
 """
 
 import importlib
@@ -13,6 +15,7 @@ from typing import Any
 
 from identifier.compare.work import Map, source_digest
 from models.extras import needs
+from tireid.progress import say
 
 PATIENCE = 30.0  # s that the scheduler and the first worker may take to answer
 _ONE_AT_A_TIME = threading.Lock()  # CasADi's graphs must not be built by two threads of a worker
@@ -47,6 +50,7 @@ def cluster(address: str) -> Iterator[Map]:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         _require_workers(client, address)
+        _tell_of_idle_threads(client, address)
         yield partial(_map, dask, client, address)
     finally:
         client.close()
@@ -69,6 +73,16 @@ def _require_workers(client: Any, address: str) -> None:
 def _digest() -> str:
     """Return the digest by a function of tireid, which finds its own packages on a worker."""
     return source_digest()
+
+
+def _tell_of_idle_threads(client: Any, address: str) -> None:
+    threads = {worker: count for worker, count in client.nthreads().items() if count > 1}
+    if threads:
+        worker, count = next(iter(threads.items()))
+        say(
+            f"worker {worker} has {count} threads, of which one works; start it as processes: "
+            f"dask worker {address} --nworkers -1 --nthreads 1"
+        )
 
 
 def _map(

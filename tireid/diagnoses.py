@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
+from identifier.measured import with_doubt
 from models.recordings import LogMap, Recording, Repair
 from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
@@ -21,11 +22,11 @@ from tireid.report import (
     Report,
     Section,
     Table,
+    Tone,
     printed,
     write_report,
 )
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.verdicts import with_doubt
 
 HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -124,6 +125,13 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
 
 
+def tone_of(diagnosis: Diagnosis) -> Tone:
+    """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
+    if not diagnosis.healthy:
+        return "bad"
+    return "doubt" if diagnosis.findings else "good"
+
+
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
     """Return what was found as warnings of a report.
 
@@ -211,11 +219,16 @@ def write_doctor_report(
         sections.append(diagnosis_section(after, heading="After the repair"))
     count = len(diagnosis.findings)
     numbers = [
-        Headline(str(count), f"finding{'s' * (count != 1)} in the log or the car's file"),
+        Headline(
+            str(count),
+            f"finding{'s' * (count != 1)} in the log or the car's file",
+            tone_of(diagnosis),
+        ),
         Headline(str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"),
     ]
     if after is not None:
-        numbers.append(Headline(str(len(after.findings)), "left after the repair"))
+        left = str(len(after.findings))
+        numbers.append(Headline(left, "left after the repair", tone_of(after)))
     report = Report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import find_compiler
+from codegen.writing import write_file
 from identifier.export.package import Package, build_package, readme
 from identifier.export.processor import Cost, figures_text, measure, with_figures
 from identifier.method import CannotFreezeError, Method
@@ -67,9 +68,8 @@ class Exported:
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
-        estimates = [step.vehicle.estimates] if step.vehicle.estimates else []
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
-        return "\n".join([*lines, *self.told, *estimates, reads, *told, wrote])
+        return "\n".join([*lines, *self.told, reads, *told, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -241,7 +241,7 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
 def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
+        write_file(folder / path, text)
 
 
 def _write_onnx(

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.writing import naming, write_file
 from models.extras import needs
 from models.files import resolved
 from models.schema import read_json
@@ -91,13 +92,27 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
         new = scratch / "new"
         try:
             new.mkdir()
-            yield new
-            _write_marker(new)
+            with _named_as_final(new, target):
+                yield new
+                _write_marker(new)
             _put_in_place(new, target, final, force=force, aside=scratch / "old")
         finally:
             _discard(new)
             with suppress(OSError):  # it holds what could not be put back
                 scratch.rmdir()
+
+
+@contextmanager
+def _named_as_final(new: Path, target: Path) -> Iterator[None]:
+    """Say of a file that cannot be written where it was to be: nobody knows the scratch folder."""
+    try:
+        yield
+    except OSError as error:
+        path = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else new
+        if new not in path.parents:
+            raise
+        at = target / path.relative_to(new)
+        raise OSError(error.errno, error.strerror, str(at)) from error
 
 
 def _require_replaceable(target: Path, final: Path, force: bool) -> None:
@@ -143,7 +158,7 @@ def _write_marker(folder: Path) -> None:
         else:
             files[name] = [path.stat().st_size, _hash(path)]
     content = {"format": FORMAT, "files": files, "folders": folders}
-    (folder / MARKER).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_file(folder / MARKER, json.dumps(content, indent=1) + "\n")
 
 
 def _hash(path: Path) -> str:
@@ -286,7 +301,7 @@ def write_json(path: Path, data: Any) -> None:
     ----------
     data : dictionaries, lists, numbers, strings and None.
     """
-    path.write_text(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
 
 
 def _finite(data: Any) -> Any:
@@ -319,7 +334,7 @@ def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
     ----------
     parts : each with the same columns.
     """
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    with naming(path), path.open("w", encoding="utf-8", newline="\n") as file:
         for k, columns in enumerate(parts):
             if k == 0:
                 file.write(",".join(columns) + "\n")
@@ -342,7 +357,7 @@ def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
         write_long_csv(path, parts)
         return
     pyarrow, parquet = _parquet()
-    with ExitStack() as stack:
+    with naming(path), ExitStack() as stack:
         writer: Any = None
         for columns in parts:
             arrays = {  # by their buffers: what makes arrays of NumPy's imports pandas

@@ -38,6 +38,7 @@ from models.vehicle import Vehicle
 
 STEP = 0.05  # s between samples that are added: a fifth of the filter's time constant loses nothing
 CHUNK = 4000  # added samples that are held at once
+TOGETHER = 64  # drives whose sum is held as they are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,22 +127,63 @@ def total(parts: Iterable[Information], q: int) -> Information:
     parts : of drives.
     q : parameters of an axle.
     """
-    some = list(parts)
-    if not some:
-        return Information.nothing(q)
+    sums = Total(q)
+    for one in parts:
+        sums.add(one)
+    return sums.information
 
-    def added(name: str) -> Array:
-        rows = np.array([np.ravel(getattr(one, name)) for one in some])
-        sums = [math.fsum(column) for column in rows.T]
-        return np.reshape(sums, np.shape(getattr(some[0], name)))
 
-    return Information(
-        matrix=added("matrix"),
-        vector=added("vector"),
-        square=added("square"),
-        samples=math.fsum(one.samples for one in some),
-        seconds=math.fsum(one.seconds for one in some),
-    )
+class Total:
+    """What many tell together, in the room of a few: sums are exact to the last bit in any order.
+
+    Each sum is a few numbers of falling size whose exact sum it is (J. R. Shewchuk, Discrete &
+    Computational Geometry 18, 1997).
+
+    Parameters
+    ----------
+    q : parameters of an axle.
+    """
+
+    def __init__(self, q: int) -> None:
+        self._shapes = [(2, q, q), (2, q), (2,), (1,), (1,)]
+        self._rows = [np.zeros(sum(map(math.prod, self._shapes)))]
+
+    def add(self, one: Information) -> None:
+        """Add what a drive tells.
+
+        Parameters
+        ----------
+        one : of q parameters.
+        """
+        values = (one.matrix, one.vector, one.square, one.samples, one.seconds)
+        self._rows.append(np.concatenate([np.ravel(value) for value in values]))
+        if len(self._rows) > TOGETHER:
+            self._rows = list(_exact(np.array(self._rows)))
+
+    @property
+    def information(self) -> Information:
+        """The sum."""
+        ends = np.cumsum([math.prod(shape) for shape in self._shapes])[:-1]
+        pieces = np.split(_exact(np.array(self._rows))[0], ends)
+        matrix, vector, square, samples, seconds = (
+            piece.reshape(shape) for piece, shape in zip(pieces, self._shapes, strict=True)
+        )
+        return Information(
+            matrix=matrix,
+            vector=vector,
+            square=square,
+            samples=float(samples[0]),
+            seconds=float(seconds[0]),
+        )
+
+
+def _exact(rows: Array) -> Array:
+    """Return few rows of the same exact sum, column by column; the first is it, rounded."""
+    found: list[Array] = []
+    while not found or found[-1].any():
+        left = np.vstack([rows, *(-one[None] for one in found)])
+        found.append(np.array([math.fsum(column) for column in left.T.tolist()]))
+    return np.array(found[:-1] or found)
 
 
 def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:

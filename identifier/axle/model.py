@@ -81,6 +81,8 @@ class AxleModel(TireModel):
     calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
     guarantee : weights that the drive left possible; None where nobody asked.
+    force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
+        None where nobody looked.
 
     Raises
     ------
@@ -102,6 +104,7 @@ class AxleModel(TireModel):
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
     guarantee: Guarantee | None = None
+    force_missed: Array | None = None
 
     def __post_init__(self) -> None:
         doublings(self.ladder)
@@ -127,6 +130,9 @@ class AxleModel(TireModel):
                 f"W must be static axle loads below {LARGEST_WEIGHT:g}, it reaches "
                 f"{np.abs(self.W).max():g}"
             )
+        missed = self.force_missed
+        if missed is not None and not (missed.shape == (2,) and (missed >= 0.0).all()):
+            raise ValueError(f"force_missed must be two shares of at least 0, it is {missed}")
         self._require_possible()
 
     def _require_possible(self) -> None:
@@ -205,14 +211,17 @@ class AxleModel(TireModel):
         """Whether the width of its band was found on parts of the drive that did not teach."""
         return self.calibration is not None
 
-    def with_calibration(self, calibration: BandCalibration | None) -> "AxleModel":
+    def with_calibration(
+        self, calibration: BandCalibration | None, force_missed: Array | None = None
+    ) -> "AxleModel":
         """Return the model, its band calibrated.
 
         Parameters
         ----------
         calibration : None takes errors to be as learning is told.
+        force_missed : of the drive that taught, (2,); None where nobody looked.
         """
-        return replace(self, calibration=calibration)
+        return replace(self, calibration=calibration, force_missed=force_missed)
 
     @property
     def known_slip(self) -> Array:
@@ -551,7 +560,8 @@ class AxleModel(TireModel):
         zeros = np.array([at_most.max_steering, at_most.slow])
         low = np.column_stack([np.zeros((2, 2)), -zeros])
         high = np.column_stack([np.full(2, car.wheelbase), np.ones(2), zeros])
-        return replace(self, W=W, own=np.clip(self.own + away[:, n:], low, high))
+        own = np.clip(self.own + away[:, n:], low, high)
+        return replace(self, W=W, own=own, force_missed=None)
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
@@ -595,13 +605,9 @@ class AxleModel(TireModel):
         return bent
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
+        """Return what `summary` says beside the estimates."""
         known = self.known_slip
-        lines = [
-            Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
-            Fact(RELAXATION, self.relaxation_length, "m"),
-            Fact("known up to a slip of", np.degrees(known), "deg"),
-        ]
+        lines = list(TireModel.facts(self))
         if (known > 0.0).all():
             unsure = 100.0 * np.diag(self.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
@@ -618,7 +624,8 @@ class AxleModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle, guarantee=None)  # it was shown of this car alone
+        # Both were shown of this car alone.
+        return replace(self, vehicle=vehicle, guarantee=None, force_missed=None)
 
     def beside_v_y(self) -> "AxleModel":
         """Return the model as one that the axle identifier goes on learning, which is told v_y."""
@@ -648,7 +655,8 @@ class AxleModel(TireModel):
             covariance=self.covariance * np.outer(unit, unit),
             prior_covariance=self.prior_covariance * np.outer(unit, unit),
             excitation=excitation,
-            guarantee=None,  # of the road that taught
+            guarantee=None,  # of the road that taught, as is what is missed
+            force_missed=None,
         )
 
     @property
@@ -770,6 +778,7 @@ class AxleModel(TireModel):
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
             **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
+            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
         }
 
     @classmethod
@@ -803,6 +812,11 @@ class AxleModel(TireModel):
                     else None
                 ),
                 tells_v_y=bool(data.get("tells_v_y", False)),
+                force_missed=(
+                    np.array(data["force_missed"], dtype=np.float64)
+                    if "force_missed" in data
+                    else None
+                ),
             )
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error

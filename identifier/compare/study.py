@@ -129,7 +129,7 @@ def run_comparison(
     Parameters
     ----------
     names : of methods.
-    recordings : with true forces.
+    recordings : with true forces, or judged by the motion, without sweep and floors.
     seed : of initial weights and of the sweep.
     designs : random designs of each method; 0 leaves the sweep out.
     starts : of each offline fit to the true forces; 0 leaves the floors out.
@@ -143,13 +143,15 @@ def run_comparison(
     Raises
     ------
     ValueError
-        Where a method is unknown or the recordings cannot be compared on; a RecordingError where
-        one cannot learn on them, as `cannot_learn` tells.
+        Where a method is unknown, a sweep or floors lack true forces, or the recordings cannot be
+        compared on; a RecordingError where one cannot learn on them, as `cannot_learn` tells.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
     methods |= others or {}
     slowest = max(method.min_speed for method in methods.values())
     course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
+    if course.by_motion and (designs or starts):
+        raise ValueError("sweeps and floors are fitted to the true forces Fyf, Fyr of every log")
     trials = {}
     for name, method in methods.items():
         trials[name] = cross_replay(method, course)

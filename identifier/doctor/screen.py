@@ -22,6 +22,7 @@ from identifier.doctor.pieces import (
 from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
+from identifier.measured import with_doubt
 from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction
 from models.recordings.repair import Repair
@@ -366,7 +367,7 @@ def steering_finding(
     deviation : of the factor over the factor, NaN where nobody knows it.
     """
     size, turned = 1.0 / abs(factor), ", positive to the right" if factor < 0.0 else ""
-    off = "" if math.isnan(deviation) else f" ± {size * deviation:.2g}"
+    said = with_doubt(size, size * deviation)
     if abs(math.log(size)) < NEAR:
         code, text, size = "sign", f"delta_f has the wrong sign{doubt}", -1.0
         factor = -1.0
@@ -377,19 +378,18 @@ def steering_finding(
     elif WHEEL[0] < size < WHEEL[1]:
         code = "steering_ratio"
         text = (
-            f"delta_f is the angle of the steering wheel in rad, {size:.3g}{off} times that of the "
+            f"delta_f is the angle of the steering wheel in rad, {said} times that of the "
             f"road wheels{turned}{doubt}"
         )
     elif WHEEL[0] < size * DEGREE < WHEEL[1]:
         code, size = "steering_ratio", size * DEGREE
-        off = "" if math.isnan(deviation) else f" ± {size * deviation:.2g}"
         text = (
-            f"delta_f is the angle of the steering wheel in degrees, {size:.3g}{off} times that "
-            f"of the road wheels{turned}{doubt}"
+            "delta_f is the angle of the steering wheel in degrees, "
+            f"{with_doubt(size, size * deviation)} times that of the road wheels{turned}{doubt}"
         )
     else:
         code = "factor"
-        text = f"delta_f reads {size:.3g}{off} times the right value{turned}{doubt}"
+        text = f"delta_f reads {said} times the right value{turned}{doubt}"
     return Finding(
         code=code,
         channel="delta_f",

@@ -19,6 +19,7 @@ from codegen import CompilationError, find_compiler
 from codegen.compiler import KEEP_GUARDS
 from codegen.escape import visible
 from codegen.package import c_files, header
+from codegen.writing import write_file
 from identifier.export.c_source import PREFIX, c_sources
 from identifier.export.package import ingredients, summary
 from identifier.export.specialize import SpecializedStep
@@ -107,7 +108,7 @@ def _folder_of(files: Mapping[str, bytes]) -> Iterator[Path]:
     """A folder that holds the files until the block ends."""
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
         for file, content in files.items():
-            (Path(scratch) / file).write_bytes(content)
+            write_file(Path(scratch) / file, content)
         yield Path(scratch)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from codegen import CompilationError
 from codegen.arrays import Array
 from codegen.package import manifest_with_figures, renamed
+from codegen.writing import write_file
 from identifier.export.c_source import PREFIX
 from identifier.export.package import Package, synthetic_samples
 
@@ -235,7 +236,7 @@ def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
     }
     for path, text in wanted.items():
         (folder / path).parent.mkdir(exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
+        write_file(folder / path, text)
     return sorted(path for path in wanted if path.endswith(".c"))
 
 
@@ -251,8 +252,8 @@ def _build(
     sources = _write(folder, files)
     for path in TARGET.iterdir():
         text = renamed(path.read_text(encoding="utf-8"), {PREFIX: name})
-        (folder / path.name).write_text(text, encoding="utf-8")
-    (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
+        write_file(folder / path.name, text)
+    write_file(folder / "samples.bin", np.ascontiguousarray(samples, dtype="<f8").tobytes())
     own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
     compiler, *words = command
     files_and_words = [*sources, "replay.c", "samples.S", *words]

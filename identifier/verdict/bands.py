@@ -128,7 +128,10 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
         for into, values in zip(missed[:-1], asked_of, strict=True):
             into[..., mine, :] = values[..., mine, :]
     told = replace(told, noise=sensor_noise(recording, model.vehicle))
-    return model.with_calibration(calibration(missed, found.noise, found.windows, told))
+    judged, _ = found.but_a_stretch()
+    return model.with_calibration(
+        calibration(missed, found.noise, found.windows, told), judged.missed
+    )
 
 
 def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:

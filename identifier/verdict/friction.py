@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.band import LEVEL, normal_quantile
+from identifier.measured import with_doubt
 from identifier.tire_model import GRIP, TireModel
 from identifier.verdict.motion import evidence, modelled_force
 from models.recordings import Recording
@@ -60,8 +61,8 @@ class Road(NamedTuple):
     def text(self) -> str:
         """The stretch in words."""
         return (
-            f"from {self.first:.4g} to {self.last:.4g} s the road has {self.ratio:.2f} ± "
-            f"{self.sd:.2f} of the friction of the drive that taught"
+            f"from {self.first:.4g} to {self.last:.4g} s the road has "
+            f"{with_doubt(self.ratio, self.sd)} of the friction of the drive that taught"
         )
 
 

@@ -21,6 +21,9 @@ from models.vehicle import GRAVITY, Vehicle
 WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
+STRETCH = 0.3  # share of the windows that may be missed in one piece
+REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
+CONFINED = 0.6  # and of what is missed with the piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,6 +224,36 @@ class Evidence:
             measured=self.measured[kept],
             modelled=self.modelled[kept],
         )
+
+    def but_a_stretch(self) -> "tuple[Evidence, tuple[int, int] | None]":
+        """Return what a model is judged by, and which windows are left out of it: first, past last.
+
+        One stretch may be missed, as before a sensor has settled, where all the rest is explained:
+        it is left out. None is where all is explained, or more than one stretch is missed.
+        """
+        if (self.missed <= REST_MISSED).all():
+            return self, None
+        first, last = self.worst_stretch(STRETCH)
+        place = np.arange(len(self.windows))
+        rest = self.where((place < first) | (place >= last))
+        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * self.missed.max())).all()
+        if len(rest.windows) >= FEWEST and confined:
+            return rest, (first, last)
+        return self, None
+
+    def worst_stretch(self, share: float) -> tuple[int, int]:
+        """Return the stretch of a share of the windows in which most is missed: first, past last.
+
+        Parameters
+        ----------
+        share : of the windows.
+        """
+        n = max(1, int(share * len(self.windows)))
+        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
+        missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
+        total = np.concatenate([[0.0], np.cumsum(missed)])
+        first = int(np.argmax(total[n:] - total[:-n]))
+        return first, first + n
 
 
 def clean_rms(signal: Array, noise: Array) -> Array:

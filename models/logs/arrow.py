@@ -44,6 +44,18 @@ def is_used(path: Path) -> bool:
     return "pyarrow" in sys.modules or path.stat().st_size > WORTH
 
 
+def _of_arrow(block: bytes) -> Any:
+    """Return bytes in memory of pyarrow's own.
+
+    Its threads may drop them last, while Python ends: of what is Python's that aborts the program.
+    """
+    import pyarrow
+
+    held = pyarrow.allocate_buffer(len(block))
+    np.frombuffer(held, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
+    return held
+
+
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
 
@@ -64,7 +76,7 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
     }
     try:
         table = pyarrow.csv.read_csv(
-            pyarrow.BufferReader(block),
+            pyarrow.BufferReader(_of_arrow(block)),
             pyarrow.csv.ReadOptions(
                 column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
             ),
@@ -99,7 +111,9 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
 
 
 def words(cells: Any) -> Words:
-    """Return cells of any type as words, "" where one is missing.
+    """Return cells of any type as the distinct words of them, "" where one is missing.
+
+    What a dictionary keeps once is never written out row by row.
 
     Parameters
     ----------
@@ -107,11 +121,13 @@ def words(cells: Any) -> Words:
     """
     import pyarrow
 
-    if pyarrow.types.is_dictionary(cells.type):
-        cells = cells.dictionary_decode()
-    coded = cells.dictionary_encode(null_encoding="encode")
-    names = ["" if one is None else str(one) for one in coded.dictionary.to_pylist()]
-    return Words(names, whole_numbers(coded.indices, 0))
+    if not pyarrow.types.is_dictionary(cells.type):
+        cells = cells.dictionary_encode()
+    codes = whole_numbers(cells.indices, -1)
+    used, first, where = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # a dictionary may hold words in another order, and more of them
+    found = [None if k < 0 else cells.dictionary[int(k)].as_py() for k in used[order]]
+    return Words(["" if one is None else str(one) for one in found], np.argsort(order)[where])
 
 
 def doubles(cells: Any) -> NDArray[np.float64]:

@@ -491,9 +491,9 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     found = []
     listed = [_with_told_unit(one) for one in headings]
     for one in listed:
-        names = {one.name, without_ending(one.name, one.unit)}
-        by_name = max(name_confidence(signal, name) for name in names)
-        by_hand = max(name_confidence(HAND, name) for name in names) if signal == "delta_f" else 0.0
+        name = without_ending(one.name, one.unit)
+        by_name = name_confidence(signal, name)
+        by_hand = name_confidence(HAND, name) if signal == "delta_f" else 0.0
         best = max(by_name, by_hand)
         if best > 0.0:
             found.append(

@@ -72,20 +72,20 @@ def unit_in_name(name: str) -> str:
     ----------
     name : of a column, as in the file.
     """
+    return _split(name)[1]
+
+
+def _split(name: str) -> tuple[str, str]:
+    """Return a name without the unit that it holds, and the unit; it and ""."""
     if len(name) > LONGEST_NAME:
-        return ""
+        return name, ""
     held = _BRACKETS.fullmatch(name)
     if held and (is_unit(held[1]) or "[" in name):
-        return held[1]
+        return without_unit(name), held[1]
     for mark in (":", " / ", ", ", " in "):
-        _, found, unit = name.rpartition(mark)
-        if found and is_unit(unit) and unit.strip() not in _EMPTY:
-            return unit.strip()
-    return _ending(name)[1]
-
-
-def _ending(name: str) -> tuple[str, str]:
-    """Return what stands before the unit in which a name ends, and the unit; it and ""."""
+        bare, there, unit = name.rpartition(mark)
+        if there and is_unit(unit) and unit.strip() not in _EMPTY:
+            return bare.strip(), unit.strip()
     if _LENKRAD.search(name):
         return name, ""
     for ending, unit in _LONGEST_FIRST:
@@ -112,12 +112,12 @@ def without_unit(name: str) -> str:
 
 
 def without_ending(name: str, unit: str) -> str:
-    """Return a name without the unit after its last words, where it is that unit.
+    """Return a name without the unit that it holds, where it is that unit.
 
     Parameters
     ----------
-    name : of a column, as in the file: "speed_kmh".
+    name : of a column, as in the file: "speed_kmh", "speed [km/h]".
     unit : that was understood: "km/h".
     """
-    bare, meant = _ending(name)
+    bare, meant = _split(name)
     return bare if are_same(meant, unit) else name

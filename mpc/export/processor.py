@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.package import manifest_with_figures, renamed
+from codegen.writing import write_file
 from identifier.export.processor import (
     CROSS_COMPILER,
     EMULATOR,
@@ -113,12 +114,12 @@ def _replayed(
         folder = Path(scratch)
         for path, text in package.files.items():
             (folder / path).parent.mkdir(exist_ok=True)
-            (folder / path).write_text(text, encoding="utf-8")
+            write_file(folder / path, text)
         for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
             source = (BOARD / board).read_text(encoding="utf-8")
-            (folder / board).write_text(source, encoding="utf-8")
+            write_file(folder / board, source)
         replay = (TARGET / "replay.c").read_text(encoding="utf-8")
-        (folder / "replay.c").write_text(renamed(replay, {PREFIX: name}), encoding="utf-8")
+        write_file(folder / "replay.c", renamed(replay, {PREFIX: name}))
         sources = sorted(path for path in package.files if path.startswith("src/"))
         macros = [f"-D{name.upper()}_SINGLE={int(single)}", f"-DSTEPS={steps}U"]
         own = [*macros, "-Iinclude", "-Isrc", "-Itests", "-I."]

@@ -138,5 +138,5 @@ def test_sizes_have_the_digits_that_their_deviations_leave():
     delay = Finding(code="delay", channel="r", size=0.09123, deviation=0.0021, unit="s")
     assert size_text(delay) == "91.2 ± 2.1 ms"
     angle = Finding(code="offset", channel="delta_f", size=np.radians(1.0), unit="rad")
-    assert size_text(angle) == "1 deg"
+    assert size_text(angle) == "1.00 deg"
     assert size_text(Finding(code="straight")) == ""

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from benchmarks.fuzz.server import SLIP, steady_stiffness
 from identifier.axle import AxleModel
+from identifier.measured import printed_value
 from identifier.methods import METHODS, draws_weights, make_method
 from identifier.paper.design import PaperIdentifier, design_text
 from identifier.stored import load_model
@@ -206,6 +208,54 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
     (name, *_) = summary["rms_force_N"]
     error = summary["rmse_N"]["online"][name]
     assert f"{error['front']:.4g}" in told and f"{error['rear']:.4g}" in told
+
+
+def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
+    result, printed = ended
+    verdict = verdict_of(result)
+    front, rear = (f"{100.0 * share:.1f}" for share in verdict["measures"]["force_missed"])
+    page = (result / "report.html").read_text(encoding="utf-8")
+    tiles = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page)
+    assert tiles[1][1] == f"{front} / {rear} %"
+    assert f"missed of the force that the motion shows: {front} / {rear} %" in printed
+    curve = page.index("Figure 1.</b> ")
+    assert re.match("(NOT VALID. )?Axle force over slip angle", page[curve + 14 :])
+    notes = page.index('<ul class="warnings' if '<ul class="warnings' in page else "No warnings.")
+    assert page.index("<dl") < curve < notes
+    refused = 'class="bad"><dt>the verdict' in page
+    assert refused == (not verdict["valid"])
+    if law == "axle":
+        assert 'class="struck"' not in page
+    stiff = next(one for one in verdict["numbers"] if one["title"] == "cornering stiffness")
+    assert printed_value(stiff["value"], stiff["sd"], "N/rad") in page
+    assert "cornering stiffness [kN/rad]" in printed and " N/rad" not in printed
+
+
+def test_a_replayed_log_has_the_verdict_of_predict(ended, logs, tmp_path, law, unmade):
+    result, printed = ended
+    summary = json.loads((result / "summary.json").read_text())
+    ask = ["predict", str(result / "weights.json"), str(logs / "quick.csv"), "--accept"]
+    assert main([*ask, "--out", str(tmp_path / "asked")]) == 0
+    expected = json.loads((tmp_path / "asked" / "summary.json").read_text())["verdict"]
+    found = summary["replay_verdicts"]["quick"]
+    assert (found["valid"], found["findings"]) == (expected["valid"], expected["findings"])
+    missed = found["measures"]["force_missed"]
+    assert missed == pytest.approx(expected["measures"]["force_missed"])
+    said = "valid" if found["valid"] else "NOT VALID"
+    assert f"replayed on quick: verdict: {said}" in printed
+
+
+def test_a_replayed_log_that_the_model_does_not_explain_refuses(logs, tmp_path, capsys, unmade):
+    def biased(row):
+        row["vy"] = repr(float(row["vy"]) + 0.6)
+
+    log = rewritten(logs / "quick.csv", tmp_path / "biased.csv", biased)
+    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--replay", str(log), "--out", str(tmp_path / "out")]
+    assert main(words) == 3
+    said = capsys.readouterr().out
+    assert "replayed on biased: verdict: NOT VALID" in said and "\nverdict: valid" in said
+    assert main([*words, "--accept", "--force"]) == 0
 
 
 def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
@@ -581,6 +631,9 @@ def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path
         page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
         assert "NOT VALID" in page
         assert "Is it good?" in page
+        assert '<div class="bad"><dt>the verdict' in page
+        assert page.count('class="struck"') > 4, "numbers of the refused axles"
+        assert '<div class="good">' not in page
     ask = ["predict", str(tmp_path / "refused" / "weights.json"), str(logs / "quick.csv")]
     assert main([*ask, "--accept", "--out", str(tmp_path / "asked")]) == 0
     assert "was found not valid when it was learnt" in capsys.readouterr().err

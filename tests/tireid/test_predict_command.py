@@ -13,6 +13,7 @@ from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings import read_recording, write_recording
+from tests.pages import faults_of
 from tireid.cli import main
 
 
@@ -44,6 +45,39 @@ def test_it_says_what_the_interface_says(model, logs, tmp_path, capsys):
     said = capsys.readouterr()
     assert f"{summary['rmse_N']['front']:.4g} N" in said.out
     assert "wrote" in said.err
+
+
+def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
+    log = replace(read_recording(logs / "quick.csv"), axle_force=None)
+    write_recording(log, tmp_path / "blind.csv")
+    for name, asked in (("with", logs / "quick.csv"), ("without", tmp_path / "blind.csv")):
+        out = tmp_path / name
+        summary, _ = predicted(out, model, asked)
+        page = (out / "report.html").read_text(encoding="utf-8")
+        assert faults_of(page) == []
+        for figure in ("slip", "forces", "motion", "friction"):
+            assert (out / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+        assert page.count("<img") == 4
+        front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
+        assert f"<dd>{front} / {rear} %</dd>" in page
+        assert f"missed of the force that the motion shows: {front} / {rear} %" in (
+            capsys.readouterr().out
+        )
+        assert '<div class="good"><dt>the verdict' in page
+        assert page.index("Axle force over slip angle") < page.index("No warnings.")
+
+
+def test_a_refused_answer_looks_refused(model, logs, tmp_path):
+    data = json.loads(model.read_text(encoding="utf-8"))
+    path = tmp_path / "weak.json"
+    weak = {**data, "W": (0.5 * np.array(data["W"])).tolist(), "valid": False}
+    path.write_text(json.dumps(weak), encoding="utf-8")
+    predicted(tmp_path / "out", path, logs / "quick.csv", status=3)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
+    assert "NOT VALID. Axle force over slip angle" in page
+    assert '<li class="bad">' in page and "was found not valid when it was learnt" in page
+    assert '<div class="good">' not in page
 
 
 def test_without_truth_it_says_what_of_the_motion_is_explained(model, logs, tmp_path, capsys):

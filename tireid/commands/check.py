@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
 from identifier.methods import REFERENCE, certify
@@ -211,7 +212,7 @@ def run(options: argparse.Namespace) -> int:
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
         certificate = replace(certificate, properties=certificate.properties + along.properties)
-    text = _with_estimates(method_text(name, certificate, vehicle, driving), vehicle)
+    text = method_text(name, certificate, vehicle, driving)
     numbers = {
         "method": name,
         "conditions": {field: getattr(driving, field) for field in OF_ALL},
@@ -296,7 +297,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
-    text = _with_estimates("\n".join(texts), vehicle)
+    text = "\n".join(texts)
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
@@ -309,13 +310,9 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     return FAILS if certificate.verdict == "fail" or passed else DONE
 
 
-def _with_estimates(text: str, vehicle: Vehicle) -> str:
-    return "\n".join(part for part in (text, vehicle.estimates) if part)
-
-
 def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
     write_json(folder / NUMBERS, numbers)
-    (folder / TEXT).write_text(f"{text}\n", encoding="utf-8")
+    write_file(folder / TEXT, f"{text}\n")
 
 
 def _say_written(options: argparse.Namespace) -> None:

@@ -1,6 +1,7 @@
 """The files of `tireid compare`: compare.json, whose keys are stable, tables, CSV and figures.
 
-compare.json: recordings (samples, duration, rms_force_N); methods: by name online_N by recording,
+compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or motion: mean forces
+over 0.3 s that the motion shows); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
 recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
 methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio; left_out: by
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from codegen.writing import naming, write_file
 from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
@@ -86,7 +88,8 @@ def summary_table(comparison: Comparison) -> str:
     comparison : the methods.
     """
     n, lines = len(comparison.names), summary_rows(comparison)
-    title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
+    measure = comparison.course.measure
+    title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
     return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
 
 
@@ -236,9 +239,7 @@ def write_comparison(
     numbers = comparison_numbers(comparison)
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
-    (folder / "tables.txt").write_text(
-        comparison_text(comparison) + pair_tables(comparison), encoding="utf-8"
-    )
+    write_file(folder / "tables.txt", comparison_text(comparison) + pair_tables(comparison))
     _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
     if comparison.sweeps:
         _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
@@ -284,6 +285,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             }
             for recording in course.recordings
         },
+        "judged_by": "motion" if course.by_motion else "truth",
         "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
         "left_out": dict(comparison.left_out),
         "floors": {
@@ -420,7 +422,7 @@ def _words(values: Mapping[str, float]) -> str:
 
 
 def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with naming(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:

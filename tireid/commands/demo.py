@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, judge_prediction
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -61,8 +61,19 @@ from tireid.report import (
     write_report,
 )
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.reports.identify import identify_headlines, identify_warnings, learnt_blocks
-from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
+from tireid.reports.identify import (
+    curve_drawing,
+    identify_headlines,
+    identify_warnings,
+    learnt_blocks,
+)
+from tireid.verdicts import (
+    missed_headline,
+    number_headlines,
+    verdict_headline,
+    verdict_section,
+    verdict_warnings,
+)
 
 # The demo's report: what was driven, learnt, frozen and predicted, in order.
 
@@ -102,6 +113,8 @@ def demo_report(
         summary=SUMMARY,
         numbers=[
             verdict_headline(verdict),
+            *missed_headline(verdict),
+            *number_headlines(verdict),
             *identify_headlines(model, runs, story.default.frozen[FREEZE]),
             *drive_numbers(driven),
         ],
@@ -109,7 +122,7 @@ def demo_report(
         sections=[
             verdict_section(verdict),
             drive_section(driven, folder),
-            _learn(figures["identify"], model),
+            _learn(figures["identify"], model, verdict),
             _predict(story),
             package_section(shipped),
             Section(
@@ -127,7 +140,7 @@ def demo_report(
     )
 
 
-def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
+def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> Section:
     return Section(
         heading="What was learnt",
         blocks=[
@@ -144,6 +157,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
                 "from motion alone; what was never excited keeps what is believed of any tire."
             ),
+            curve_drawing(figures, verdict),
             *learnt_blocks("the default method", model, figures)[1:],
             drawing(
                 figures["forces"],
@@ -348,6 +362,7 @@ def run(options: argparse.Namespace) -> None:
         verdicts = {name: part.learnt.verdict(FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in parts.items():
+            model = part.learnt.freeze(FREEZE)
             figures[name] = write_results(
                 folders[name],
                 part.law,
@@ -355,6 +370,7 @@ def run(options: argparse.Namespace) -> None:
                 part.others,
                 part.frozen,
                 verdicts[name],
+                {one.recording.name: judge_prediction(model, one.recording) for one in part.others},
             )
         operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(

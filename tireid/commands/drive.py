@@ -293,7 +293,6 @@ def run(options: argparse.Namespace) -> int:
             command=options.words,
         )
         told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
-        told = "\n".join(part for part in (told, setup.vehicle.estimates) if part)
     tell(told)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else NOT_COMPLETED

@@ -18,6 +18,7 @@ from tireid.commands.options import (
     chosen_method,
     method_is_given,
     read_vehicle,
+    say_estimates,
 )
 from tireid.exporting import export_method
 from tireid.progress import say
@@ -100,7 +101,10 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
-    return start.vehicle if start is not None and options.vehicle is None else read_vehicle(options)
+    if start is None or options.vehicle is not None:
+        return read_vehicle(options)
+    say_estimates(start.vehicle, options.weights)
+    return start.vehicle
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:

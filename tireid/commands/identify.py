@@ -21,7 +21,8 @@ from identifier.reproducibility import (
 )
 from identifier.run import History, check_recording
 from identifier.stored import load_model
-from identifier.verdict import judge_prediction
+from identifier.tire_model import TireModel
+from identifier.verdict import Verdict, judge_prediction
 from models.recordings import (
     Recording,
     Repair,
@@ -61,7 +62,7 @@ from tireid.commands.options import (
 )
 from tireid.diagnoses import add_repair, doctor_text, write_repair
 from tireid.figures.style import paper_design
-from tireid.learning import identify
+from tireid.learning import identify, with_v_y
 from tireid.output import (
     output_folder,
     require_curves,
@@ -71,7 +72,7 @@ from tireid.output import (
 )
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
-from tireid.verdicts import verdict_text, warn_of_stored
+from tireid.verdicts import asked_text, verdict_text, warn_of_stored
 
 LEARNING, JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
 OWN_PAST = "  its past, against online"
@@ -116,7 +117,7 @@ def add_parser(commands: Any) -> None:
         action="extend",
         default=[],
         metavar="LOG[:RUN]",
-        help="recordings to predict",
+        help="recordings to predict, each with a verdict",
     )
     parser.add_argument(
         "--bound",
@@ -144,7 +145,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return 3 where what was learnt is not valid."""
+    """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = read_vehicle(options)
     seed = None if options.seed is None else seed_of(options)
     law, design = chosen_method(options, vehicle, seed)
@@ -206,9 +207,10 @@ def run(options: argparse.Namespace) -> int:
         progress.begin(JUDGING)
         if network is not None:
             verdict = judge_prediction(network, histories[0].recording)
+            asked = _asked(network, others)
             progress.begin(DRAWING)
             replays, figures = write_network_results(
-                folder, options.network, law, network, histories, verdict, options.curves
+                folder, options.network, law, network, histories, verdict, asked, options.curves
             )
             by_key = {NETWORK: replays}
             told = network_table(law, histories, replays)
@@ -218,6 +220,7 @@ def run(options: argparse.Namespace) -> int:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
             verdict = learnt.verdict(freeze_times[-1])
+            asked = _asked(learnt.freeze(freeze_times[-1]), others)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
             figures = write_results(
                 folder,
@@ -226,6 +229,7 @@ def run(options: argparse.Namespace) -> int:
                 histories[1:],
                 frozen,
                 verdict,
+                asked,
                 pieces,
                 curves=options.curves,
                 bound=bound,
@@ -237,7 +241,8 @@ def run(options: argparse.Namespace) -> int:
         doctor = doctor_text(diagnosis, repair, options.repair)
         model = network or load_model(folder / "weights.json")
         sure = "" if bound is None else guaranteed_text(model)
-        parts_told = (told, sure, vehicle.estimates, doctor, verdict_text(verdict))
+        of_others = asked_text(asked)
+        parts_told = (told, sure, doctor, of_others, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(
@@ -251,13 +256,19 @@ def run(options: argparse.Namespace) -> int:
             pieces,
             diagnosis=diagnosis,
             command=options.words,
+            asked=asked,
         )
     if repair:
         write_repair(options.repair, told_map(options), diagnosis)
         say(f"wrote {options.repair}")
     tell(told)
     say(f"wrote {options.out}/")
-    return exit_code(verdict, options)
+    return max(exit_code(one, options) for one in (verdict, *asked.values()))
+
+
+def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
+    """Return the verdict of `tireid predict` on a model over each replayed log, by its name."""
+    return {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:

@@ -76,6 +76,7 @@ def summarize(
     others: Sequence[History],
     frozen: Mapping[float, Mapping[str, Replay]],
     verdict: Verdict,
+    asked: Mapping[str, Verdict],
     parts: Sequence[History] = (),
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
@@ -92,10 +93,11 @@ def summarize(
     others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
+    asked : on it over each of the other recordings.
     parts : of the online run, over each of several logs that were learnt on.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict)
+    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict, asked)
 
 
 def summarize_replays(
@@ -103,6 +105,7 @@ def summarize_replays(
     runs: Sequence[History],
     frozen: Mapping[str, Mapping[str, Replay]],
     verdict: Verdict | None,
+    asked: Mapping[str, Verdict],
 ) -> dict[str, Any]:
     """Return the same of any replays.
 
@@ -112,10 +115,12 @@ def summarize_replays(
     runs : online runs of one design, the first the one that was learnt.
     frozen : key in the summary to recording name to replay.
     verdict : on the model that was replayed last.
+    asked : on it over recordings that it was not learnt on, by recording.
     """
     learnt = runs[0]
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
+        "replay_verdicts": {name: one.to_dict() for name, one in asked.items()},
         "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
         "rmse_N": {
             "online": {h.recording.name: _axles(online_error(h)) for h in runs},
@@ -201,6 +206,7 @@ def write_results(
     others: Sequence[History],
     frozen: Frozen,
     verdict: Verdict,
+    asked: Mapping[str, Verdict],
     parts: Sequence[History] = (),
     *,
     curves: str = "csv",
@@ -217,6 +223,7 @@ def write_results(
     others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
+    asked : on it over each of the other recordings.
     parts : of the online run, over each of several logs that were learnt on.
     curves : "csv" or "parquet", as what curves over time are written.
     bound : of the guaranteed band of the last freeze; None asks for none.
@@ -233,7 +240,13 @@ def write_results(
     write_json(
         folder / "summary.json",
         summarize(
-            law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict, parts=parts
+            law=law,
+            learnt=learnt,
+            others=others,
+            frozen=frozen,
+            verdict=verdict,
+            asked=asked,
+            parts=parts,
         ),
     )
     for t in frozen:
@@ -467,6 +480,7 @@ def write_network_results(
     model: OnnxModel,
     histories: Sequence[History],
     verdict: Verdict,
+    asked: Mapping[str, Verdict],
     curves: str = "csv",
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
     """Write everything that is known of a network into a folder; return replays and figures.
@@ -479,6 +493,7 @@ def write_network_results(
     model : the network.
     histories : what was identified online over each recording.
     verdict : on the network.
+    asked : on it over each recording but the first.
     curves : "csv" or "parquet", as what curves over time are written.
     """
     replays = {history.recording.name: replay(model, history) for history in histories}
@@ -487,7 +502,7 @@ def write_network_results(
         "inputs": list(model.signals),
         "slip_sign": model.slip_sign,
     }
-    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict)
+    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict, asked)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json", valid=verdict.valid)
     columns = curve_columns(model, [history.recording for history in histories])

@@ -65,9 +65,19 @@ def read_vehicle(options: argparse.Namespace) -> Vehicle:
             "fill in"
         )
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
-    if vehicle.estimates:
-        say(f"{options.vehicle}: {vehicle.estimates}")
+    say_estimates(vehicle, options.vehicle)
     return repaired_vehicle(vehicle, options)
+
+
+def say_estimates(vehicle: Vehicle, source: Path | None) -> None:
+    """Say which numbers of a car are estimated, where any are: once in a command.
+
+    Parameters
+    ----------
+    source : file that tells of the car.
+    """
+    if vehicle.estimates:
+        say(f"{source}: {vehicle.estimates}")
 
 
 def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:

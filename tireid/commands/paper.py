@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from codegen.writing import write_file
 from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
@@ -228,7 +229,7 @@ def write_study(folder: Path, study: Study) -> dict[str, Figure]:
     """
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
-    (folder / "tables.txt").write_text(study_text(study) + "\n", encoding="utf-8")
+    write_file(folder / "tables.txt", study_text(study) + "\n")
     say("drawing figures")
     figures = {SCHEME: scheme_figure()}
     for maneuver in study.errors:

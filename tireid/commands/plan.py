@@ -18,7 +18,14 @@ from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 from tireid import __version__
 from tireid.commands import COMMANDS
-from tireid.commands.options import add_output, add_seed, add_vehicle, read_vehicle, seed_of
+from tireid.commands.options import (
+    add_output,
+    add_seed,
+    add_vehicle,
+    read_vehicle,
+    say_estimates,
+    seed_of,
+)
 from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.planning import (
@@ -53,7 +60,7 @@ def add_parser(commands: Any) -> None:
         help=COMMANDS["plan"],
         description="Plan the steering that narrows the band of the tires' forces most, within an "
         "area, with a margin, for every tire that the car may have (stiffness and grip within "
-        "30 %%, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
+        "30 %, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
         "and report.html, which compares it with a slalom and with random steering.",
     )
     add_vehicle(parser, default="the sedan; with --after that of the model")
@@ -139,9 +146,11 @@ def run(options: argparse.Namespace) -> int:
     if options.after is not None:
         model = load_model(options.after)
         warn_of_stored(options.after)
-    vehicle = (
-        model.vehicle if model is not None and options.vehicle is None else read_vehicle(options)
-    )
+    if model is not None and options.vehicle is None:
+        vehicle = model.vehicle
+        say_estimates(vehicle, options.after)
+    else:
+        vehicle = read_vehicle(options)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
             found = plan(

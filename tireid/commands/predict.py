@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
@@ -28,11 +29,20 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     repaired_vehicle,
+    say_estimates,
     told_map,
+)
+from tireid.figures import (
+    friction_figure,
+    motion_figure,
+    prediction_figure,
+    save_figure,
+    slip_figure,
 )
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_csv, write_json, write_long_csv
 from tireid.progress import say, tell
+from tireid.reports.predict import write_predict_report
 from tireid.verdicts import verdict_text, warn_of_stored
 
 
@@ -47,10 +57,10 @@ def add_parser(commands: Any) -> None:
         "predict",
         help=COMMANDS["predict"],
         description="Predict the axle forces of LOG with a stored model, which learns nothing from "
-        "it; write forces.csv, summary.json and, where it can be told, friction.csv, of the road "
-        "over that of the drive that taught. Where LOG has true forces, say how much is missed; "
-        "else how much of the measured lateral and yaw acceleration the forces explain, in means "
-        "over 0.2 s.",
+        "it; write report.html, figures, forces.csv, summary.json and, where it can be told, "
+        "friction.csv, of the road over that of the drive that taught. Where LOG has true forces, "
+        "say how much is missed; else how much of the measured lateral and yaw acceleration the "
+        "forces explain, in means over 0.2 s.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
@@ -88,8 +98,20 @@ def run(options: argparse.Namespace) -> int:
             columns |= {"another": friction.another, "unexplained": friction.unexplained}
             write_csv(folder / "friction.csv", columns)
         write_json(folder / "summary.json", summary(model, prediction, verdict, half))
-        told = prediction_text(model, prediction, half, friction)
-    tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
+        lines = prediction_text(model, prediction, half, friction)
+        say("drawing figures")
+        figures = draw(folder, prediction, verdict)
+        write_predict_report(
+            folder,
+            prediction,
+            verdict,
+            figures,
+            told=lines,
+            source=options.model,
+            command=options.words,
+        )
+    table = error_table(prediction)
+    tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
     say(f"wrote {options.out}/")
     return exit_code(verdict, options)
 
@@ -99,6 +121,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     model = load_model(options.model)
     warn_of_stored(options.model)
     if options.vehicle is None:
+        say_estimates(model.vehicle, options.model)
         vehicle = repaired_vehicle(model.vehicle, options)
     else:
         vehicle = read_vehicle(options)
@@ -207,13 +230,49 @@ def summary(
     }
 
 
+def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Figure]:
+    """Write the figures of a prediction; return them by the name of their file.
+
+    Parameters
+    ----------
+    folder : where to.
+    prediction : of a drive.
+    verdict : on the model over it.
+    """
+    figures = {
+        "slip": slip_figure(prediction.model, prediction.recording),
+        "forces": prediction_figure(prediction),
+    }
+    if verdict.shown is not None:
+        figures["motion"] = motion_figure(verdict.shown, prediction.model.vehicle)
+    if verdict.friction is not None:
+        figures["friction"] = friction_figure(verdict.friction)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return figures
+
+
+def error_table(prediction: Prediction) -> str:
+    """Return the errors against the true forces as a table; empty where there are none.
+
+    Parameters
+    ----------
+    prediction : of a drive.
+    """
+    error, size = prediction.against_truth, prediction.true_force
+    if error is None:
+        return ""
+    name = visible(prediction.recording.name)
+    return text_table([["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>")
+
+
 def prediction_text(
     model: TireModel,
     prediction: Prediction,
     half: Array | None,
     friction: RoadFriction | None,
 ) -> str:
-    """Return what is to be said of a prediction, as lines of text.
+    """Return what is to be said of a prediction beside its errors, as lines of text.
 
     Parameters
     ----------
@@ -222,13 +281,8 @@ def prediction_text(
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     friction : of the drive's road; None where nobody can tell.
     """
-    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
-    lines = []
-    if error is not None:
-        rows = [["predicted", "front", "rear"]]
-        rows.append([visible(prediction.recording.name), *error_cells(error, size)])
-        lines.append(text_table(rows, "<>>"))
-    else:
+    motion, lines = prediction.motion, []
+    if prediction.against_truth is None:
         lines.append("no true forces in the log: what the forces miss cannot be said in newtons")
     if motion is not None:
         lines.append(
@@ -266,8 +320,6 @@ def prediction_text(
             if friction.as_taught
             else "friction: the tires slide too little to show it"
         )
-    if model.vehicle.estimates:
-        lines.append(model.vehicle.estimates)
     return "\n".join(lines)
 
 

@@ -124,7 +124,7 @@ def methods_figure(comparison: Comparison) -> Figure:
     axes.tick_params(axis="y", length=0.0)
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(rows) + len(floors) - 0.5, -0.5)
-    axes.set_xlabel("axle force RMSE, both axles [% of rms force]")
+    axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
     legend_above(figure)
     return figure
 
@@ -226,7 +226,7 @@ def matrix_figure(comparison: Comparison) -> Figure:
             axes.set_yticklabels([])
     figure.supylabel("learnt on", fontsize=8.0)
     figure.supxlabel("frozen, replayed on", fontsize=8.0)
-    figure.suptitle("axle force RMSE, both axles [% of rms force]", fontsize=8.0)
+    figure.suptitle(f"{comparison.course.measure}, both axles [% of rms force]", fontsize=8.0)
     return figure
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from identifier.doctor.consistency import Motion, Reading, forces_and_slips
-from identifier.reproducibility import Replay, freeze_key, online_error
+from identifier.reproducibility import Prediction, Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -176,7 +176,7 @@ def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
 
 @styled
 def prediction_figure(
-    replay: Replay, online: History | None = None, *, window: Window = None
+    replay: Replay | Prediction, online: History | None = None, *, window: Window = None
 ) -> Figure:
     """Draw a frozen model on a recording it did not learn from, with what it misses below.
 
@@ -230,7 +230,7 @@ def prediction_figure(
         upper.plot(t, drawable(frozen[:, axle], limits), **FROZEN)
         if error is not None:
             note(upper, f"RMSE {unit.format(error, axle)}")
-        elif known is not None:
+        elif known is not None and isinstance(replay, Replay):
             note(upper, f"RMSE to online {unit.format(replay.against_online, axle)}")
         label_time(panels[-1, axle], recording.t)
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")

@@ -22,6 +22,7 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 from codegen.arrays import Array
+from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
@@ -265,7 +266,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     ----------
     figure : as a function of this package returns it.
     """
-    path.write_bytes(figure_png(figure))
+    write_file(path, figure_png(figure))
 
 
 # Parts that several figures share: time axes, freeze marks, legends, errors in titles.

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
+from identifier.measured import printed_scale, printed_unit
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
@@ -149,7 +150,14 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     if band is not None:
         low, high = (force[:, axle] / newtons for force in band)
         axes.fill_between(
-            np.rad2deg(slip), low, high, color=SKY, alpha=0.35, linewidth=0.0, label=BAND
+            np.rad2deg(slip),
+            low,
+            high,
+            facecolor=(SKY, 0.6),
+            edgecolor=BLUE,
+            linewidth=0.4,
+            zorder=3,
+            label=BAND,
         )
     for side in model.guaranteed_band(slip) or ():
         axes.plot(
@@ -165,6 +173,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         model.force(slip)[:, axle] / newtons,
         color=BLUE,
         linewidth=1.2,
+        zorder=4,
         label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
     )
 
@@ -331,9 +340,7 @@ def learnt_axles_figure(
     figure = new_figure(PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
-        label = f"{title}\n[{unit}]"
-        if unit == "N/rad" and float(values.max()) >= 1000.0:
-            label, values = f"{title}\n[kN/rad]", values / 1000.0
+        label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
         for axle, color in enumerate((GREEN, PURPLE)):
             axes.plot(at, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))

@@ -50,9 +50,8 @@ def write_compare_report(
     }
     blocks: list[Block] = [
         Table(
-            caption=f"RMSE of the axle force, front / rear, in percent of the rms force (and N), "
-            f"mean over {len(comparison.names)} recordings."
-            + "".join(f" {line}." for line in remarks),
+            caption=f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
+            f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in remarks),
             header=rows[0],
             rows=rows[1:],
         )
@@ -70,9 +69,9 @@ def write_compare_report(
         warnings=[
             *compare_warnings(comparison),
             *(
-                f"The default learnt on {name}: {one}"
+                one
                 for name, verdict in verdicts.items()
-                for one in verdict_warnings(verdict)
+                for one in verdict_warnings(verdict, f"The default learnt on {name}: ")
             ),
         ],
         sections=[
@@ -110,7 +109,13 @@ def compare_warnings(comparison: Comparison) -> list[str]:
     ----------
     comparison : the methods.
     """
-    said = []
+    vehicle = comparison.course.vehicle
+    said = [f"{vehicle.estimates}."] if vehicle.estimates else []
+    if comparison.course.by_motion:
+        said.append(
+            "Without true forces methods are judged by the motion: by mean forces over 0.3 s, the "
+            "noise of the sensors taken off. A wrong mass scales all of them alike."
+        )
     for name, trial in comparison.trials.items():
         at = [f"{where} at {freeze_key(t)} s" for where, t in trial.diverged_at.items()]
         if at:

@@ -73,11 +73,19 @@ def drive_headlines(runs: Sequence[Run]) -> list[Headline]:
     """
     first = runs[0].scores
     numbers = [
-        Headline(f"{first.rms_e_y_m:.3f} m", f"rms deviation from the path, {runs[0].label}"),
+        Headline(
+            f"{first.rms_e_y_m:.3f} m",
+            f"rms deviation from the path, {runs[0].label}{_end(runs[0])}",
+            "" if first.completed else "bad",
+        ),
         Headline(f"{first.peak_e_y_m:.3f} m", f"largest deviation, {runs[0].label}"),
     ]
     numbers += [
-        Headline(f"{run.scores.rms_e_y_m:.3f} m", f"rms deviation, {run.label}{_end(run)}")
+        Headline(
+            f"{run.scores.rms_e_y_m:.3f} m",
+            f"rms deviation, {run.label}{_end(run)}",
+            "" if run.scores.completed else "bad",
+        )
         for run in runs[1:]
     ]
     told = told_scores(runs[0].drive)

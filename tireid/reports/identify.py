@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from identifier.axle.guarantee import Guarantee
 from identifier.doctor import Diagnosis
+from identifier.measured import with_doubt
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -17,16 +18,35 @@ from identifier.reproducibility import (
     online_error,
 )
 from identifier.run import History
-from identifier.tire_model import TireModel
+from identifier.tire_model import AXLES, TireModel
 from identifier.verdict import Verdict
+from identifier.verdict.verdict import PERCENT
 from models.files import digest
+from models.recordings import Recording
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
-from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
+from tireid.report import (
+    Block,
+    Cell,
+    Headline,
+    Marked,
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Tone,
+    write_report,
+)
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
+from tireid.verdicts import (
+    missed_headline,
+    number_headlines,
+    of_answer,
+    verdict_headline,
+    verdict_section,
+    verdict_warnings,
+)
 
-AXLES = ("front", "rear")
-HEADLINES = 3  # facts of a model that stand at the top
 EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
 
@@ -42,6 +62,7 @@ def write_identify_report(
     *,
     diagnosis: Diagnosis,
     command: str,
+    asked: Mapping[str, Verdict],
 ) -> None:
     """Write the report of what was learnt, or of a network that was judged.
 
@@ -56,6 +77,7 @@ def write_identify_report(
     parts : of the first run, over each of several logs that were learnt on.
     diagnosis : of what was learnt on, as it was read.
     command : as it was typed.
+    asked : verdicts on the model over the drives that it was not learnt on, by recording.
     """
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
@@ -63,7 +85,10 @@ def write_identify_report(
         Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
         Section(
             heading="How well it predicts",
-            blocks=_errors([runs[0], *parts, *runs[1:]], frozen, figures),
+            blocks=[
+                *_asked(asked),
+                *_errors([runs[0], *parts, *runs[1:]], frozen, figures),
+            ],
         ),
         Section(
             heading="What went in",
@@ -79,14 +104,31 @@ def write_identify_report(
             method=f"{law}, hash {digest(learnt.design.numbers())}",
         ),
     ]
+    notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, runs)]
     report = Report(
         title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
         summary=_how_learnt(learnt),
-        numbers=[verdict_headline(verdict), *identify_headlines(model, runs, last)],
+        numbers=[
+            verdict_headline(verdict, notes),
+            *of_answer(
+                verdict,
+                [
+                    *missed_headline(verdict),
+                    *asked_headlines(asked),
+                    *number_headlines(verdict),
+                    *identify_headlines(model, runs, last),
+                ],
+            ),
+        ],
+        lead=[curve_drawing(figures, verdict)],
         warnings=[
             *verdict_warnings(verdict),
-            *diagnosis_warnings(diagnosis),
-            *identify_warnings(model, runs),
+            *(
+                one
+                for name, found in asked.items()
+                for one in verdict_warnings(found, f"{name}, replayed: ")
+            ),
+            *notes,
         ],
         sections=sections,
     )
@@ -124,7 +166,7 @@ def side_slip_text(learnt: History) -> str:
 def identify_headlines(
     model: TireModel, runs: Sequence[History], replays: Mapping[str, Replay]
 ) -> list[Headline]:
-    """Return the errors of a frozen model, other drives first, and what it says of the tires.
+    """Return the errors of a frozen model, other drives first, and up to which slip it knows.
 
     Parameters
     ----------
@@ -137,11 +179,44 @@ def identify_headlines(
         if shares:
             meaning = f"of the rms force missed on drives {kind}, frozen"
             numbers.append(Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
-    for title, (front, rear), unit in model.facts()[:HEADLINES]:
-        scale, name = (1e3, f"k{unit}") if unit.startswith("N") and front >= 1e3 else (1.0, unit)
-        value = f"{front / scale:.3g} / {rear / scale:.3g} {'°' if name == 'deg' else name}"
-        numbers.append(Headline(value.replace(" °", "°"), f"{title}, front / rear"))
+    if model.known_slip is not None:
+        front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
+        numbers.append(Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
     return numbers
+
+
+def asked_headlines(asked: Mapping[str, Verdict]) -> list[Headline]:
+    """Return on how many drives that it was not learnt on a model is valid, and what it misses.
+
+    Parameters
+    ----------
+    asked : verdicts on the model, by recording.
+    """
+    if not asked:
+        return []
+    valid = sum(verdict.valid for verdict in asked.values())
+    tone: Tone = "" if valid == len(asked) else "bad"
+    meaning = "replayed drives, not learnt on, whose motion the model gives back"
+    numbers = [Headline(f"{valid} of {len(asked)}", meaning, tone)]
+    shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
+    if shares:
+        front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
+        meaning = "missed of the force that the motion of these drives shows, front / rear"
+        numbers.append(Headline(f"{front} / {rear} %", meaning))
+    return numbers
+
+
+def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> Picture:
+    """Return the learnt curve with its band, the first figure of a report.
+
+    Parameters
+    ----------
+    figures : by the name of their files.
+    verdict : on the model; of a refused one the caption says so.
+    """
+    refused = "" if verdict.valid else "NOT VALID. "
+    caption = f"{refused}Axle force over slip angle: drive, curve and its band."
+    return drawing(figures["slip"], caption, READ["slip"])
 
 
 def _share(run: History, replays: Mapping[str, Replay]) -> float | None:
@@ -169,18 +244,34 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
                 f"{name} has no true forces: errors are against what was identified online over "
                 "it, which asks only whether the model agrees with itself."
             )
-        beyond = beyond_known(model, recording)
-        if model.known_slip is None or beyond is None:
-            continue
-        for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True):
-            if share > EXTRAPOLATED:
-                said.append(
-                    f"{name}: {100.0 * share:.0f} % of the samples slip farther than is known at "
-                    f"the {axle} axle ({known:.1f}°): there the curve is a guess."
-                )
+        said += _extrapolated(model, recording)
     if model.known_slip is None:
         said.append("This kind of model cannot tell where it knows the tires and where it guesses.")
     return said
+
+
+def asked_warnings(model: TireModel, recording: Recording) -> list[str]:
+    """Return what speaks against a stored model over a drive beside the verdict.
+
+    Parameters
+    ----------
+    recording : that it is asked about.
+    """
+    estimated = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
+    return [*estimated, *_extrapolated(model, recording)]
+
+
+def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
+    """Return at which axles a drive slips farther than the model knows, in words."""
+    beyond = beyond_known(model, recording)
+    if model.known_slip is None or beyond is None:
+        return []
+    return [
+        f"{recording.name}: {100.0 * share:.0f} % of the samples exceed the identified slip range "
+        f"of the {axle} axle ({known:.1f}°). There the curve is extrapolated."
+        for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True)
+        if share > EXTRAPOLATED
+    ]
 
 
 def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[Block]:
@@ -191,15 +282,17 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     law : what learnt, as the user named it.
     figures : by the name of their files.
     """
-    facts = [[fact.title, *fact.words, fact.unit] for fact in model.facts()]
+    facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[Block] = [
         Paragraph(
             text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
             "left. curve.csv holds the curve with what is known of it, weights.json the model."
-        ),
-        Table(caption=f"The tires by {law}.", header=["", *AXLES, "unit"], rows=facts),
-        drawing(figures["slip"], "Axle force over slip angle: drive and curve.", READ["slip"]),
+        )
     ]
+    if facts:
+        blocks.append(
+            Table(caption=f"What {law} knows of the tires.", header=["", *AXLES], rows=facts)
+        )
     for told in (band_sentence(model), guaranteed_sentence(model)):
         if told:
             blocks.append(Paragraph(text=told))
@@ -264,6 +357,23 @@ def guaranteed_sentence(model: TireModel) -> str:
         "static axle loads a second, the difference may be as much larger. That bound was "
         f"{'told' if given.told else 'estimated from the drive'}."
     )
+
+
+def _asked(asked: Mapping[str, Verdict]) -> list[Block]:
+    """Return the verdicts on a model over drives that it was not learnt on, as a table."""
+    rows: list[list[Cell]] = []
+    for name, verdict in asked.items():
+        missed = verdict.force_missed or (None, None)
+        shares = [None if one is None else with_doubt(PERCENT * one) for one in missed]
+        tone: Tone = "" if verdict.valid else "bad"
+        rows.append([name, Marked("valid" if verdict.valid else "NOT VALID", tone), *shares])
+    if not rows:
+        return []
+    caption = (
+        "The verdict on each replayed drive, as of tireid predict, and what is missed of the "
+        "force that the motion shows."
+    )
+    return [Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)]
 
 
 def _errors(

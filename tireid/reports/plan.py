@@ -27,7 +27,7 @@ def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     each = found.time / count
     times = f"one pass of {each:.1f} s" if count == 1 else f"{count} passes of {each:.1f} s"
     said = [
-        f"{times} at {space.speed:g} m/s in {space.length:g} x {space.width:g} m: the expected "
+        f"{times} at {space.speed:.3g} m/s in {space.length:g} x {space.width:g} m: the expected "
         f"error of the forces falls from {100.0 * found.error_before:.0f} to "
         f"{100.0 * found.error:.1f} % of the grip."
     ]

@@ -15,7 +15,7 @@ from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge_prediction
-from identifier.verdict.causes import CAUSES, Suspect
+from identifier.verdict.causes import CAUSES, PATIENCE, Suspect, _least
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import (
     Windows,
@@ -96,6 +96,8 @@ def test_a_verdict_is_plain_data(good):
     assert {"findings", "numbers", "measures", "unseen"} < set(data)
     assert good.lines[0] == "verdict: valid"
     assert "mass" in good.lines[-2]
+    front, rear = (100.0 * share for share in good.measures["force_missed"])
+    assert f"{front:.1f} / {rear:.1f} % (front / rear, limit 12 %)" in good.lines[1]
 
 
 def test_what_is_measured_is_the_true_force(whole):
@@ -218,12 +220,34 @@ def test_a_cause_is_said_by_its_side_and_by_where_a_number_comes_from():
     assert said.startswith("the estimated yaw inertia")
 
 
+def test_the_size_of_a_cause_is_doubled_and_then_bent_to_the_least():
+    bias = next(one for one in CAUSES if one.code == "v_y_bias")
+    for size in (0.11, -0.2):
+        found, left = _least(lambda x, to=size: 1.0 + (x - to) ** 2, 1.0 + size**2, bias)
+        assert (found, left) == (pytest.approx(size), pytest.approx(1.0))
+    assert _least(lambda x: 1.0 + abs(x), 1.0, bias)[0] == pytest.approx(0.0, abs=0.02)
+    far, _ = _least(lambda x: -x, 0.0, bias)
+    asked = []
+    _least(lambda x: asked.append(x) or 2.0, 1.0, bias)
+    apart = [one for one in asked if abs(one) > 1e-9]
+    assert len(apart) == 2 * PATIENCE, "what only gets worse is not asked for ever"
+    assert 0.5 * bias.most < far <= bias.most
+
+
+def test_a_delay_is_taken_out_by_whole_samples(drive):
+    late = next(one for one in CAUSES if one.code == "steering_late")
+    mended = late.mend(drive, sedan(), 0.05).recording
+    k = round(0.05 / drive.dt)
+    np.testing.assert_array_equal(mended.delta_f[:-k], drive.delta_f[k:])
+    assert (mended.delta_f[-k:] == drive.delta_f[-1]).all()
+
+
 def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
     verdict = answer(drive.between(0.0, ONSET)).verdict()
     assert not verdict.valid
     assert codes(verdict) == {"no_force"}
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
-    assert {number.state for number in tires} == {"told, not learnt"}
+    assert {number.state for number in tires} == {"not identifiable from this drive"}
     assert not [number for number in verdict.numbers if number.valid]
 
 
