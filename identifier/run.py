@@ -204,7 +204,7 @@ class History:
         """
         from identifier.verdict import calibrated
 
-        return self.freeze(t) if self.design.whole else calibrated(self, t)
+        return calibrated(self, t)
 
     def guaranteed(
         self,

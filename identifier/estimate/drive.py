@@ -74,8 +74,9 @@ class Drive:
             if one.stop - one.start >= every
         ]
         t, signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return cls(t=t, dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every)
-
+        return cls(
+            t=t, dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every
+        )
 
     def on(self, ln_m: Array | float) -> "Drive":
         """Return the drive on roads of other frictions: ln of each over that of the curves."""

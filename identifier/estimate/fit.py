@@ -139,5 +139,3 @@ def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[
             length += seconds
     if group:
         yield group
-
-

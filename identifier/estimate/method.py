@@ -76,4 +76,6 @@ class FitMethod(Method):
             Always.
         """
         del vehicle, start
-        raise ValueError("the method fit learns from whole logs: in a car, the axle identifier does")
+        raise ValueError(
+            "the method fit learns from whole logs: in a car, the axle identifier does"
+        )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array, blocks, large
-from identifier.axle.band import LEVEL, normal_quantile
+from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
 from identifier.axle.curve import EDGES
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
@@ -71,6 +71,8 @@ class FittedModel(TireModel):
     a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
     missed : share of the force by which drives of a car differ from one model, (2,).
     segments : of the drives, on a road of another friction than that of the curves.
+    force_missed : share of the measured force that it misses of the drives that taught, (2,); None
+        where nobody looked.
     """
 
     kind = "fit"
@@ -83,6 +85,7 @@ class FittedModel(TireModel):
     a_x: Array
     missed: Array
     segments: tuple[Segment, ...] = ()
+    force_missed: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(NAMES)
@@ -358,6 +361,18 @@ class FittedModel(TireModel):
         """Whether the model can tell how sure it is: by its covariance."""
         return True
 
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of its band is more than noise of the sensors: always."""
+        return True
+
+    def with_calibration(
+        self, calibration: BandCalibration | None, force_missed: Array | None = None
+    ) -> "FittedModel":
+        """Return the model with what it misses of the drives that taught."""
+        del calibration
+        return replace(self, force_missed=force_missed)
+
     def half_band(
         self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
     ) -> Array:
@@ -493,7 +508,13 @@ class FittedModel(TireModel):
             now, prior = (scale * float(np.sqrt(P[k, k])) for P in (self.covariance, before))
             listed.append(
                 Estimate(
-                    title, of, scale * self[name], now, unit, 0.0, now <= DECIDED * prior  # type: ignore[arg-type]
+                    title,
+                    of,
+                    scale * self[name],
+                    now,
+                    unit,
+                    0.0,
+                    now <= DECIDED * prior,  # type: ignore[arg-type]
                 )
             )
         return tuple(listed)
@@ -504,13 +525,8 @@ class FittedModel(TireModel):
         return self._curve_sd(small, covariance)[0] / 1e-4
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
-        known = self.known_slip
-        lines = [
-            Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
-            Fact(RELAXATION, self.relaxation_length, "m"),
-            Fact("known up to a slip of", np.degrees(known), "deg"),
-        ]
+        """Return what `summary` says beside the estimates."""
+        lines = [Fact("identified up to a slip of", np.degrees(self.known_slip), "deg")]
         if self.vehicle.has_downforce:
             more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
             lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
@@ -643,6 +659,7 @@ class FittedModel(TireModel):
             "a_x_m_s2": self.a_x.tolist(),
             "missed": self.missed.tolist(),
             "segments": [one._asdict() for one in self.segments],
+            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
@@ -667,6 +684,8 @@ class FittedModel(TireModel):
             "a_x": "a_x_m_s2",
             "missed": "missed",
         }
+        if "force_missed" in table:
+            arrays["force_missed"] = "force_missed"
         found = {name: table.array(key) for name, key in arrays.items()}
         for name, value in (("parameters", p), *found.items()):
             if np.abs(value).max(initial=0.0) > LARGEST:

@@ -123,9 +123,7 @@ def _ranked(found: list[NDArray[np.intp]]) -> tuple[NDArray[np.intp], ...]:
     states, counts = np.unique(whole, return_counts=True)
     order: dict[int, int] = {}
     for state in states[np.argsort(-counts)]:
-        alike = [
-            known for known in order if abs(GRID[known] - GRID[state]) < LEAST
-        ]
+        alike = [known for known in order if abs(GRID[known] - GRID[state]) < LEAST]
         order[int(state)] = order[alike[0]] if alike else len(set(order.values()))
     table = np.zeros(len(GRID), dtype=np.intp)
     for state, label in order.items():

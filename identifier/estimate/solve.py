@@ -101,7 +101,9 @@ class Problem:
         for k, one in enumerate(self.drives):
             stride, kept = self._strides[k], self._kept[k]
             roads = None if self.labels is None else self.labels[k]
-            driven = one if roads is None and not road else one.on(ln_m[0 if roads is None else roads])
+            driven = (
+                one if roads is None and not road else one.on(ln_m[0 if roads is None else roads])
+            )
             out = self._scan(
                 len(driven.signals),
                 arguments(driven, p[: len(NAMES)], self._car, self._scan),

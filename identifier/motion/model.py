@@ -242,7 +242,9 @@ def _sway(
     """Return ρ', ρ and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
     names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
     rho, rate, f_f, f_r, C_f, C_r = (ca.SX.sym(name) for name in names)
-    k_f, k_r, ln_sway, shift, speed, yaw = (ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw"))
+    k_f, k_r, ln_sway, shift, speed, yaw = (
+        ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw")
+    )
     L = car.l_f + car.l_r
     front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
     omega = car.omega * ca.exp(ln_sway)
@@ -371,9 +373,7 @@ def _axle(
     mean = (1 - fall) / (RATE * dt)
     z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
     z = ca.if_else(first > 0, 0, z)
-    bank = Dual(
-        signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes
-    )
+    bank = Dual(signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
     balance = Stage(
         [z0, xi0, u0, F0, angle, ln_I, push, vx, vy, yaw, cg], [z, xi, u, across, RATE * z]
     )

@@ -110,6 +110,9 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     found = evidence(model, recording, run.road)
     if found is None:
         return model
+    if history.design.whole:
+        found = found.where(~model.on_another_road(recording.t)[found.windows.starts])
+        return model.with_calibration(None, found.but_a_stretch()[0].missed)
 
     def teach(halting: Recording) -> TireModel:
         return run.taught(halting, history.vehicle)
