@@ -137,8 +137,8 @@ def _asked(
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model.vehicle))
     if own and found is not None:
-        other = model.on_another_road(recording.t[part.samples])
-        found = found.where(other[found.windows.starts] < 0.5)
+        other = model.road_differs(recording.t[part.samples])
+        found = found.where(~other[found.windows.starts])
     if found is None or len(found.windows) < FEWEST:
         return None
     judged, some = found.but_a_stretch()
