@@ -294,7 +294,7 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     whole = np.zeros((len(p), len(p)))
     whole[np.ix_(index, index)] = np.linalg.inv(data + P)
     n, tires = len(NAMES), problem.tires
-    told: Array = np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])])
+    told = np.asarray(np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]), np.float64)
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
