@@ -325,8 +325,8 @@ class TireModel(ABC):
         return np.zeros(t.shape, dtype=bool)
 
     @property
-    def road_notes(self) -> tuple[str, ...]:
-        """What a drive that taught told of other roads, a line each."""
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
         return ()
 
     def at_bounds(self) -> "tuple[Reached, ...]":

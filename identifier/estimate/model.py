@@ -45,6 +45,7 @@ DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided
 LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
 SMALL = 1e-4  # rad, over which a slope is taken
+SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering that is noted
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LARGEST = 1e6  # of the numbers in a file
 
@@ -295,13 +296,27 @@ class FittedModel(TireModel):
         return found
 
     @property
-    def road_notes(self) -> tuple[str, ...]:
-        """What a drive that taught told of other roads, a line each."""
-        return tuple(
-            f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
-            f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given"
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
+        listed = [
+            (
+                "another_road",
+                f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
+                f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given",
+            )
             for one in self.segments
-        )
+        ]
+        gain, k = self["steering_gain"], INDEX["steering_gain"]
+        sd = float(np.sqrt(self.covariance[k, k]))
+        if abs(gain) > max(SURELY * sd, NOTED_GAIN):
+            listed.append(
+                (
+                    "steering_gain",
+                    f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
+                    "says: check the steering ratio; the curves allow for it",
+                )
+            )
+        return tuple(listed)
 
     def at_bounds(self) -> tuple[Reached, ...]:
         """Return the numbers of the tires that rest at the bounds of what tires have."""

@@ -105,8 +105,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
         return _too_short(model)
     state = {} if history.design.whole else history.state_at(end)
     reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
-    roads = [Objection("another_road", None, text, False) for text in model.road_notes]
-    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *roads], whole)
+    notes = [Objection(code, None, text, False) for code, text in model.notes]
+    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *notes], whole)
 
 
 def judge_prediction(
