@@ -49,7 +49,13 @@ class Drive:
 
     @classmethod
     def of(
-        cls, recording: Recording, vehicle: Vehicle, part: slice = ALL, *, replay: bool = False
+        cls,
+        recording: Recording,
+        vehicle: Vehicle,
+        part: slice = ALL,
+        *,
+        replay: bool = False,
+        fastest: float = FASTEST,
     ) -> "Drive":
         """Return a recording with a v_y as the estimate reads it.
 
@@ -57,9 +63,10 @@ class Drive:
         ----------
         part : samples that are read.
         replay : whether each sample is asked about, down to the lowest speed; else those that
-            come faster than 100 Hz are averaged, and slow ones do not count.
+            come faster are averaged, and slow ones do not count.
+        fastest : sampling interval to which they are averaged [s].
         """
-        every = 1 if replay else max(1, round(FASTEST / recording.dt))
+        every = 1 if replay else max(1, round(fastest / recording.dt))
         slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))

@@ -87,22 +87,36 @@ class Problem:
         found: NDArray[np.intp] = self._kept[k] * self._strides[k]
         return found
 
-    def residuals(self, p: Array, road: float = 0.0) -> Residuals:
+    def missed(self, p: Array, road: float) -> Array:
+        """Return what the balance misses over its size where the friction is another, (m, 2).
+
+        Parameters
+        ----------
+        p : parameters.
+        road : ln of the friction over that of the curves.
+        """
+        scan = motion_scan()
+        e = []
+        for k, one in enumerate(self.drives):
+            driven = one.on(road)
+            given = arguments(driven, p, self._car, scan)
+            out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
+            e.append(out["missed"][self._kept[k]])
+        return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
+
+    def residuals(self, p: Array) -> Residuals:
         """Return what the balance misses, and its slopes.
 
         Parameters
         ----------
         p : parameters, and behind them ln of the friction of other roads.
-        road : added to ln of all frictions.
         """
         e, slopes = [], []
-        ln_m = np.concatenate([[0.0], p[len(NAMES) :]]) + road
+        ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
         for k, one in enumerate(self.drives):
             stride, kept = self._strides[k], self._kept[k]
             roads = None if self.labels is None else self.labels[k]
-            driven = (
-                one if roads is None and not road else one.on(ln_m[0 if roads is None else roads])
-            )
+            driven = one if roads is None else one.on(ln_m[roads])
             out = self._scan(
                 len(driven.signals),
                 arguments(driven, p[: len(NAMES)], self._car, self._scan),
@@ -212,6 +226,7 @@ def estimate(
     begin: Array | None = None,
     *,
     labels: Labels | None = None,
+    enough: float = ENOUGH,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
 
@@ -223,12 +238,13 @@ def estimate(
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights
         show v_y or steering off zero, also from there.
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
+    enough : improvement of the cost, below which it ends [nats].
     """
     priors = Priors.of(vehicle) if priors is None else priors
     problem = Problem(drives, vehicle, priors, labels)
     starts = _starts(problem) if begin is None else [begin]
     starts = [np.concatenate([one[: len(NAMES)], np.zeros(problem.roads)]) for one in starts]
-    found = [_descend(problem, start) for start in starts]
+    found = [_descend(problem, start, enough) for start in starts]
     return min(found, key=lambda one: one.cost)
 
 
@@ -254,7 +270,7 @@ def _starts(problem: Problem) -> list[Array]:
     return [np.clip(one, low, high) for one in starts]
 
 
-def _descend(problem: Problem, start: Array) -> Posterior:
+def _descend(problem: Problem, start: Array, enough: float) -> Posterior:
     """Return the optimum that is found from a start."""
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
@@ -285,7 +301,7 @@ def _descend(problem: Problem, start: Array) -> Posterior:
             break
         p, now, gained = better
         damping = max(damping / 5.0, 1e-6)
-        if gained < ENOUGH and iterations > 3:
+        if gained < enough and (iterations > 3 or enough > ENOUGH):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e)
     H = _normal(problem, now, S2, T)[0] + _around_beliefs(priors, p)[1][np.ix_(index, index)]
@@ -347,15 +363,10 @@ def softness(p: Array) -> tuple[Array, Array]:
 
 def _normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
-    n = at.slopes.shape[2]
-    H, gradient = np.zeros((n, n)), np.zeros(n)
-    for axle in range(2):
-        e, J = at.e[:, axle], at.slopes[:, axle, :]
-        w = problem.weight / T[axle] * (NU + 1.0) / (NU * S2[axle] + e**2)
-        weighted = J * w[:, None]
-        H += weighted.T @ J
-        gradient += weighted.T @ e
-    return H, gradient
+    w = problem.weight[:, None] / T * (NU + 1.0) / (NU * S2 + at.e**2)
+    J = at.slopes.reshape(-1, at.slopes.shape[2])
+    weighted = J * w.reshape(-1, 1)
+    return weighted.T @ J, weighted.T @ at.e.ravel()
 
 
 def _bounded(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:
