@@ -150,7 +150,7 @@ def _run(log: Recording, told: Vehicle) -> tuple[ti.History, bool]:
     signals = {name: getattr(log, of) for name, of in COLUMNS.items()}
     table = {name: signal for name, signal in signals.items() if signal is not None}
     try:
-        read = ti.Recording.from_dataframe(table, name=log.name, dt=log.dt)
+        read = ti.read_recording(table, name=log.name, dt=log.dt)
         return ti.identify(read, told), True
     except RecordingError:
         return ti.identify(log, told, check=False), False

@@ -1,7 +1,7 @@
 """Learns a car's lateral tire forces while it drives, and freezes them: `import tireid as ti`.
 
     car = ti.Vehicle.from_toml("car.toml")      # or ti.sedan()
-    log = ti.read_recording("log.csv")          # or ti.Recording.from_dataframe(df)
+    log = ti.read_recording("log.csv")          # or ti.read_recording(df)
     tire = ti.identify(log, car).freeze()
     print(tire.summary(), tire.force(0.05, "front"))
 

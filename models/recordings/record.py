@@ -11,9 +11,8 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,6 @@ from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
 from models.rules import LARGEST_FORCE
-
-if TYPE_CHECKING:
-    from models.recordings.map import LogMap
 
 MINIMUM_SAMPLES = 10
 PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
@@ -150,43 +146,6 @@ class Recording:
                     f"{self.name}: t must rise from one stretch to the next, "
                     f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
                 )
-
-    @classmethod
-    def from_dataframe(
-        cls,
-        data: Any,
-        *,
-        name: str = "recording",
-        run: str | None = None,
-        dt: float = 0.01,
-        check: bool = True,
-        columns: Mapping[str, str] | None = None,
-        log_map: "LogMap | str | PathLike[str] | None" = None,
-    ) -> "Recording":
-        """Return one run of a data frame, checked and brought to a uniform time as a file is.
-
-        Parameters
-        ----------
-        data : a pandas data frame, or a mapping of arrays of one length, by column. Names, units
-            and signs are those of `read_recording`; `delta_r` may be missing. Times of the
-            calendar and durations count from the first.
-        name : of the recording, in place of a file's.
-        run : which run of the column "run", where there are several.
-        dt : sample time T_s to resample to [s].
-        check : whether data that contradict physics, once they are repaired, are refused.
-        columns : by our name of a column, its name in `data` and, behind it, unit, factor, offset
-            or ratio, as of `read_recording`.
-        log_map : how the data are read, or the path of a log.toml; its repair is not applied.
-
-        Raises
-        ------
-        RecordingError
-            One line: name and run, column, rule, value, remedy.
-        """
-        from models.recordings.reader import map_of, recording_from_arrays, with_columns
-
-        told = with_columns(map_of(log_map), columns or {})
-        return recording_from_arrays(name, data, told, run=run, dt=dt, check=check)
 
     def __len__(self) -> int:
         """Return the number of samples."""

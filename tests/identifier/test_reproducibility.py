@@ -20,7 +20,7 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 
 
 @pytest.fixture(name="history")

@@ -176,7 +176,7 @@ class Frame:
 
 @pytest.mark.parametrize("kind", [dict, Frame])
 def test_arrays_are_read_as_a_file_is(kind, log):
-    same = ti.Recording.from_dataframe(kind(columns_of(log)), name="mine")
+    same = ti.read_recording(kind(columns_of(log)), name="mine")
     assert same.name == "mine"
     assert np.allclose(same.x, log.x, atol=1e-12) and not same.delta_r.any()
     assert same.a_y is None and same.axle_force is None
@@ -185,7 +185,7 @@ def test_arrays_are_read_as_a_file_is(kind, log):
 def test_a_pandas_frame_is_read(log):
     pandas = pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
     frame = pandas.DataFrame({**columns_of(log), "run": "lap 2", "comment": "x"})
-    assert ti.Recording.from_dataframe(frame).name == "recording:lap 2"
+    assert ti.read_recording(frame).name == "recording:lap 2"
 
 
 def test_columns_of_another_name_and_runs_are_chosen(log):
@@ -193,12 +193,12 @@ def test_columns_of_another_name_and_runs_are_chosen(log):
     columns["yaw_rate"] = columns.pop("r")
     twice = {name: np.concatenate([value, value]) for name, value in columns.items()}
     twice["run"] = np.repeat(["a", "b"], log.t.size)
-    read = ti.Recording.from_dataframe(twice, run="b", columns={"r": "yaw_rate"})
+    read = ti.read_recording(twice, run="b", columns={"r": "yaw_rate"})
     assert read.name == "recording:b" and np.allclose(read.r, log.r)
     with pytest.raises(RecordingError, match="name one of its runs: a, b"):
-        ti.Recording.from_dataframe(twice, columns={"r": "yaw_rate"})
+        ti.read_recording(twice, columns={"r": "yaw_rate"})
     with pytest.raises(RecordingError, match="did you mean 'yaw_rate' for r"):
-        ti.Recording.from_dataframe(twice, run="b")
+        ti.read_recording(twice, run="b")
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_arrays_are_judged_as_a_file_is(log, name, change, said):
     columns = columns_of(log)
     columns[name] = change(columns[name])
     with pytest.raises(RecordingError, match=f"^recording: .*{said}"):
-        ti.Recording.from_dataframe(columns)
+        ti.read_recording(columns)
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,7 @@ def test_arrays_are_judged_as_a_file_is(log, name, change, said):
 )
 def test_arguments_of_another_kind_are_refused_by_their_name(log, words, said):
     with pytest.raises(RecordingError, match=said):
-        ti.Recording.from_dataframe(columns_of(log), **words)
+        ti.read_recording(columns_of(log), **words)
 
 
 def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
@@ -261,13 +261,13 @@ def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
     milliseconds = np.round(1e3 * (log.t - log.t[0])).astype("timedelta64[ms]")
     start = np.datetime64("2026-03-29T00:59:55") if kind.startswith("d") else 0
     stamped = {"t": (start + milliseconds).astype(kind), **columns}
-    told = ti.Recording.from_dataframe(stamped)
-    plain = ti.Recording.from_dataframe({"t": log.t - log.t[0], **columns})
+    told = ti.read_recording(stamped)
+    plain = ti.read_recording({"t": log.t - log.t[0], **columns})
     np.testing.assert_allclose(told.t, plain.t, atol=1e-9)
     np.testing.assert_allclose(told.r, plain.r, atol=1e-9)
     stamped["t"][7] = "NaT"
     with pytest.raises(RecordingError, match=r"1 of .* are empty, .* the first in index 7"):
-        ti.Recording.from_dataframe(stamped)
+        ti.read_recording(stamped)
 
 
 def test_an_hour_that_is_there_twice_in_summer_time_is_no_jump(log):
@@ -275,7 +275,7 @@ def test_an_hour_that_is_there_twice_in_summer_time_is_no_jump(log):
     t = pandas.to_datetime("2026-10-25 00:59:55", utc=True) + pandas.to_timedelta(log.t, unit="s")
     columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
     data = pandas.DataFrame({"t": t.tz_convert("Europe/Berlin"), **columns})
-    np.testing.assert_allclose(ti.Recording.from_dataframe(data).t, log.t - log.t[0], atol=1e-6)
+    np.testing.assert_allclose(ti.read_recording(data).t, log.t - log.t[0], atol=1e-6)
 
 
 @pytest.mark.parametrize("unit", ["milli", "micro", "nano"])
@@ -284,13 +284,13 @@ def test_the_unit_of_a_time_that_is_not_in_seconds_is_guessed(log, unit):
     data = {"t": 10.0**power * log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r,
             "delta_f": log.delta_f}  # fmt: skip
     with pytest.raises(RecordingError, match=f"; {unit}seconds[?] divide by 1{power * '0'}$"):
-        ti.Recording.from_dataframe(data)
+        ti.read_recording(data)
 
 
 @pytest.mark.parametrize("data", [[1.0, 2.0], 3.0, None])
 def test_what_has_no_columns_is_refused(data):
     with pytest.raises(RecordingError, match="a data frame or a mapping"):
-        ti.Recording.from_dataframe(data)
+        ti.read_recording(data)
 
 
 @pytest.mark.parametrize("name", KINDS)

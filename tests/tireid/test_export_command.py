@@ -12,7 +12,7 @@ from identifier.export.compiled import CompiledPackage
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid import exporting

@@ -159,19 +159,19 @@ def test_without_v_y_there_are_no_slip_angles(exact):
 
 def test_a_frame_without_vy_is_taken_where_ay_is_there(exact):
     columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
-    told = Recording.from_dataframe(columns | {"ay": exact.a_y})
+    told = read_recording(columns | {"ay": exact.a_y})
     assert told.v_y is None
     assert "no lateral velocity is read" in " ".join(told.notes)
     with pytest.raises(RecordingError, match=r"column vy \(or ay, from which it is estimated\)"):
-        Recording.from_dataframe(columns)
+        read_recording(columns)
 
 
 def test_a_log_that_contradicts_itself_without_v_y_is_refused(exact):
     columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
     with pytest.raises(RecordingError, match="change the sign of ay"):
-        Recording.from_dataframe(columns | {"ay": -exact.a_y})
+        read_recording(columns | {"ay": -exact.a_y})
     with pytest.raises(RecordingError, match="delta_f must be in rad"):
-        Recording.from_dataframe(columns | {"ay": exact.a_y, "delta_f": 10 * exact.delta_f})
+        read_recording(columns | {"ay": exact.a_y, "delta_f": 10 * exact.delta_f})
 
 
 def test_a_written_recording_leaves_out_what_was_estimated(history, tmp_path):

@@ -9,8 +9,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from identifier.frozen import VEHICLE_KEYS
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from models.faults import SIZED, FaultError, SensorFault
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan

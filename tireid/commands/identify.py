@@ -20,8 +20,7 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History, check_recording
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict, judge_prediction
 from models.recordings import (
     Recording,

@@ -13,8 +13,7 @@ from codegen.arrays import Array, blocks
 from codegen.escape import visible
 from identifier.frozen import vehicle_numbers
 from identifier.reproducibility import Prediction, beyond_known
-from identifier.stored import load_model
-from identifier.tire_model import UNCALIBRATED, TireModel
+from identifier.tire_model import UNCALIBRATED, TireModel, load_model
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__

@@ -18,7 +18,7 @@ from identifier.axle.band import (
 )
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from identifier.verdict import calibrated, within_band
 from identifier.verdict.bands import color_of, quantile
 from identifier.verdict.motion import Windows

@@ -26,7 +26,7 @@ from identifier.axle.guarantee import (
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from identifier.verdict import BoundViolatedError, OnlineBound, contradictions
 from identifier.verdict.guaranteed import strips_of
 from models.friction import Friction, FrictionChange

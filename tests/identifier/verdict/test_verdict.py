@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from identifier.verdict.causes import CAUSES, PATIENCE, Suspect, _least
+from identifier.verdict.rules import Drive, findings
 
 import identifier.verdict
 from identifier.axle import AxleIdentifier
@@ -15,7 +17,6 @@ from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge_prediction
-from identifier.verdict.causes import CAUSES, PATIENCE, Suspect, _least
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import (
     Windows,
@@ -24,7 +25,6 @@ from identifier.verdict.motion import (
     measured_force,
     noise_variance,
 )
-from identifier.verdict.rules import Drive, findings
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors, white_noise
