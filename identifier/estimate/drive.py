@@ -1,4 +1,4 @@
-"""A drive as the estimate reads it: signals of at most 100 Hz, smoothed alike, and where they count.
+"""A drive as the estimate reads it: at most 100 Hz, smoothed alike, and where samples count.
 
 The balance is linear in its signals but for slip: the same zero-phase mean over all of them costs
 nothing and takes noise away.

@@ -1,5 +1,6 @@
 """Tires from one log or several: blocks of ten minutes, their information added up."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -130,7 +131,7 @@ def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[
         n = max(round(BLOCK / recording.dt), 1)
         count = -(-len(recording) // n)
         edges = np.linspace(0, len(recording), count + 1).astype(int)
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in itertools.pairwise(edges):
             seconds = (end - begin) * recording.dt
             if group and length + seconds > BLOCK:
                 yield group

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from codegen import Scan
