@@ -35,7 +35,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "what learning believes, not calibrated; `run.calibrated()` checks it on the drive"
+UNCALIBRATED = "what learning believes, not calibrated; `run.tire` checks it on the drive"
 
 
 class TireFunctions(NamedTuple):
@@ -380,7 +380,7 @@ class TireModel(ABC):
     def band_calibrated(self) -> bool:
         """Whether the width of `band` was found on parts of the drive that did not teach.
 
-        As of `History.calibrated`, where enough was driven; else it is what learning believes.
+        As of `Run.tire`, where enough was driven; else it is what learning believes.
         """
         return False
 

@@ -69,9 +69,9 @@ def read_recording(
     """
     told = with_columns(map_of(log_map), columns)
     if not isinstance(source, str | PathLike):
-        return recording_from_arrays(
-            name or "recording", source, told, run=run, dt=dt, check=check
-        )
+        name = name or "recording"
+        arrays = ArrayLog(name, source, told.clock, mend=told.order == MEND)
+        return _judged(arrays, name, replace(told, clock=""), run=run, dt=dt, check=check)
     path = Path(source)
     log = open_log(path, told.dbc or None, mend=told.order == MEND)
     return _judged(log, name or _stem(path), told, run=run, dt=dt, check=check)
@@ -129,29 +129,6 @@ def repair_text(repair: Repair) -> str:
         inner = value if isinstance(value, dict) else {"": value}
         words += [f"{name}{'.' * bool(key)}{key} = {one:.4g}" for key, one in inner.items()]
     return ", ".join(words)
-
-
-def recording_from_arrays(
-    name: str, data: Any, told: LogMap, *, run: str | None, dt: float, check: bool
-) -> Recording:
-    """Return one run of arrays in memory as a recording.
-
-    Parameters
-    ----------
-    name : of the recording, and in messages.
-    data : a data frame or a mapping, by column.
-    told : how it is read.
-    run : name of the run; None where there is only one.
-    dt : sample time T_s of the result [s].
-    check : whether to judge signs, axes and units by physics.
-
-    Raises
-    ------
-    RecordingError
-        One line: name and run, column, rule, value, remedy.
-    """
-    log = ArrayLog(name, data, told.clock, mend=told.order == MEND)
-    return _judged(log, name, replace(told, clock=""), run=run, dt=dt, check=check)
 
 
 def map_of(told: Told) -> LogMap:

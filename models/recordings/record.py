@@ -5,6 +5,7 @@ ISO axes: x forward, y left, z up; r and delta turn left when positive, forces p
 """
 
 import csv
+import importlib
 import io
 import math
 import zlib
@@ -271,6 +272,40 @@ class Recording:
             )
         return self.taken(keep)
 
+    def __getitem__(self, times: slice) -> "Recording":
+        """Return the part between two times [s], both included, as label slices of pandas have it.
+
+        Parameters
+        ----------
+        times : `log[5.0:20.0]`, on the recording's own clock; what is left out is the begin or end.
+
+        Raises
+        ------
+        TypeError
+            Where it is no slice of two times.
+        RecordingError
+            If fewer than 10 samples are left.
+        """
+        if not isinstance(times, slice) or times.step is not None:
+            raise TypeError(f"a recording is sliced by time in s, as log[5.0:20.0], not {times!r}")
+        t0 = self.t[0] if times.start is None else times.start
+        t1 = self.t[-1] if times.stop is None else times.stop
+        return self.between(float(t0), float(t1))
+
+    def to_dataframe(self) -> Any:
+        """Return it as a data frame of pandas, by the columns of `write_recording`.
+
+        Raises
+        ------
+        ImportError
+            Where pandas is not installed.
+        """
+        try:
+            pandas = importlib.import_module("pandas")
+        except ImportError:
+            raise ImportError("a data frame needs pandas: pip install pandas") from None
+        return pandas.DataFrame(_columns(self))
+
     def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a stretch begins.
 
@@ -503,6 +538,13 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
         raise RecordingError(f"{path}: the name must end in .csv or .csv.gz")
+    text = _csv(_columns(recording))
+    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
+    return path
+
+
+def _columns(recording: Recording) -> dict[str, Array]:
+    """Return the signals that there are, by the standard names of columns."""
     signals = {
         "t": recording.t,
         "vx": recording.v_x,
@@ -515,9 +557,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
-    text = _csv(columns)
-    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
-    return path
+    return columns
 
 
 def _csv(columns: Mapping[str, Array]) -> Iterator[bytes]:

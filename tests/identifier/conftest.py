@@ -9,7 +9,7 @@ import pytest
 
 from identifier.frozen import FrozenModelError
 from identifier.tire_model import load_model
-from models.recordings import Recording
+from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
 CAR = Vehicle(

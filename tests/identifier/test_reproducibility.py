@@ -7,6 +7,7 @@ import pytest
 
 from identifier.frozen import FrozenModelError
 from identifier.paper.design import PaperIdentifier
+from identifier.prediction import predict
 from identifier.reproducibility import (
     AxleRmse,
     MotionError,
@@ -15,7 +16,6 @@ from identifier.reproducibility import (
     force_rms,
     freeze_key,
     online_error,
-    predict,
     replay,
     reproduce,
 )

@@ -10,7 +10,7 @@ from models.logs.log import RecordingError
 from models.logs.signals import Signal
 from models.maneuvers import RandomSteer
 from models.plant import Plant
-from models.recordings import LogMap, Recording, Repair, read_recording
+from models.recordings import LogMap, Repair, read_recording
 from models.recordings.reader import read_repaired
 from models.recordings.rolled import rolled
 from models.recordings.wheels import Wheels
@@ -68,16 +68,12 @@ def test_turns_and_speeds_give_the_same_recording_whatever_their_unit(run, wheel
 
 
 def test_our_names_without_a_unit_are_in_si(run, wheels):
-    got = read_recording(
-        columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=()))
-    )
+    got = read_recording(columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=())))
     np.testing.assert_allclose(got.v_x, run.v_x, atol=0.5)
 
 
 def test_the_notes_say_of_what_the_speed_is_made_and_what_was_left_out(run, wheels):
-    (note,) = (
-        one for one in read_recording(columns(run, wheels)).notes if "vx is made" in one
-    )
+    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is made" in one)
     assert "wheel_fl, wheel_fr, wheel_rl, wheel_rr" in note
     share = float(note.split(" % of the samples")[0].split()[-1])
     assert 8.0 < share < 13.0  # 2 of 20 s
@@ -165,9 +161,7 @@ def test_axes_and_signs_that_a_map_turns_are_turned_before_wheels_are_brought_ov
     np.testing.assert_allclose(left.v_x, right.v_x, rtol=1e-12)
     wrong = {**columns(run, rear), "r": -run.r}
     repair = Repair(factor={"r": -1.0})
-    mended = read_recording(
-        wrong, log_map=LogMap(wheels=known, repair=repair), check=False
-    )
+    mended = read_recording(wrong, log_map=LogMap(wheels=known, repair=repair), check=False)
     np.testing.assert_allclose(mended.v_x, right.v_x, rtol=1e-12)
 
 

@@ -119,7 +119,7 @@ def test_every_command_of_the_list_is_one(name, capsys):
 def test_the_shortest_way_learns_the_tires(run, log):
     tire = run.freeze()
     assert np.array_equal(tire.predict(log), run.freeze(t=log.t[-1]).axle_force(log))
-    missed = ti.replay(tire, log)
+    missed = ti.replay(log, tire)
     rms = np.sqrt(np.mean((tire.predict(log) - log.axle_force) ** 2, axis=0))
     assert np.allclose([missed.against_truth.front, missed.against_truth.rear], rms)
     assert missed.against_truth.rear < 0.15 * missed.true_force.rear
@@ -130,8 +130,8 @@ def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path, 
     out = tmp_path / "out"
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     assert main([*words, "--out", str(out)]) == 0
-    told = {"valid": run.verdict().valid}
-    model = run.calibrated()
+    told = {"valid": run.verdict.valid}
+    model = run.tire
     assert json.loads((out / "weights.json").read_text()) == model.to_dict() | told
     assert ti.TireModel.load(out / "weights.json").to_dict() == model.to_dict()
     found = {name: model.to_dict()[name] for name in ("band", "force_missed")}
@@ -247,9 +247,9 @@ def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
         (lambda: ti.identify([log, log], car), "recording must be a Recording, .* a list of 2"),
         (lambda: ti.identify(log, "car.toml"), "vehicle must be a Vehicle, as of Vehicle.from_"),
         (lambda: ti.identify(log, car, "rls"), r"method must be a Method, as of make_method\("),
-        (lambda: ti.replay(log, tire), "tire must be a TireModel, as of History.freeze"),
+        (lambda: ti.replay(tire, log), "tire must be a TireModel, as of History.freeze"),
         (lambda: run.freeze("20"), "a time to freeze at is a number of seconds, not '20'"),
-        (lambda: ti.replay(tire, "log.csv"), "recording must be a Recording"),
+        (lambda: ti.replay("log.csv", tire), "recording must be a Recording"),
     ):
         with pytest.raises(TypeError, match=f"^{said}"):
             call()
@@ -415,7 +415,7 @@ def test_a_summary_says_what_the_numbers_are(tires):
 
 def test_representations_are_short(tires, run, log, car):
     certificate = ti.certify(ti.PaperIdentifier.for_vehicle(car), car)
-    for shown in (*tires.values(), run, log, certificate, ti.replay(tires["axle"], log)):
+    for shown in (*tires.values(), run, log, certificate, ti.replay(log, tires["axle"])):
         assert len(repr(shown)) < 160 and "\n" not in repr(shown)
     assert "sedan" in repr(tires["axle"])
 
@@ -485,6 +485,6 @@ def test_a_drive_that_cannot_be_is_refused(car, words, said):
 
 def test_logs_runs_and_tires_are_equal_to_themselves_alone(log, run, tires):
     """Arrays in a record would make == of two an error, and none of them a key."""
-    for one in (log, run, ti.replay(tires["axle"], log), *tires.values()):
+    for one in (log, run, ti.replay(log, tires["axle"]), *tires.values()):
         assert one == one and len({one, one}) == 1
     assert log != replace(log) and tires["axle"] != run.freeze()

@@ -11,7 +11,7 @@ import pytest
 import tireid as ti
 from models.maneuvers import RandomSteer
 from models.plant import Plant
-from models.recordings import LogMap, Recording
+from models.recordings import LogMap, read_recording
 from models.recordings.wheels import Wheels
 from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, shown, spin
 from tireid.cli import main
@@ -162,12 +162,8 @@ def test_one_encoder_is_enough_where_it_does_not_slip(run):
     slips = shown(run, gentle_slip(run), np.random.default_rng(0))
     encoder = np.mean([*slips.values()], axis=0)
     known = replace(Wheels().completed(CAR), radius=(0.316,))
-    one = read_recording(
-        {**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known)
-    )
+    one = read_recording({**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known))
     slip, force = errors(run, one)
-    slip_of_exact, force_of_exact = errors(
-        run, read_recording({**imu(run), "vx": run.v_x})
-    )
+    slip_of_exact, force_of_exact = errors(run, read_recording({**imu(run), "vx": run.v_x}))
     assert slip < 1.3 * slip_of_exact + 0.02
     assert force < 1.2 * force_of_exact + 0.01
