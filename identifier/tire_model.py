@@ -324,13 +324,13 @@ class TireModel(ABC):
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
 
-    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times [s] of the drive that taught the road was another one, (n,)."""
         return np.zeros(t.shape, dtype=bool)
 
     @property
-    def road_notes(self) -> tuple[str, ...]:
-        """What a drive that taught told of other roads, a line each."""
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
         return ()
 
     def at_bounds(self) -> "tuple[Reached, ...]":

@@ -258,7 +258,6 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     """Return the optimum that is found from a start."""
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
-    P = priors.information[np.ix_(index, index)]
     p, damping = start.copy(), 1e-3
     now = problem.residuals(p)
     T = problem.memory(now.e)
@@ -268,9 +267,9 @@ def _descend(problem: Problem, start: Array) -> Posterior:
         T = np.sqrt(T * problem.memory(now.e)) if iterations > 1 else T
         cost = problem.misfit(now.e, S2, T) + _beliefs(priors, p)
         H, gradient = _normal(problem, now, S2, T)
-        soft, soft_slopes = softness(p)
-        H = H + P + (soft_slopes.T @ soft_slopes)[np.ix_(index, index)]
-        gradient = gradient + (priors.information @ (p - priors.mean) + soft @ soft_slopes)[index]
+        of_beliefs, curvature = _around_beliefs(priors, p)
+        H = H + curvature[np.ix_(index, index)]
+        gradient = gradient + of_beliefs[index]
         better = None
         for _ in range(8):
             step = _bounded(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
@@ -289,17 +288,18 @@ def _descend(problem: Problem, start: Array) -> Posterior:
         if gained < ENOUGH and iterations > 3:
             break
     S2, T = problem.scale(now.e), problem.memory(now.e)
-    data, _ = _normal(problem, now, S2, T)
+    H = _normal(problem, now, S2, T)[0] + _around_beliefs(priors, p)[1][np.ix_(index, index)]
     cost = problem.cost(now.e, p, T)
     whole = np.zeros((len(p), len(p)))
-    whole[np.ix_(index, index)] = np.linalg.inv(data + P)
+    whole[np.ix_(index, index)] = np.linalg.inv(H)
     n, tires = len(NAMES), problem.tires
+    told = np.asarray(np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]), np.float64)
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
         covariance=whole[:n, :n],
         index=index[:tires],
-        information=np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]),
+        information=told,
         roads=p[n:],
         road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
@@ -313,6 +313,13 @@ def _beliefs(priors: Priors, p: Array) -> float:
     """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
     soft, _ = softness(p)
     return priors.cost(p) + 0.5 * float(soft @ soft)
+
+
+def _around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
+    """Return gradient (p,) and positive curvature (p, p) of `_beliefs`."""
+    gradient, curvature = priors.around(p)
+    soft, slopes = softness(p)
+    return gradient + soft @ slopes, curvature + slopes.T @ slopes
 
 
 def softness(p: Array) -> tuple[Array, Array]:

@@ -111,7 +111,7 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     if found is None:
         return model
     if history.design.whole:
-        found = found.where(~model.on_another_road(recording.t)[found.windows.starts])
+        found = found.where(~model.road_differs(recording.t)[found.windows.starts])
         return model.with_calibration(None, found.but_a_stretch()[0].missed)
 
     def teach(halting: Recording) -> TireModel:
