@@ -501,11 +501,14 @@ class Vehicle:
         Raises
         ------
         VehicleError
-            One line with file, key and rule: key unknown or missing, type or value wrong.
-        FileNotFoundError
-            When there is no such file.
+            One line with file, key and rule: no such file, key unknown or missing, type or value
+            wrong.
         """
         file = Path(path)
+        if not file.exists():
+            raise VehicleError(
+                f"{file}: there is no such file; `tireid init` writes one to fill in"
+            )
         data = read_toml(file, VehicleError)
         inner = data.pop("chassis", None)
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")

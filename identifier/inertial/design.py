@@ -27,7 +27,7 @@ from identifier.inertial.motion import MOVING, SENSORS, of_axles, size
 from identifier.inertial.step import CARRY, OVER, PORTS, build_step, heard_size
 from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import Reached, AXLES, TireModel
+from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle

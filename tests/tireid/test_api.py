@@ -1,5 +1,7 @@
 """The one import: complete, lazy, typed, and the same numbers as the rooms behind it."""
 
+import ast
+import builtins
 import json
 import re
 import subprocess
@@ -21,6 +23,8 @@ from mpc.tires import prediction_tire
 from tireid.cli import main
 from tireid.commands import COMMANDS
 
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 HEAVY = {"matplotlib", "control", "scipy", "casadi", "numpy"}
 KINDS = ("axle", "integral", "rls", "linear", "magic_formula_ekf", "dugoff_ekf")
 STATES = ((0.0, 0.0, 0.02), (0.3, 0.4, 0.05), (-1.2, 0.2, -0.1))  # v_y, r, delta
@@ -87,7 +91,7 @@ def test_a_command_begins_without_what_only_some_of_its_options_need(command, un
 def test_every_promised_name_is_there_and_an_unknown_one_is_refused():
     for name in ti.__all__:
         assert getattr(ti, name) is not None
-    assert set(ti.__all__) <= set(dir(ti))
+    assert dir(ti) == sorted(ti.__all__)
     with pytest.raises(AttributeError, match="no attribute 'identifyy'"):
         ti.identifyy  # noqa: B018
 
@@ -134,8 +138,96 @@ def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path, 
     model = run.tire
     assert json.loads((out / "weights.json").read_text()) == model.to_dict() | told
     assert ti.TireModel.load(out / "weights.json").to_dict() == model.to_dict()
-    found = {name: model.to_dict()[name] for name in ("band", "force_missed")}
-    assert model.to_dict() == run.freeze().to_dict() | found
+    checked = {name: model.to_dict()[name] for name in ("force_missed",)}
+    assert model.to_dict() == run.freeze().to_dict() | checked
+
+
+def test_the_tire_of_a_run_is_what_it_freezes_to_with_a_calibrated_band(log, car):
+    run = ti.identify(log, car, "axle")
+    tire, frozen = run.tire, run.freeze()
+    assert tire.band_calibrated and "calibrated on the drive" in tire.summary()
+    assert not frozen.band_calibrated and "`run.tire` checks it" in frozen.summary()
+    checked = {name: tire.to_dict()[name] for name in ("band", "force_missed")}
+    assert tire.to_dict() == frozen.to_dict() | checked
+    surely = run.guarantee(0.3)
+    slip = np.array([0.02])
+    assert surely.guarantee is not None
+    assert np.array_equal(surely.half_band(slip), tire.half_band(slip))
+
+
+def test_a_run_says_once_whether_it_is_good(log, car, monkeypatch):
+    from tireid import run as home
+
+    judged = []
+    monkeypatch.setattr(home, "judge", lambda history: judged.append(history) or "verdict")
+    run = ti.identify(log, car, "linear")
+    assert run.verdict == run.verdict == "verdict" and judged == [run.history]
+
+
+def test_a_run_names_its_parts(log, car, tmp_path):
+    run = ti.identify(log, car, "integral")
+    assert run.recording is run.history.recording and run.force is run.history.axle_force
+    assert run.method.law == "integral" and run.vehicle is car
+    assert run.certificate.to_dict() == ti.certify("integral", car).to_dict()
+    run.save(tmp_path / "run")
+    again = ti.TireModel.load(tmp_path / "run" / "weights.json")
+    assert again.to_dict() == run.tire.to_dict()
+    told = json.loads((tmp_path / "run" / "verdict.json").read_text())
+    assert told["valid"] == run.verdict.valid
+    with pytest.raises(FileExistsError, match="overwrite=True replaces it"):
+        run.save(tmp_path / "run")
+    run.save(str(tmp_path / "run"), overwrite=True)
+
+
+def test_methods_have_the_names_of_the_command_line(log, car):
+    assert ti.methods()[0] == "fit" and {"axle", "integral", "linear"} <= {*ti.methods()}
+    by_name = ti.identify(log, car, "linear").force
+    assert np.array_equal(by_name, ti.identify(log, car, ti.make_method("linear", car)).force)
+    assert ti.certify("axle", car).verdict == "pass"
+    for call in (lambda: ti.identify(log, car, "lineal"), lambda: ti.certify("lineal", car)):
+        with pytest.raises(ValueError, match=r"^method must be one of fit, axle.*not 'lineal'$"):
+            call()
+    with pytest.raises(TypeError, match=r"^vehicle must be a Vehicle, as of Vehicle.from_toml"):
+        ti.certify(car, "axle")
+
+
+def test_a_missing_car_file_is_told_in_one_line(tmp_path):
+    with pytest.raises(ti.TireidError, match=r"car\.toml: there is no such file") as told:
+        ti.Vehicle.from_toml(tmp_path / "car.toml")
+    assert "\n" not in str(told.value)
+
+
+def test_all_errors_have_one_base_and_the_builtin_of_their_meaning():
+    for path in (path for name in PACKAGES for path in (ROOT / name).rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            bases = [one.id for one in getattr(node, "bases", []) if isinstance(one, ast.Name)]
+            if {base for base in bases if hasattr(builtins, base)} and node.name != "TireidError":
+                assert bases[0] == "TireidError", f"{path}: {node.name}"
+    for error in map(ti.errors.__dict__.get, ti.errors.__all__):
+        assert issubclass(error, ti.TireidError)
+        meanings = ValueError | ArithmeticError | RuntimeError
+        assert error is ti.TireidError or issubclass(error, meanings)
+
+
+def test_a_recording_is_sliced_by_time_and_made_a_frame(log):
+    part = log[2.0:4.0]
+    assert part.t[0] == 2.0 and part.t[-1] == 4.0
+    assert np.array_equal(log[:4.0].r, log.between(log.t[0], 4.0).r)
+    assert len(log[:]) == len(log)
+    for wrong in (3, slice(0.0, 4.0, 2.0)):
+        with pytest.raises(TypeError, match=r"sliced by time in s, as log\[5.0:20.0\]"):
+            log[wrong]
+    with pytest.raises(RecordingError, match="between 90 and 95 s there are 0"):
+        log[90.0:95.0]
+    pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
+    again = ti.read_recording(log.to_dataframe(), name=log.name)
+    assert again.name == log.name and np.array_equal(again.axle_force, log.axle_force)
+    assert all(np.array_equal(getattr(again, one), getattr(log, one)) for one in ("t", "x", "u"))
+
+
+def test_a_recording_is_plotted(log):
+    figure = ti.plot(log)
+    assert len(figure.axes) >= 4 and figure.axes[-1].get_xlabel().startswith("t")
 
 
 def test_a_recording_of_another_car_is_refused(log, car):
@@ -246,8 +338,9 @@ def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
         (lambda: ti.identify("log.csv", car), "recording must be a Recording, as of read_rec"),
         (lambda: ti.identify([log, log], car), "recording must be a Recording, .* a list of 2"),
         (lambda: ti.identify(log, "car.toml"), "vehicle must be a Vehicle, as of Vehicle.from_"),
-        (lambda: ti.identify(log, car, "rls"), r"method must be a Method, as of make_method\("),
-        (lambda: ti.replay(tire, log), "tire must be a TireModel, as of History.freeze"),
+        (lambda: ti.identify(log, car, 3), r"method must be a Method, as of make_method\("),
+        (lambda: ti.replay(log, run), "tire must be a TireModel, as of Run.tire"),
+        (lambda: ti.replay(tire, log), "recording must be a Recording, as of read_recording"),
         (lambda: run.freeze("20"), "a time to freeze at is a number of seconds, not '20'"),
         (lambda: ti.replay("log.csv", tire), "recording must be a Recording"),
     ):
@@ -439,12 +532,12 @@ def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch
     monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     written = ti.export(run, tmp_path / "run", name="axle")
     assert (tmp_path / "run" / "include" / "axle.h").is_file()
-    expected = build_package(run.design, car, run.freeze(), name="axle", single=False)
+    expected = build_package(run.method, car, run.freeze(), name="axle", single=False)
     assert written.package.about["hash"] == expected.about["hash"]
     assert str(written).endswith(f"wrote {tmp_path / 'run'}/, hash {expected.about['hash']}")
     from_model = ti.export(run.freeze(), str(tmp_path / "model"), name="axle")
     assert from_model.package.about["hash"] == expected.about["hash"]
-    fresh = ti.export(run.design, tmp_path / "method", vehicle=car, name="axle")
+    fresh = ti.export(run.method, tmp_path / "method", vehicle=car, name="axle")
     assert fresh.package.about["hash"] != expected.about["hash"]
     with pytest.raises(FileExistsError, match="overwrite=True replaces it"):
         ti.export(run, tmp_path / "run")

@@ -146,7 +146,7 @@ def test_several_logs_of_which_one_has_no_v_y_are_a_drive_without(exact):
     both = joined([exact, as_logged(exact)])
     assert both.v_y is None
     assert "vy is left out, drive3 has none" in both.notes
-    parts = ti.identify(both, CAR).parts([exact, as_logged(exact)])
+    parts = ti.identify(both, CAR).history.parts([exact, as_logged(exact)])
     assert [one.recording.estimated for one in parts] == [(), ("v_y",)]
 
 
