@@ -145,7 +145,7 @@ def run(seed: int) -> Ended:
             return Ended(seed, drive.car.kind, "verdict that is none")
     except Exception as error:
         return Ended(seed, drive.car.kind, f"{type(error).__name__}: {error}")
-    sound = np.isfinite(history.axle_force).all()
+    sound = np.isfinite(history.force).all()
     return Ended(seed, drive.car.kind, "" if sound else "force online that is not finite")
 
 
