@@ -14,7 +14,7 @@ from identifier.axle import AxleModel
 from identifier.measured import printed_value
 from identifier.methods import METHODS, draws_weights, make_method
 from identifier.paper.design import PaperIdentifier, design_text
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline

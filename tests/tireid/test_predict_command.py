@@ -19,7 +19,7 @@ from tireid.cli import main
 
 @pytest.fixture(scope="module")
 def model(logs, tmp_path_factory):
-    tire = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan()).calibrated()
+    tire = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan()).tire
     path = tmp_path_factory.mktemp("model") / "tire.json"
     tire.save(path)
     return path
@@ -121,7 +121,7 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys):
 
 def test_it_says_how_often_the_band_held(logs, tmp_path, capsys):
     run = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan())
-    tire = run.calibrated()
+    tire = run.tire
     tire.save(tmp_path / "model.json")
     summary, _ = predicted(tmp_path / "out", tmp_path / "model.json", logs / "quick.csv")
     held = summary["windows_within_band"]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.verdict import Verdict, judge, judge_prediction
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -359,7 +359,7 @@ def run(options: argparse.Namespace) -> None:
         for one in folders.values():
             one.mkdir()
         parts = {"identify": story.default, "paper_network": story.paper}
-        verdicts = {name: part.learnt.verdict(FREEZE) for name, part in parts.items()}
+        verdicts = {name: judge(part.learnt, FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in parts.items():
             model = part.learnt.freeze(FREEZE)

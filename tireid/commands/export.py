@@ -5,8 +5,7 @@ from typing import Any
 
 from identifier.method import Method
 from identifier.methods import continuing
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from models.vehicle import Vehicle
 from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS

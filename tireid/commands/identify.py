@@ -20,9 +20,8 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History, check_recording
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.tire_model import TireModel, load_model
+from identifier.verdict import Verdict, judge, judge_prediction
 from models.recordings import (
     Recording,
     Repair,
@@ -201,7 +200,7 @@ def run(options: argparse.Namespace) -> int:
         for k, one in enumerate((recording, *others)):
             share = progress.within(k / count, (k + 1) / count)
             histories.append(  # checked when they were read
-                identify(one, vehicle, design, start=start, check=False, progress=share)
+                identify(one, vehicle, design, start=start, check=False, progress=share).history
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(JUDGING)
@@ -219,7 +218,7 @@ def run(options: argparse.Namespace) -> int:
             for t in freeze_times:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = learnt.verdict(freeze_times[-1])
+            verdict = judge(learnt, freeze_times[-1])
             asked = _asked(learnt.freeze(freeze_times[-1]), others)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
             figures = write_results(

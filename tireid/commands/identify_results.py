@@ -27,7 +27,7 @@ from identifier.reproducibility import (
 from identifier.run import History
 from identifier.setup import Block
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, calibrated, guaranteed
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -234,9 +234,9 @@ def write_results(
     BoundViolatedError
         Where no curve keeps a bound that was told.
     """
-    calibrated = learnt.calibrated(max(frozen))
+    tire = calibrated(learnt, max(frozen))
     if bound is not None:
-        calibrated = learnt.guaranteed(bound.told, max(frozen), calibrated)
+        tire = guaranteed(learnt, bound.told, max(frozen), tire)
     write_json(
         folder / "summary.json",
         summarize(
@@ -251,7 +251,7 @@ def write_results(
     )
     for t in frozen:
         last = "" if t == max(frozen) else f"_{freeze_key(t)}s"
-        model = learnt.freeze(t) if last else calibrated
+        model = learnt.freeze(t) if last else tire
         judged = verdict if t == max(frozen) else None
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
@@ -260,7 +260,7 @@ def write_results(
     told = progress or Progress("curves")
     _write_curves(folder, learnt, others, frozen, curves, told, tracks)
     say("drawing figures")
-    return _draw(folder, learnt, others, frozen, calibrated, tracks)
+    return _draw(folder, learnt, others, frozen, tire, tracks)
 
 
 def file_name(recording: Recording) -> str:
@@ -439,14 +439,14 @@ def _draw(
     learnt: History,
     others: Sequence[History],
     frozen: Frozen,
-    calibrated: TireModel,
+    tire: TireModel,
     tracks: DrawnRun | None,
 ) -> dict[str, Figure]:
     name, last = learnt.recording.name, max(frozen)
     own = {t: replays[name] for t, replays in frozen.items()}
     figures = {
         "forces": force_figure(learnt, own),
-        "slip": slip_figure(calibrated, learnt.recording, learnt),
+        "slip": slip_figure(tire, learnt.recording, learnt),
         "inputs": inputs_figure(learnt.recording),
     }
     if OBSERVED in learnt.outputs:

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from identifier.doctor.consistency import Motion, Reading, forces_and_slips
-from identifier.reproducibility import Prediction, Replay, freeze_key, online_error
+from identifier.prediction import Prediction
+from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle

@@ -16,8 +16,7 @@ from identifier.method import Reached
 from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
-from identifier.verdict import judge_prediction
-from identifier.verdict.judging import judge
+from identifier.verdict import judge, judge_prediction
 from identifier.verdict.motion import (
     Windows,
     clean_share,
@@ -73,7 +72,7 @@ def clean(drive):
 
 @pytest.fixture(scope="module")
 def good(clean):
-    return clean.verdict()
+    return judge(clean)
 
 
 def codes(verdict, *, refusing=True):
@@ -173,7 +172,7 @@ def likely(verdict):
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_fault_is_refused_and_named_with_its_size(drive, name):
     plant, said, sizes = PLANTED[name]
-    verdict = answer(plant(drive)).verdict()
+    verdict = judge(answer(plant(drive)))
     assert not verdict.valid
     cause = likely(verdict)
     found = re.search(said, cause)
@@ -189,8 +188,8 @@ def test_a_planted_fault_is_refused_and_named_with_its_size(drive, name):
 
 @pytest.mark.parametrize("degrees", [5.0, -5.0])
 def test_at_a_speed_that_changes_a_turned_sensor_is_told_from_a_bias(changing, degrees):
-    assert answer(changing).verdict().valid
-    cause = likely(answer(turned(changing, degrees)).verdict())
+    assert judge(answer(changing)).valid
+    cause = likely(judge(answer(turned(changing, degrees))))
     found = re.search(rf"turned by {NUMBER} degrees", cause)
     assert found, cause
     assert float(found[1]) == pytest.approx(degrees, rel=0.4)
@@ -199,7 +198,7 @@ def test_at_a_speed_that_changes_a_turned_sensor_is_told_from_a_bias(changing, d
 def test_a_wrong_inertia_is_refused_and_named(drive):
     """Its size is told by doubling what is tried, so within a factor of two and a half."""
     car = replace(sedan(), yaw_inertia=10.0 * sedan().yaw_inertia)
-    verdict = answer(drive, car).verdict()
+    verdict = judge(answer(drive, car))
     assert not verdict.valid
     (told,) = [one for one in verdict.findings if one.code == "yaw_inertia"]
     assert not told.refuses
@@ -243,7 +242,7 @@ def test_a_delay_is_taken_out_by_whole_samples(drive):
 
 
 def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
-    verdict = answer(drive.between(0.0, ONSET)).verdict()
+    verdict = judge(answer(drive.between(0.0, ONSET)))
     assert not verdict.valid
     assert codes(verdict) == {"no_force"}
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
@@ -253,33 +252,33 @@ def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
 
 @pytest.mark.parametrize("value", [0.0, 0.3, -1.7])
 def test_v_y_that_is_not_measured_is_noticed(drive, value):
-    verdict = answer(replace(drive, v_y=np.full(len(drive), value))).verdict()
+    verdict = judge(answer(replace(drive, v_y=np.full(len(drive), value))))
     assert "v_y_stuck" in codes(verdict)
 
 
 def test_a_drive_of_a_moment_is_too_short(drive):
-    assert codes(answer(drive.between(6.0, 6.9)).verdict()) == {"too_short"}
+    assert codes(judge(answer(drive.between(6.0, 6.9)))) == {"too_short"}
 
 
 def test_a_y_that_contradicts_the_motion_is_noticed(drive):
     banked = replace(drive, a_y=drive.a_y + 3.0)
-    verdict = answer(banked).verdict()
+    verdict = judge(answer(banked))
     (one,) = [finding for finding in verdict.findings if finding.code == "a_y_disagrees"]
     assert "+3 m/s²" in one.text
-    assert "a_y_disagrees" not in codes(answer(drive).verdict())
+    assert "a_y_disagrees" not in codes(judge(answer(drive)))
 
 
 def test_swapped_axles_are_noticed_by_the_center_of_gravity(drive):
     car = sedan()
     swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
-    verdict = answer(drive, swapped).verdict()
+    verdict = judge(answer(drive, swapped))
     assert codes(verdict) == {"center_of_gravity"}
     assert verdict.measures["center_of_gravity_m"] == pytest.approx(car.l_f - car.l_r, rel=0.4)
 
 
 def test_a_downforce_that_is_not_told_is_the_likely_cause_and_told_the_answer_is_valid():
     log, car = pressed(0.3, np.random.default_rng(3))
-    verdict = answer(log, car).verdict()
+    verdict = judge(answer(log, car))
     assert not verdict.valid
     named = [one.text for one in verdict.findings if "downforce" in one.text]
     told = dict(re.findall(r"(downforce_area_\w+) = ([\d.]+)", named[0]))
@@ -289,13 +288,13 @@ def test_a_downforce_that_is_not_told_is_the_likely_cause_and_told_the_answer_is
         assert float(area) == pytest.approx(right[name], rel=0.25)
     assert "center_of_gravity" not in codes(verdict)
     written = replace(car, **{key: float(area) for key, area in told.items()})
-    assert answer(log, written).verdict().valid
+    assert judge(answer(log, written)).valid
 
 
 def test_without_downforce_none_is_blamed(drive):
     car = sedan()
     swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
-    (one,) = answer(drive, swapped).verdict().findings
+    (one,) = judge(answer(drive, swapped)).findings
     assert "downforce" not in one.text
 
 
@@ -317,7 +316,7 @@ def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
 
 
 def test_a_number_of_a_refused_axle_is_not_valid(drive):
-    verdict = answer(replace(drive, v_y=drive.v_y + 2.0)).verdict()
+    verdict = judge(answer(replace(drive, v_y=drive.v_y + 2.0)))
     assert not [number for number in verdict.numbers if number.valid]
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
     assert len(tires) == 4
@@ -389,7 +388,7 @@ def test_a_v_y_from_the_roof_of_a_car_that_rolls_is_refused(whole):
     roll = -0.012 * whole.a_y  # 6.7 degrees at 1 g, 1.5 m below the sensor
     shaken = replace(whole, v_y=whole.v_y + 1.5 * np.gradient(roll, whole.dt), axle_force=None)
     car = sedan()
-    verdict = identify(shaken, car, make_method("axle", car)).verdict()
+    verdict = judge(identify(shaken, car, make_method("axle", car)))
     assert "lags_too_far" in {one.code for one in verdict.findings if one.refuses}
 
 
@@ -461,7 +460,7 @@ def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
     """Where it is valid, the axles miss less than a seventh of the true force; else one, more."""
     car = sedan()
     run = identify(drive, car, make_method(name, car))
-    verdict = run.verdict()
+    verdict = judge(run)
     missed = run.freeze().axle_force(drive) - drive.axle_force
     share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
     assert verdict.valid == valid
@@ -474,15 +473,15 @@ def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
 def test_a_run_that_went_on_from_a_stored_model_is_judged_with_it(clean, drive):
     """What these seconds teach of the rear axle repeats nowhere; what was stored is known."""
     short, car = drive.between(12.0, 14.5), sedan()
-    assert codes(answer(short).verdict()) == {"not_repeated"}
+    assert codes(judge(answer(short))) == {"not_repeated"}
     went_on = identify(short, car, AxleIdentifier.for_vehicle(car), clean.freeze())
     assert went_on.start is not None
-    assert went_on.verdict().valid
+    assert judge(went_on).valid
 
 
 def test_a_stretch_that_a_sensor_needed_to_settle_is_a_note(drive):
     settling = replace(drive, v_y=drive.v_y + np.clip(ONSET - drive.t, 0.0, 0.5))
-    verdict = answer(settling).verdict()
+    verdict = judge(answer(settling))
     (note,) = [one for one in verdict.findings if one.code == "stretch"]
     assert not note.refuses
     assert verdict.valid
