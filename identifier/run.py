@@ -83,6 +83,11 @@ class History:
     """Of a method that learns from whole logs: the model by number of samples that taught it."""
 
     @property
+    def online(self) -> bool:
+        """Whether forces were identified sample by sample, not from the whole recording at once."""
+        return not self.design.whole
+
+    @property
     def diverged_at(self) -> float | None:
         """Time [s] from which a force is not finite or a hundred times the weight, or None."""
         for part in blocks(len(self.recording)):
@@ -183,6 +188,29 @@ class History:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
 
+    def asked(self, recording: Recording, t: float | None = None) -> "History":
+        """Return what the model frozen at a time says of another recording, which teaches nothing.
+
+        Parameters
+        ----------
+        recording : another drive of the car.
+        t : time of the freeze in this recording's own clock [s]; None is the end.
+
+        Raises
+        ------
+        ValueError
+            Where the run is online: then `identify` runs over the other recording, too.
+        """
+        if self.online:
+            raise ValueError("an online run is beside another drive as of identify")
+        model = self.freeze(t)
+        return replace(
+            self,
+            recording=recording,
+            axle_force=model.axle_force(recording),
+            models={len(recording): model},
+        )
+
     def calibrated(self, t: float | None = None) -> TireModel:
         """Return the model of `freeze`, its `band` calibrated on stretches that did not teach it.
 
@@ -281,7 +309,9 @@ class History:
                 outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
             found.append(
-                replace(self, recording=one, axle_force=force, state=state, outputs=outputs)
+                replace(
+                    self, recording=one, axle_force=force, state=state, outputs=outputs, models={}
+                )
             )
             first = end
         return found

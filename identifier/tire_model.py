@@ -321,7 +321,12 @@ class TireModel(ABC):
         return None
 
     def on_another_road(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        """Return at which times [s] of the drive that taught the road was another one, (n,).
+
+        Parameters
+        ----------
+        t : [s], (n,).
+        """
         return np.zeros(t.shape, dtype=bool)
 
     @property

@@ -39,7 +39,7 @@ from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, resu
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -130,7 +131,7 @@ def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[
         n = max(round(BLOCK / recording.dt), 1)
         count = -(-len(recording) // n)
         edges = np.linspace(0, len(recording), count + 1).astype(int)
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in pairwise(edges):
             seconds = (end - begin) * recording.dt
             if group and length + seconds > BLOCK:
                 yield group

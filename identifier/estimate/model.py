@@ -1,4 +1,4 @@
-"""The tires that an estimate found, frozen: curve, lag, sway, load transfer, ellipse and sensors."""
+"""The tires that an estimate found: curve, lag, sway, load transfer, ellipse and sensors."""
 
 import math
 from dataclasses import dataclass, replace
@@ -145,7 +145,12 @@ class FittedModel(TireModel):
         return np.column_stack(phi), np.column_stack(slope), np.array(J)
 
     def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
         return phi * self._loads
 
@@ -286,7 +291,12 @@ class FittedModel(TireModel):
         return self.speeds
 
     def on_another_road(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        """Return at which times [s] of the drive that taught the road was another one, (n,).
+
+        Parameters
+        ----------
+        t : [s], (n,).
+        """
         found = np.zeros(t.shape, dtype=bool)
         for one in self.segments:
             found |= (t >= one.begin) & (t <= one.end)
@@ -339,7 +349,12 @@ class FittedModel(TireModel):
         return sd
 
     def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         both = np.column_stack([alpha, alpha])
         prior = self._curve_sd(both, _prior_covariance(self.vehicle))
         ratio: Array = self._curve_sd(both, self.covariance) / np.maximum(prior, 1e-12)
@@ -369,7 +384,12 @@ class FittedModel(TireModel):
     def with_calibration(
         self, calibration: BandCalibration | None, force_missed: Array | None = None
     ) -> "FittedModel":
-        """Return the model with what it misses of the drives that taught."""
+        """Return the model with what it misses of the drives that taught.
+
+        Parameters
+        ----------
+        force_missed : share of the force [-], (2,).
+        """
         del calibration
         return replace(self, force_missed=force_missed)
 
@@ -380,6 +400,11 @@ class FittedModel(TireModel):
 
         It has the doubt of the curve and of the sensors' zeros, and the share `missed` of the force
         by which drives of a car differ.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        v_x : [m/s].
 
         Raises
         ------
@@ -397,7 +422,13 @@ class FittedModel(TireModel):
         return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
 
     def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N]."""
+        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
+
+        Parameters
+        ----------
+        slip : [rad], (n, 2).
+        v_x : [m/s], (n,).
+        """
         pressed = self.vehicle.load_ratio(v_x)
         return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
 

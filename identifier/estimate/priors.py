@@ -6,7 +6,7 @@ plant and confirmed once on recordings.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +68,7 @@ ALIKE = {  # standard deviation of front less rear
     "compliance": (0.003, "L"),
     "sway_share": (0.1, ""),
 }
-# At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
+# At one speed a bias of v_y and a mounting angle are one: each takes its half.
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
 FAULTS = (  # what no log leaves open but one that shows it
@@ -152,7 +152,12 @@ class Priors:
         )
 
     def cost(self, p: Array) -> float:
-        """Return -ln of the prior's density over that at its mean [nats]."""
+        """Return -ln of the prior's density over that at its mean [nats].
+
+        Parameters
+        ----------
+        p : as `mean`, (p,).
+        """
         away = p - self.mean
         return float(0.5 * away @ self.information @ away)
 

@@ -1,9 +1,9 @@
 """Where the friction of the road changes inside drives: segments with a grip of their own.
 
 At the estimate without segments the loss of each residual is computed for a grid of frictions m
-(the curve is m φ(x/m)); the piecewise constant friction of least loss, with a price for each change,
-is found by dynamic programming (Viterbi). The segments are then estimated with all parameters, and
-kept where that gains more than the price.
+(the curve is m φ(x/m)); the piecewise constant friction of least loss, with a price for each
+change, is found by dynamic programming (Viterbi). The segments are then estimated with all
+parameters, and kept where that gains more than the price.
 """
 
 from collections.abc import Sequence
