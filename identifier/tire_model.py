@@ -320,7 +320,7 @@ class TireModel(ABC):
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
 
-    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+    def in_segment(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times [s] of the drive that taught the road was another one, (n,).
 
         Parameters

@@ -14,6 +14,7 @@ from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
 from identifier.axle.curve import EDGES
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
+from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
@@ -290,7 +291,7 @@ class FittedModel(TireModel):
         """Least and largest speed [m/s] of the drives that taught, (2,)."""
         return self.speeds
 
-    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+    def in_segment(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times [s] of the drive that taught the road was another one, (n,).
 
         Parameters
@@ -572,7 +573,7 @@ class FittedModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle, segments=())
+        return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
@@ -585,7 +586,28 @@ class FittedModel(TireModel):
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
-        return replace(self, p=p, driven=ratio * self.driven, segments=())
+        driven = ratio * self.driven
+        return replace(self, p=p, driven=driven, segments=(), force_missed=None)
+
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "FittedModel":
+        """Return the model for a road whose friction is not that of the drive that taught.
+
+        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
+
+        Parameters
+        ----------
+        sd_friction : standard deviation of ln μ between the roads [-].
+
+        Raises
+        ------
+        ValueError
+            Where it is negative or not finite.
+        """
+        if not 0.0 <= sd_friction < math.inf:
+            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
+        covariance, k = self.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += sd_friction**2
+        return replace(self, covariance=covariance)
 
     def in_units(self) -> AxleModel:
         """Return the tires in the hidden units of the axle identifier, for C, FMU and tracker.
