@@ -156,8 +156,8 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
                 "from motion alone; what was never excited keeps what is believed of any tire. This "
-                "identifier learns sample by sample, in a car too; of a log, tireid identify makes "
-                "one estimate of all of it."
+                "identifier learns sample by sample, in a car too; tireid identify makes one "
+                "estimate of a whole log."
             ),
             curve_drawing(figures, verdict),
             *learnt_blocks("the axle identifier", model, figures)[1:],
