@@ -155,8 +155,8 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
-                "from motion alone; what was never excited keeps what is believed of any tire. This "
-                "identifier learns sample by sample, in a car too; tireid identify makes one "
+                "from motion alone; what was never excited keeps what is believed of any tire. It "
+                "learns sample by sample, in a car too; tireid identify makes one "
                 "estimate of a whole log."
             ),
             curve_drawing(figures, verdict),

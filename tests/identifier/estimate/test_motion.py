@@ -14,7 +14,8 @@ from tests.identifier.estimate.conftest import driven
 FINE = 10  # steps of the integration in a sample
 SENSORS = {
     "v_y_bias": 0.1, "v_y_angle": 0.01, "v_y_lever": 0.05, "v_y_delay": 0.02,
-    "steering_zero": 0.004, "steering_gain": 0.05, "steering_delay": 0.01, "r_bias": 0.01, "r_delay": 0.01,
+    "steering_zero": 0.004, "steering_gain": 0.05, "steering_delay": 0.01, "r_bias": 0.01,
+    "r_delay": 0.01,
     "v_x_factor": 0.02, "cg_shift": 0.05, "ln_inertia": 0.1, "bank": 0.01, "ln_road": -0.2,
     "compliance_f": 0.03, "compliance_r": 0.04, "residual1_f": 0.05, "residual3_r": -0.04,
 }  # fmt: skip
