@@ -189,7 +189,7 @@ class Replay:
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over all samples against the true force, None without truth.
     against_online : error over all samples, before and after a freeze, against the forces that were
-        identified online over the same recording.
+        identified online over the same recording; None where the method learns from whole logs.
     reproduction : both sides of the freeze, None where the weights were not frozen in this
         recording.
     """
@@ -197,7 +197,7 @@ class Replay:
     recording: Recording
     axle_force: Array
     against_truth: AxleRmse | None
-    against_online: AxleRmse
+    against_online: AxleRmse | None
     reproduction: Reproduction | None = None
 
 
@@ -312,7 +312,8 @@ def reproduce(online: History, t_freeze: float, *, since: float | None = None) -
     truth = recording.axle_force
     past = counted.copy()
     past[np.searchsorted(recording.t, t_freeze - tolerance, side="left") :] = False
-    against_online = _side(whole.axle_force, online.axle_force, past)
+    known = online.axle_force if online.online else None
+    against_online = _side(whole.axle_force, known, past)
     against_truth = _side(whole.axle_force, truth, past)
     after = counted  # itself: a byte for each sample of a hundred hours is not little
     after[: np.searchsorted(recording.t, t_freeze + tolerance, side="right")] = False
@@ -331,7 +332,7 @@ def _side(force: Array, reference: Array | None, where: NDArray[np.bool_]) -> Ax
 
 
 def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
-    """Return the error of the forces identified online, None without truth.
+    """Return the error of the forces identified online, None without truth or without such forces.
 
     Parameters
     ----------
@@ -344,7 +345,7 @@ def online_error(history: History, *, since: float | None = None) -> AxleRmse | 
         Where no sample counts.
     """
     truth = history.recording.axle_force
-    if truth is None:
+    if truth is None or not history.online:
         return None
     counted = counted_samples(history.recording, history.design.min_speed, since)
     return axle_rms(history.axle_force, counted, truth)

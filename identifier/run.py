@@ -79,6 +79,11 @@ class History:
     """Of a method that learns from whole logs: the model by number of samples that taught it."""
 
     @property
+    def online(self) -> bool:
+        """Whether forces were identified sample by sample, not from the whole recording at once."""
+        return not self.design.whole
+
+    @property
     def diverged_at(self) -> float | None:
         """Time [s] from which a force is not finite or a hundred times the weight, or None."""
         for part in blocks(len(self.recording)):
@@ -200,7 +205,9 @@ class History:
                 outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
             found.append(
-                replace(self, recording=one, axle_force=force, state=state, outputs=outputs)
+                replace(
+                    self, recording=one, axle_force=force, state=state, outputs=outputs, models={}
+                )
             )
             first = end
         return found

@@ -86,7 +86,12 @@ class Drive:
         )
 
     def on(self, ln_m: Array | float) -> "Drive":
-        """Return the drive on roads of other frictions: ln of each over that of the curves."""
+        """Return the drive on roads of other frictions.
+
+        Parameters
+        ----------
+        ln_m : ln of each sample's friction over that of the curves, (n,) or one.
+        """
         signals = self.signals.copy()
         signals[:, 7] = ln_m
         return replace(self, signals=signals)
@@ -128,13 +133,24 @@ def _piece(
 
 
 def gradient(signal: Array, dt: float) -> Array:
-    """Return d/dt by central differences, (n,)."""
+    """Return d/dt by central differences, (n,).
+
+    Parameters
+    ----------
+    signal : (n,).
+    dt : [s].
+    """
     slope: Array = np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
     return slope
 
 
 def box(signal: Array, count: float) -> Array:
-    """Return the centered mean over an odd count of samples, edges held, (n,)."""
+    """Return the centered mean over an odd count of samples, edges held, (n,).
+
+    Parameters
+    ----------
+    signal : (n,).
+    """
     width = max(1, int(count) | 1)
     if width == 1:
         return np.array(signal, dtype=np.float64)

@@ -14,6 +14,7 @@ from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
 from identifier.axle.curve import EDGES
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
+from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
@@ -148,7 +149,12 @@ class FittedModel(TireModel):
         return np.column_stack(phi), np.column_stack(slope), np.array(J)
 
     def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
         return phi * self._loads
 
@@ -356,7 +362,12 @@ class FittedModel(TireModel):
         return sd
 
     def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         both = np.column_stack([alpha, alpha])
         prior = self._curve_sd(both, _prior_covariance(self.vehicle))
         ratio: Array = self._curve_sd(both, self.covariance) / np.maximum(prior, 1e-12)
@@ -386,7 +397,12 @@ class FittedModel(TireModel):
     def with_calibration(
         self, calibration: BandCalibration | None, force_missed: Array | None = None
     ) -> "FittedModel":
-        """Return the model with what it misses of the drives that taught."""
+        """Return the model with what it misses of the drives that taught.
+
+        Parameters
+        ----------
+        force_missed : share of the force [-], (2,).
+        """
         del calibration
         return replace(self, force_missed=force_missed)
 
@@ -397,6 +413,11 @@ class FittedModel(TireModel):
 
         It has the doubt of the curve and of the sensors' zeros, and the share `missed` of the force
         by which drives of a car differ.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        v_x : [m/s].
 
         Raises
         ------
@@ -414,7 +435,13 @@ class FittedModel(TireModel):
         return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
 
     def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N]."""
+        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
+
+        Parameters
+        ----------
+        slip : [rad], (n, 2).
+        v_x : [m/s], (n,).
+        """
         pressed = self.vehicle.load_ratio(v_x)
         return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
 
@@ -559,7 +586,7 @@ class FittedModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle, segments=())
+        return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
@@ -572,7 +599,28 @@ class FittedModel(TireModel):
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
-        return replace(self, p=p, driven=ratio * self.driven, segments=())
+        driven = ratio * self.driven
+        return replace(self, p=p, driven=driven, segments=(), force_missed=None)
+
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "FittedModel":
+        """Return the model for a road whose friction is not that of the drive that taught.
+
+        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
+
+        Parameters
+        ----------
+        sd_friction : standard deviation of ln μ between the roads [-].
+
+        Raises
+        ------
+        ValueError
+            Where it is negative or not finite.
+        """
+        if not 0.0 <= sd_friction < math.inf:
+            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
+        covariance, k = self.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += sd_friction**2
+        return replace(self, covariance=covariance)
 
     def in_units(self) -> AxleModel:
         """Return the tires in the hidden units of the axle identifier, for C, FMU and tracker.

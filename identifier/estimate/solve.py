@@ -139,7 +139,12 @@ class Problem:
             )
 
     def memory(self, e: Array) -> Array:
-        """Return T of both axles [s], (2,), from the correlation of residuals (m, 2)."""
+        """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        """
         found = np.empty(2)
         step = self.weight[0]
         lags = int(LONGEST_MEMORY / step) + 1
@@ -165,7 +170,12 @@ class Problem:
         return np.maximum(found, SHORTEST_MEMORY)
 
     def scale(self, e: Array) -> Array:
-        """Return S² of both axles, (2,), by expectation maximization."""
+        """Return S² of both axles, (2,), by expectation maximization.
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        """
         S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, LEAST_SCALE) ** 2
         total = self.weight.sum()
         for _ in range(8):
@@ -174,13 +184,27 @@ class Problem:
         return S2
 
     def cost(self, e: Array, p: Array, T: Array) -> float:
-        """Return J of residuals at parameters when a second of them counts 1/T times [nats]."""
+        """Return J of residuals at parameters when a second of them counts 1/T times [nats].
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        p : (p,).
+        T : [s], (2,).
+        """
         S2 = self.scale(e)
         scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
         return self.misfit(e, S2, T) + _beliefs(self.priors, p) + scales
 
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
-        """Return Σ w/T ρ(e) [nats]."""
+        """Return Σ w/T ρ(e) [nats].
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        S2 : [-], (2,).
+        T : [s], (2,).
+        """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
 
@@ -193,7 +217,13 @@ def car_numbers(vehicle: Vehicle) -> Array:
 
 
 def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
-    """Return the inputs of a compiled motion over a drive."""
+    """Return the inputs of a compiled motion over a drive.
+
+    Parameters
+    ----------
+    p : as `motion.parameters` lists them (p,).
+    car : of `car_numbers`, (6,).
+    """
     more = {}
     if "tangent" in scan.carry:
         more = {"tangent": np.zeros(scan.step.numel_in("tangent"))}
@@ -210,7 +240,12 @@ def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
 
 
 def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
-    """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port."""
+    """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port.
+
+    Parameters
+    ----------
+    p : as `motion.parameters` lists them (p,).
+    """
     scan = motion_scan()
     return scan(
         len(one.signals),
@@ -342,6 +377,10 @@ def softness(p: Array) -> tuple[Array, Array]:
     """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
 
     No tire has less than a quarter of C there: play in the steering looks so.
+
+    Parameters
+    ----------
+    p : (p,).
 
     Returns
     -------

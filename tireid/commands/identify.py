@@ -39,6 +39,7 @@ from tireid.commands.identify_results import (
     file_name,
     guaranteed_text,
     network_table,
+    no_truth,
     write_network_results,
     write_results,
 )
@@ -147,7 +148,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = read_vehicle(options)
     seed = None if options.seed is None else seed_of(options)
-    law, design = chosen_method(options, vehicle, seed)
+    beside = options.network is not None  # of which something learns online
+    law, design = chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     bound = None if options.bound is None else AskedBound.of(options.bound)
@@ -176,7 +178,7 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
-        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y)
+        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y, online=beside)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
@@ -198,6 +200,9 @@ def run(options: argparse.Namespace) -> int:
         histories: list[History] = []
         pieces: list[History] = []
         for k, one in enumerate((recording, *others)):
+            if design.whole and histories:
+                histories.append(histories[0].asked(one, freeze_times[-1]))
+                continue
             share = progress.within(k / count, (k + 1) / count)
             histories.append(  # checked when they were read
                 identify(one, vehicle, design, start=start, check=False, progress=share).history
@@ -300,11 +305,13 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
+    reach = f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)"
+    if not learnt.online:
+        return reach
     told = side_slip_text(learnt)
     return (f"{told}\n" if told else "") + (
-        f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)\n"
-        f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
-        "covariance stay in their boxes by construction (summary.json lists them)"
+        f"{reach}\ncertificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets "
+        "and covariance stay in their boxes by construction (summary.json lists them)"
     )
 
 
@@ -367,7 +374,7 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            note = "" if sizes[name] is not None else "(against online, no truth)"
+            note = no_truth(error, sizes[name])
             cells = error_cells(error, sizes[name])
             rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
             sides = result.reproduction
