@@ -102,7 +102,9 @@ class Problem:
             given = arguments(driven, p, self._car, scan)
             out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
             e.append(out["missed"][self._kept[k]])
-        return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
+        whole: Array = np.concatenate(e) / self.size[:, None]
+        found: Array = np.nan_to_num(whole, nan=1e3, posinf=1e3)
+        return found
 
     def residuals(self, p: Array) -> Residuals:
         """Return what the balance misses, and its slopes.
