@@ -28,8 +28,8 @@ VEHICLE_KEYS = ("name", *BICYCLE)
 def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
 
-    Where the car has downforce its areas follow, and what else of `LENGTHWISE` it tells; where some numbers are estimated, `estimated`
-    lists which.
+    Where the car has downforce its areas follow, and what it tells of `LENGTHWISE`; where some
+    numbers are estimated, `estimated` lists which.
     """
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
     if vehicle.has_downforce:

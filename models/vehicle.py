@@ -543,8 +543,8 @@ class Vehicle:
         """Read a vehicle from a TOML file: mass, l_f, l_r and what else is known of it.
 
         Name, yaw inertia, cornering stiffnesses, areas of downforce, what `LENGTHWISE` names and
-        the table [chassis] may be left out; inertia and stiffnesses are estimated then, see `estimated`, and the axles carry
-        their static loads at any speed.
+        the table [chassis] may be left out; inertia and stiffnesses are estimated then, see
+        `estimated`, and the axles carry their static loads at any speed.
 
         Parameters
         ----------

@@ -177,7 +177,7 @@ class FittedModel(TireModel):
         return float(scaled) if scaled.ndim == 0 else scaled
 
     def ratio(self, v_x: Array, a_x: Array) -> Array:
-        """Return λ G, load and ellipse: force over that at static load of a car that coasts, (k, 2).
+        """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 """What a log must tell of a car, and how one of these signals is read from channels.
 
-SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y, a_x [m/s²], axle
-forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
+SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y, a_x [m/s²],
+axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
 """
 
 import math

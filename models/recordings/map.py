@@ -52,8 +52,8 @@ class LogMap:
 
     Parameters
     ----------
-    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, a_x, Fyf, Fyr) how it
-        is read.
+    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, a_x, Fyf, Fyr) how
+        it is read.
     axes : of the file: "ISO" (y to the left, z up) or "SAE" (y to the right, z down).
     run : which of the file's runs; empty where there is one.
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
