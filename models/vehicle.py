@@ -397,7 +397,7 @@ class Vehicle:
 
     def without_chassis(self) -> "Vehicle":
         """Return the car alone, with the numbers of `OF_CHASSIS` that its chassis tells."""
-        told = {name: self.lengthwise(name) for name in OF_CHASSIS}
+        told: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}
         return replace(self, chassis=None, **told)
 
     @property
