@@ -41,6 +41,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "guaranteed": [],
     "guaranteed_faster": [],
     "road_friction": [],
+    "braking": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],

@@ -164,7 +164,7 @@ class FittedModel(TireModel):
         axle: Axle | None = None,
         *,
         v_x: float | None = None,
-        a_x: float = 0.0,
+        a_x: float | None = None,
     ) -> float | Array:
         """Return the steady lateral force at slip angles, the wheels straight ahead [N].
 
@@ -172,24 +172,29 @@ class FittedModel(TireModel):
         ----------
         alpha, axle, v_x : as of `TireModel.force`.
         a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
-            shift load between the axles.
+            shift load between the axles. None is of tires that push nothing lengthwise, as those
+            of a car that coasts.
         """
         found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
+        if a_x is None:
+            return found if found.ndim else float(found)
         speed = self.curve_speed if v_x is None else v_x
-        ratio = self.ratio(np.array([speed]), np.array([a_x]))[0]
-        ratio = ratio / self.ratio(np.array([speed]), np.zeros(1))[0]
+        coasting = -self.vehicle.drag * speed**2
+        moving, plain = self.ratio(np.full(2, speed), np.array([a_x, coasting]))
+        ratio = moving / plain
         scaled: Array = found * (ratio if axle is None else ratio[AXLES.index(axle)])
         return float(scaled) if scaled.ndim == 0 else scaled
 
     def ratio(self, v_x: Array, a_x: Array) -> Array:
-        """Return λ G, load and ellipse: force over that at static load and a_x = 0, (k, 2).
+        """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
 
         Parameters
         ----------
         v_x : speeds [m/s], (k,).
         a_x : longitudinal accelerations [m/s²], (k,).
         """
-        car, f = self.vehicle, np.asarray(a_x) / GRAVITY
+        car = self.vehicle
+        f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
         moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
         load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
         drive = np.array([self["driving_f"], self["driving_r"]])
@@ -712,7 +717,7 @@ class FittedModel(TireModel):
         return {
             "format": FORMAT,
             "kind": self.kind,
-            "vehicle": vehicle_numbers(self.vehicle),
+            "vehicle": vehicle_numbers(self.vehicle.without_chassis()),
             "parameters": {
                 one.name: {"value": float(value), "unit": one.unit, "sd": float(math.sqrt(var))}
                 for one, value, var in zip(

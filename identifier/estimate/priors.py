@@ -16,6 +16,10 @@ from codegen.arrays import Array
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import Vehicle
 
+LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
+LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
+SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
+SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse where a share is told: of it; least
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
 
@@ -122,6 +126,8 @@ class Priors:
             k, size = INDEX[name], unit[belief.per]
             mean[k], sd[k] = size * belief.mean, size * belief.sd
             low[k], high[k] = size * belief.low, size * belief.high
+        for name, (value, doubt) in _told(vehicle).items():
+            mean[INDEX[name]], sd[INDEX[name]] = value, doubt
         for name, value in wide.items():
             sd[INDEX[name]] = value
         for name in fixed:
@@ -170,6 +176,26 @@ class Priors:
         curvature[TYPED, TYPED] *= (TAILS + 1.0) / (TAILS + typed * away[TYPED] ** 2)
         gradient: Array = curvature @ away
         return gradient, curvature
+
+
+def _told(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of what follows from numbers that a car tells, by name.
+
+    An axle of share s that pushes f weights uses s W f/μ of its grip, W weights per static load.
+    """
+    L, grip = vehicle.wheelbase, np.exp(OF_AXLES["ln_grip"].mean)
+    told: dict[str, tuple[float, float]] = {}
+    if (height := vehicle.lengthwise("cg_height")) is not None:
+        told["load_transfer"] = LESS_LOAD * height / L, SURE_HEIGHT
+    for name, share in (("driving", "drive_front_share"), ("braking", "brake_front_share")):
+        if (front := vehicle.lengthwise(share)) is not None:
+            for axle, part, W in (
+                ("f", front, L / vehicle.l_r),
+                ("r", 1.0 - front, L / vehicle.l_f),
+            ):
+                use = float(LESS_USE * part * W / grip)
+                told[f"{name}_{axle}"] = use, max(SURE_SHARE * use, LEAST_USE)
+    return told
 
 
 def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:

@@ -212,10 +212,12 @@ class Problem:
 
 
 def car_numbers(vehicle: Vehicle) -> Array:
-    """Return the numbers of `CarNumbers`, (6,)."""
+    """Return the numbers of `CarNumbers`, (7,)."""
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
     omega = min(5.0 * np.sqrt(GRAVITY / vehicle.wheelbase), 60.0)
-    return np.array(CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce))
+    return np.array(
+        CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce, vehicle.drag)
+    )
 
 
 def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:

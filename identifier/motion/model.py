@@ -9,7 +9,7 @@ exactly for α linear over a step.
 Curve on a road of m times the friction:   φ(x) = m φ_0(x/m),
 φ_0 = μ sin(c atan u) + Σ q_j tanh(x/a_j),   u = B x - E (B x - atan B x),   B = C/(c μ)
 (Pacejka, Tyre and Vehicle Dynamics, 4.3, and what it misses).
-Load and ellipse, f = a_x/g:   λ_i = max(1 ∓ (h L/l_o) f + κ_i v_x², 0.2),
+Load and ellipse, f = (a_x + d v_x²)/g, d of the drag:   λ_i = max(1 ∓ (h L/l_o) f + κ_i v_x², 0.2),
 G_i = sqrt(max(1 - (c_i f)², 0.05)).
 Force over the static load:   F_i = λ_i G_i φ_i(x_i) cos δ_i.
 Balance of an axle (`axle.car`):   ξ_i' + v_x r/g - F_i - bank = 0. Missed, through a filter of
@@ -49,7 +49,9 @@ CARRIED = (
 
 
 class CarNumbers(NamedTuple):
-    """l_f, l_r [m], I_z/(m g) [s²], ω of the sway [rad/s], κ of the downforce (2) [s²/m²]."""
+    """l_f, l_r [m], I_z/(m g) [s²], ω of the sway [rad/s], κ of the downforce (2) [s²/m²], d of
+    the drag [1/m].
+    """
 
     l_f: Any
     l_r: Any
@@ -57,6 +59,7 @@ class CarNumbers(NamedTuple):
     omega: Any
     press_f: Any
     press_r: Any
+    drag: Any
 
 
 class Dual(NamedTuple):
@@ -93,7 +96,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     """Return the model as a compiled loop.
 
     Its ports: `state` (16,) and `tangent` are carried, `signals` (9,) and `rates` (3,) have a row
-    a sample, `parameters` (p,), `car` (6,) and `dt` are constant; `force` (2,) [static loads],
+    a sample, `parameters` (p,), `car` (7,) and `dt` are constant; `force` (2,) [static loads],
     `missed` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
     `missed_slopes` (2, n) come out.
 
@@ -338,9 +341,10 @@ def _axle(
     curve = Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
     value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
     # Load and ellipse.
-    phi0, height, brake, drive, cg, f, speed = (
-        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "f", "v")
+    phi0, height, brake, drive, cg, felt, speed = (
+        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "a_x", "v")
     )
+    f = (felt + car.drag * speed**2) / GRAVITY
     other = (car.l_r + cg) if front else (car.l_f - cg)
     shifted = (-height if front else height) * L / other * f
     press = car.press_f if front else car.press_r
@@ -348,15 +352,14 @@ def _axle(
     load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
     use = ca.if_else(f > 0, drive, brake) * f
     left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
-    a_x = Dual(signals["a_x"].value / GRAVITY, signals["a_x"].slopes)
-    (force,) = Stage([phi0, height, brake, drive, cg, f, speed], [phi0 * load * left])(
+    (force,) = Stage([phi0, height, brake, drive, cg, felt, speed], [phi0 * load * left])(
         [
             value,
             p["load_transfer"],
             p[f"braking_{axle}"],
             p[f"driving_{axle}"],
             p["cg_shift"],
-            a_x,
+            signals["a_x"],
             v_x,
         ]
     )
