@@ -704,7 +704,7 @@ class FittedModel(TireModel):
                 "parameters": self.p,
                 "dt": np.array(dt),
                 "car": car_numbers(self.vehicle),
-                "plausibility": limits.numbers(),
+                "plausibility": np.array(limits.numbers()),
                 "loads": self._loads,
             },
             ends_run=limits.rest(dt),

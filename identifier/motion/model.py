@@ -26,7 +26,8 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
-from identifier.axle.gate import GateState, gate
+from identifier.axle.car import named_port
+from identifier.axle.gate import GateNumbers, GateState, gate
 from identifier.axle.slip import SHORTEST
 from identifier.motion.parameters import NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
@@ -109,7 +110,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     signal_port, signals = _symbols(SIGNALS)
     rate_port, rates = _symbols(RATES)
     parameter_port, parameters = _symbols(NAMES)
-    car_port = ca.SX.sym("car", len(CarNumbers._fields))
+    car_port, car = named_port(CarNumbers, "car")
     dt = ca.SX.sym("dt")
     was_on = ca.SX.sym("was_on")
     duals = {name: Dual(parameters[name], _unit(name, columns)) for name in NAMES}
@@ -120,7 +121,6 @@ def motion_scan(columns: Columns = ()) -> Scan:
     while True:  # which parameters each state can depend on
         tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
         before = {name: Dual(old[name], tangents[name]) for name in CARRIED}
-        car = CarNumbers(*ca.vertsplit(car_port))
         after, out = _step(before, fixed, duals, car, dt, first)
         grown = {
             name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
@@ -410,12 +410,13 @@ REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
 def replay_step() -> ca.Function:
     """Return the model as a step: axle_force [N], lagged slip and the larger slip [rad], (2,)."""
     state_port, old = _symbols(REPLAYED)
-    gate_port = ca.SX.sym("gate", len(GateState._fields))
+    gate_port, last = named_port(GateState, "gate")
     x, u, v_x, dt = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x"), ca.SX.sym("dt")
     parameter_port, parameters = _symbols(NAMES)
-    car_port, limits = ca.SX.sym("car", len(CarNumbers._fields)), ca.SX.sym("plausibility", 15)
+    car_port, car = named_port(CarNumbers, "car")
+    limit_port, limits = named_port(GateNumbers, "plausibility")
     loads = ca.SX.sym("loads", 2)
-    g = gate(limits, dt, GateState(*ca.vertsplit(gate_port)), x, u, v_x)
+    g = gate(limits, dt, last, x, u, v_x)
     slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
     a_x = (g.v_x - slow) / LAG_OF_A_X - g.v_y * g.r
     following = g.v_x + (slow - g.v_x) * ca.exp(-dt / LAG_OF_A_X)
@@ -427,7 +428,6 @@ def replay_step() -> ca.Function:
     }
     duals = {name: Dual(parameters[name], nothing) for name in NAMES}
     before = {name: Dual(old.get(name, 0), nothing) for name in CARRIED}
-    car = CarNumbers(*ca.vertsplit(car_port))
     after, out = _step(before, fixed, duals, car, dt, g.first)
     slip = ca.vertcat(*(axis.value for axis in out["x"]))
     alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
@@ -435,7 +435,7 @@ def replay_step() -> ca.Function:
     force = ca.if_else(g.on, loads * ca.vertcat(*(axis.value for axis in out["F"])), 0)
     return ca.Function(
         "motion_replay",
-        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limits, loads],
+        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limit_port, loads],
         [
             g.state,
             ca.vertcat(*motion, following),
