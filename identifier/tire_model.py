@@ -325,7 +325,7 @@ class TireModel(ABC):
         return None
 
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
         return np.zeros(t.shape, dtype=bool)
 
     @property
