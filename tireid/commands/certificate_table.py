@@ -7,7 +7,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.driving import Driving
-from identifier.methods import DEFAULT, certify
+from identifier.methods import LIVE, certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.setup import force_unit_name
@@ -74,7 +74,7 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
     certificate : what is proven of it.
     driving : conditions of the drop of friction.
     """
-    default = ", the default of tireid identify" if name == DEFAULT else ""
+    default = ", the default in a car" if name == LIVE else ""
     rows = [
         [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
         for title, value in certificate.held.items()
@@ -93,7 +93,7 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
         [
             *lines,
             f"verdict: {certificate.verdict}; no margin and no bound of its error is proven, of "
-            f"{DEFAULT}, the default, there are: tireid check",
+            f"{LIVE}, the default in a car, there are: tireid check",
         ]
     )
 

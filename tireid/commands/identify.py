@@ -10,6 +10,7 @@ from codegen.escape import visible
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
+from identifier.methods import DEFAULT, WITHOUT_V_Y
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -167,7 +168,7 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        law, design = chosen_method(options, vehicle, seed, without_v_y=True)
+        law, design = chosen_method(options, vehicle, seed, usual=WITHOUT_V_Y)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):
         check_recording(one, design)
@@ -177,7 +178,8 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
-        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y)
+        usual = WITHOUT_V_Y if without_v_y else DEFAULT
+        law, design = chosen_method(options, vehicle, seed, usual=usual)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)

@@ -17,7 +17,6 @@ from identifier.methods import (
     DEFAULT,
     METHODS,
     REFERENCE,
-    WITHOUT_V_Y,
     draws_weights,
     make_method,
 )
@@ -211,18 +210,19 @@ def jobs_of(options: argparse.Namespace) -> int:
 # What learns: a method by its name, the paper's, or the design in a file.
 
 
-def add_method(parser: argparse.ArgumentParser) -> None:
+def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
     Parameters
     ----------
     parser : of a command.
+    usual : the default.
     """
     parser.add_argument(
         "--method",
         choices=METHODS,
         metavar="NAME",
-        help=f"what learns: {', '.join(METHODS)} (default: {DEFAULT})",
+        help=f"what learns: {', '.join(METHODS)} (default: {usual})",
     )
     parser.add_argument(
         "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"
@@ -258,14 +258,14 @@ def chosen_method(
     vehicle: Vehicle,
     seed: int | None = None,
     *,
-    without_v_y: bool = False,
+    usual: str = DEFAULT,
 ) -> Chosen:
     """Return what --method, --paper or --design say, the default where none is given.
 
     Parameters
     ----------
     seed : of initial weights; None where nobody asks for one.
-    without_v_y : whether a log has no lateral velocity, which changes the default.
+    usual : the default.
 
     Raises
     ------
@@ -278,7 +278,6 @@ def chosen_method(
             raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
         design = read_design(options.design)
         return Chosen(design.law, design)
-    usual = WITHOUT_V_Y if without_v_y else DEFAULT
     name = options.method or (REFERENCE if options.paper else usual)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
