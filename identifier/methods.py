@@ -81,7 +81,7 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
     AxleModel.kind: lambda model, vehicle, dt: (
         InertialIdentifier if model.tells_v_y else AxleIdentifier
     ).for_vehicle(vehicle, dt=dt),
-    FittedModel.kind: lambda model, vehicle, dt: AxleIdentifier.for_vehicle(vehicle, dt=dt),
+    FittedModel.kind: lambda _, vehicle, dt: AxleIdentifier.for_vehicle(vehicle, dt=dt),
     NetworkModel.kind: lambda model, vehicle, dt: PaperIdentifier.for_vehicle(
         vehicle, network=model.network, dt=dt
     ),

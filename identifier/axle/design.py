@@ -39,7 +39,7 @@ from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, resu
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 
@@ -249,9 +249,7 @@ class AxleIdentifier(Method):
 
     def _resumed(self, start: TireModel) -> AxleModel:
         """Return stored weights to begin with, of this structure."""
-        return resumed(
-            start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
-        )
+        return resumed(start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
 
     def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.

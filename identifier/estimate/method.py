@@ -14,7 +14,6 @@ from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import Vehicle
 
-
 PORTS = (
     AXLE_FORCE,
     Port("lagged_slip", "rad", "slip angles that make the forces, paper's sign"),

@@ -1,4 +1,4 @@
-"""The tires that an estimate found, frozen: curve, lag, sway, load transfer, ellipse and sensors."""
+"""The tires that an estimate found, frozen: curve, lag, sway, load transfer, ellipse, sensors."""
 
 import math
 from dataclasses import dataclass, replace

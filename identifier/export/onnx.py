@@ -233,9 +233,7 @@ HALF_BANDS = (
 AddBand = Callable[[Graph, int, str, str], None]  # axle, names of the units and of the force
 
 
-def axle_graph(
-    model: AxleModel, *, single: bool = False, add_band: AddBand | None = None
-) -> bytes:
+def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | None = None) -> bytes:
     """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
 
     Of a car with downforce those of the static loads.
@@ -320,7 +318,7 @@ def _of_curve(model: AxleModel, P: Array, axle: int) -> Array:
 
 
 def _band_of_fit(source: FittedModel, graph: Graph, axle: int, units: str, force: str) -> None:
-    """Add half the width of the band of an axle, as `FittedModel.half_band`; see `_band_of_axle`."""
+    """Add half the width of the band of an axle, as of a fit; arguments as of `_band_of_axle`."""
     nodes, model = _Nodes(graph, HALF_BANDS[axle].name), source.in_units()
     load = model.vehicle.axle_loads[axle]
     h = nodes.sensitivity(model, axle, units, float(source.speeds.mean()))
