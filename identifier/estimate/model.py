@@ -722,7 +722,7 @@ def _units_fit(ladder: tuple[float, ...], reach: float) -> tuple[Array, Array]:
     weight = np.where(slip <= reach, 1.0, BEYOND)
     T = unit_matrix(slip, ladder)
     damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(ladder))])
-    pseudo: Array = np.linalg.pinv(damped)[:, : slip.size] * weight
+    pseudo: Array = np.asarray(np.linalg.pinv(damped)[:, : slip.size] * weight, dtype=np.float64)
     return slip, pseudo
 
 

@@ -4,7 +4,7 @@ F = λ Σ_j w_j tanh(α'/α_j) cos δ per axle; lag σ = max(s λ Σ_j w_j/α_j 
 λ = 1 + κ v_x² is the load of the axle over the static one, 1 where the car has no downforce.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import casadi as ca
@@ -191,11 +191,13 @@ def fit_tire(model: FittedModel) -> PredictionTire:
     ----------
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
-    structure, weights, vehicle, _ = axle_tire(model.in_units())
+    units = model.in_units()
+    _, weights, vehicle, _ = axle_tire(units)
     weights[1] = model["v_y_bias"]
     weights = np.concatenate([weights, [model["v_y_angle"], model["steering_gain"]]])
     doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
-    return PredictionTire(replace(structure, mounted=True), weights, vehicle, doubt)
+    structure = LadderAxles(units=len(units.ladder), pressed=vehicle.has_downforce, mounted=True)
+    return PredictionTire(structure, weights, vehicle, doubt)
 
 
 def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
