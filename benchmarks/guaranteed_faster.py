@@ -24,6 +24,7 @@ from benchmarks.guaranteed import Asked, asked, learnt
 from benchmarks.random_cars import CLASSES, FIRST_SEED
 from benchmarks.targets import Targets, keeps
 from identifier.axle import AxleModel
+from identifier.verdict import guaranteed
 from models.maneuvers import Slalom
 from models.plant import PlantError
 
@@ -42,7 +43,7 @@ def plant_case(job: tuple[str, int]) -> list[tuple[float, dict[str, Asked]]]:
     """
     kind, seed = job
     drive = drawn(kind, seed)
-    model = learnt(drive.log(np.random.default_rng([seed, 1])), drive.car.told).guaranteed()
+    model = guaranteed(learnt(drive.log(np.random.default_rng([seed, 1])), drive.car.told))
     assert isinstance(model, AxleModel) and model.guarantee is not None
     models = {
         "": model,

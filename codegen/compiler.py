@@ -19,6 +19,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from codegen.errors import TireidError
 from codegen.writing import write_file
 
 # Where compiled code is kept between runs: what is found there, this user put there.
@@ -163,7 +164,7 @@ LONG = 50_000  # characters of a source, beyond which to optimize it takes longe
 KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
 
 
-class CompilationError(RuntimeError):
+class CompilationError(TireidError, RuntimeError):
     """The C compiler refused generated code; the message holds its first lines."""
 
 

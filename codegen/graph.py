@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 
 OPERATIONS: Mapping[int, str] = {
     getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
@@ -44,7 +45,7 @@ BUILDERS: Mapping[str, Callable[..., Any]] = {
 }
 
 
-class UnknownOperationError(ValueError):
+class UnknownOperationError(TireidError, ValueError):
     """A function holds an operation that has no plain C of its own."""
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.clean_c import OWN, Statements, recognized
+from codegen.errors import TireidError
 from codegen.escape import c_comment, c_string
 from codegen.graph import graph_of
 from codegen.template import Values, Words, filled
@@ -29,7 +30,7 @@ TAKEN = ("null", "jac", "hess")  # names that CasADi gives no function
 CMAKE = Path(__file__).with_name("package_cmake.txt")
 
 
-class PackageNameError(ValueError):
+class PackageNameError(TireidError, ValueError):
     """A name that cannot begin the symbols of a C library."""
 
 

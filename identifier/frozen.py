@@ -6,6 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.rules import LARGEST_FORCE
 from models.schema import Table
 from models.vehicle import AREAS, BICYCLE, Vehicle
@@ -13,7 +14,7 @@ from models.vehicle import AREAS, BICYCLE, Vehicle
 FORMAT = "tireid frozen model 1"
 
 
-class FrozenModelError(ValueError):
+class FrozenModelError(TireidError, ValueError):
     """A file does not hold a frozen model; the message names the file and what is wrong."""
 
 

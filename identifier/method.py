@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.setup import AXLE_FORCE, HALF_BAND, Block, Port, Setup
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from identifier.inertial.beliefs import Body
 
 
-class CannotFreezeError(ValueError):
+class CannotFreezeError(TireidError, ValueError):
     """The method estimates a signal: there is no model of the tire to freeze."""
 
 

@@ -31,6 +31,7 @@ from identifier.paper.design import VARIANTS, PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.regression import RegressionIdentifier
 from identifier.tire_model import TireModel
+from models.rules import require_kind
 from models.vehicle import Vehicle
 
 Factory = Callable[[Vehicle, int], Method]
@@ -134,11 +135,28 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
     return LEARNERS[model.kind](model, vehicle, dt)
 
 
-def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+def methods() -> tuple[str, ...]:
+    """Return the names of all methods, the default first."""
+    return tuple(METHODS)
+
+
+def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
     """Return what is proven of a method: what the method itself says.
 
     Parameters
     ----------
+    method : a method, or its name as of `methods`.
     driving : how hard it is driven; None takes what the method was designed for.
+
+    Raises
+    ------
+    ValueError
+        Where no method has that name.
+    TypeError
+        Where an argument is of another kind.
     """
+    require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
+    if isinstance(method, str):
+        method = make_method(method, vehicle)
+    require_kind(Method, "as of make_method, or a name of methods()", method=method)
     return method.certify(vehicle, driving)

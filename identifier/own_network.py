@@ -15,6 +15,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.writing import write_file
 from identifier.frozen import (
     FORMAT,
@@ -48,7 +49,7 @@ BY_COUNT = {
 }  # what the columns mean where nobody says
 
 
-class UnusableNetworkError(ValueError):
+class UnusableNetworkError(TireidError, ValueError):
     """The network is not one of a tire, or uses what cannot be read; the message says what."""
 
 

@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
+from codegen.errors import TireidError
 from identifier.method import Method, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.rerun import Recalled, Rerun, holds
@@ -19,14 +19,10 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from identifier.axle.guarantee import ForceBound
-    from identifier.verdict import Verdict  # which runs the method again, on parts of the drive
-
 IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
 
 
-class DivergedError(ArithmeticError):
+class DivergedError(TireidError, ArithmeticError):
     """The law diverged before the instant that was asked for."""
 
 
@@ -81,6 +77,11 @@ class History:
     start: TireModel | None = None
     models: dict[int, TireModel] = field(default_factory=dict)
     """Of a method that learns from whole logs: the model by number of samples that taught it."""
+
+    @property
+    def online(self) -> bool:
+        """Whether forces were identified sample by sample, not from the whole recording at once."""
+        return not self.design.whole
 
     @property
     def diverged_at(self) -> float | None:
@@ -183,83 +184,6 @@ class History:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
 
-    def calibrated(self, t: float | None = None) -> TireModel:
-        """Return the model of `freeze`, its `band` calibrated on stretches that did not teach it.
-
-        It takes as long as four times what learning took. Where the method has no band, or too
-        little is driven, it is the frozen model.
-
-        Parameters
-        ----------
-        t : time of the freeze in the recording's own clock [s]; None is the end.
-
-        Raises
-        ------
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the recording begins after that time.
-        """
-        from identifier.verdict import calibrated
-
-        return calibrated(self, t)
-
-    def guaranteed(
-        self,
-        bound: "float | ForceBound | None" = None,
-        t: float | None = None,
-        model: TireModel | None = None,
-    ) -> TireModel:
-        """Return the model of `freeze` with a guaranteed band: what no curve can leave.
-
-        Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
-        lies in `guaranteed_band`. It is the frozen model where the method learns no curve of slip,
-        no lateral velocity was measured, or too little is driven.
-
-        Parameters
-        ----------
-        bound : e of both axles [static axle loads], or e and τ of each, as a `ForceBound`; None
-            estimates them from the drive.
-        t : time of the freeze in the recording's own clock [s]; None is the end.
-        model : frozen at that time, which is to carry it, as of `calibrated`; None freezes one.
-
-        Raises
-        ------
-        BoundViolatedError
-            Where no curve keeps a bound that was told.
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the recording begins after that time, or the bound is impossible.
-        """
-        from identifier.verdict import guaranteed
-
-        return guaranteed(self, bound, t, model)
-
-    def verdict(self, t: float | None = None) -> "Verdict":
-        """Return whether the answer is good, and what speaks against it; computed at each call.
-
-        Parameters
-        ----------
-        t : time of the freeze in the recording's own clock [s]; None is the end.
-
-        Raises
-        ------
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the recording begins after that time.
-        """
-        from identifier.verdict import judge
-
-        return judge(self, t)
-
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
         """Return the run over each of the recordings that the drive was joined of.
 
@@ -281,7 +205,9 @@ class History:
                 outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
             found.append(
-                replace(self, recording=one, axle_force=force, state=state, outputs=outputs)
+                replace(
+                    self, recording=one, axle_force=force, state=state, outputs=outputs, models={}
+                )
             )
             first = end
         return found

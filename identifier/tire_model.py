@@ -4,10 +4,11 @@ Slip angles α = δ - (v_y ± l r)/v_x have the paper's sign, the negative of IS
 F = +C α. Axle forces are lateral, in the frame of the body, left positive.
 """
 
+import importlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
@@ -17,10 +18,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
+from codegen.escape import shown
+from identifier.frozen import FORMAT, FrozenModelError, require_alive
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
 from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
+from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
@@ -31,7 +35,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "what learning believes, not calibrated; `run.calibrated()` checks it on the drive"
+UNCALIBRATED = "what learning believes, not calibrated; `run.tire` checks it on the drive"
 
 
 class TireFunctions(NamedTuple):
@@ -332,13 +336,13 @@ class TireModel(ABC):
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
 
-    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times [s] of the drive that taught the road was another one, (n,)."""
         return np.zeros(t.shape, dtype=bool)
 
     @property
-    def road_notes(self) -> tuple[str, ...]:
-        """What a drive that taught told of other roads, a line each."""
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
         return ()
 
     def at_bounds(self) -> "tuple[Reached, ...]":
@@ -388,7 +392,7 @@ class TireModel(ABC):
     def band_calibrated(self) -> bool:
         """Whether the width of `band` was found on parts of the drive that did not teach.
 
-        As of `History.calibrated`, where enough was driven; else it is what learning believes.
+        As of `Run.tire`, where enough was driven; else it is what learning believes.
         """
         return False
 
@@ -728,9 +732,7 @@ class TireModel(ABC):
         FrozenModelError
             Where the file is not such a model; one line that names it.
         """
-        from identifier.stored import load_model
-
-        return load_model(Path(path))
+        return load_model(path)
 
     def __repr__(self) -> str:
         front, rear = Fact(STIFFNESS, self.stiffness, "N/rad").words
@@ -764,3 +766,77 @@ def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
     """
     r = v_x * (slope[1] - slope[0]) / vehicle.wheelbase
     return ca.vertcat(-v_x * slope[0] - vehicle.l_f * r, r)
+
+
+# Frozen models as JSON files: weights.json, whatever kind of model it holds.
+
+MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported where one is read
+    "network": ("identifier.paper.network", "NetworkModel"),
+    "axle": ("identifier.axle.model", "AxleModel"),
+    "curve": ("identifier.baselines.curves", "CurveModel"),
+    "onnx": ("identifier.own_network", "OnnxModel"),
+    "fit": ("identifier.estimate.model", "FittedModel"),
+}
+
+
+def load_model(path: str | PathLike[str]) -> TireModel:
+    """Read a frozen model of any kind.
+
+    Parameters
+    ----------
+    path : a file that the `save` of a frozen model wrote.
+
+    Raises
+    ------
+    FrozenModelError
+        Where the file is not such a model; one line that names it.
+    """
+    path = Path(path)
+    table = _stored(path)
+    _verdict_of(table)
+    kind = table.text("kind")
+    if kind not in MODELS:
+        table.refuse("kind", f"must be one of {list(MODELS)}, it is {shown(kind)}")
+    module, name = MODELS[kind]
+    model: TireModel = getattr(importlib.import_module(module), name).from_dict(
+        dict(table.data), str(path)
+    )
+    try:
+        require_alive(FrozenModelError, model)
+    except FrozenModelError as error:
+        raise FrozenModelError(f"{path}: {error}") from None
+    return model
+
+
+def stored_verdict(path: str | PathLike[str]) -> bool | None:
+    """Return whether a stored model was found valid when it was learnt; None where nobody judged.
+
+    Parameters
+    ----------
+    path : a file that the `save` of a frozen model wrote.
+
+    Raises
+    ------
+    FrozenModelError
+        Where the file is not such a model; one line that names it.
+    """
+    return _verdict_of(_stored(Path(path)))
+
+
+def _stored(path: Path) -> Table:
+    """Return the table of a file that says it is a frozen model."""
+    try:
+        table = Table(read_json(path, FrozenModelError), f"{path}: ", FrozenModelError)
+    except OSError as error:
+        reason = error.strerror or "not a file"
+        raise FrozenModelError(f"{path}: cannot be read: {reason.lower()}") from error
+    if "format" not in table or table.value("format") != FORMAT:
+        raise FrozenModelError(f"{path}: not a frozen model, format must be {FORMAT!r}")
+    return table
+
+
+def _verdict_of(table: Table) -> bool | None:
+    valid = table.value("valid") if "valid" in table else None
+    if valid is not None and not isinstance(valid, bool):
+        table.refuse("valid", f"must be true or false, it is {shown(valid)}")
+    return valid

@@ -4,10 +4,12 @@ import math
 import os
 from dataclasses import asdict, dataclass, fields
 
+from codegen.errors import TireidError
+
 VARIABLE = "TIREID_LIMITS"
 
 
-class LimitError(ValueError):
+class LimitError(TireidError, ValueError):
     """The limits that the environment asks for are none."""
 
 

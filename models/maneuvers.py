@@ -14,9 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 
 
-class ManeuverError(ValueError):
+class ManeuverError(TireidError, ValueError):
     """A number of a maneuver breaks a rule; the message names it, the rule and the value."""
 
 

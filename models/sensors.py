@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.recordings import Recording
 
 # What a sensor can show at all: beyond it, and NaN, is no number of a sensor.
@@ -24,7 +25,7 @@ LARGEST_SHOWN: Mapping[str, float] = {
 }
 
 
-class SensorError(ValueError):
+class SensorError(TireidError, ValueError):
     """A number of a sensor breaks a rule; the message names it, the rule and the value."""
 
 

@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
@@ -28,7 +29,7 @@ from models.schema import Table, read_toml, require_name
 # plant never starts from a value that is not physical.
 
 
-class VehicleError(ValueError):
+class VehicleError(TireidError, ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
 
 
@@ -500,11 +501,14 @@ class Vehicle:
         Raises
         ------
         VehicleError
-            One line with file, key and rule: key unknown or missing, type or value wrong.
-        FileNotFoundError
-            When there is no such file.
+            One line with file, key and rule: no such file, key unknown or missing, type or value
+            wrong.
         """
         file = Path(path)
+        if not file.exists():
+            raise VehicleError(
+                f"{file}: there is no such file; `tireid init` writes one to fill in"
+            )
         data = read_toml(file, VehicleError)
         inner = data.pop("chassis", None)
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")

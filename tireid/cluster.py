@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+from codegen.errors import TireidError
 from identifier.compare.work import Map, source_digest
 from models.extras import needs
 from tireid.progress import say
@@ -21,7 +22,7 @@ PATIENCE = 30.0  # s that the scheduler and the first worker may take to answer
 _ONE_AT_A_TIME = threading.Lock()  # CasADi's graphs must not be built by two threads of a worker
 
 
-class ClusterError(OSError):
+class ClusterError(TireidError, OSError):
     """The cluster cannot be reached or cannot be used; one line that names its address."""
 
 

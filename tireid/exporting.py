@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import find_compiler
+from codegen.errors import TireidError
 from codegen.writing import write_file
 from identifier.export.package import Package, build_package, readme
 from identifier.export.processor import Cost, figures_text, measure, with_figures
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import continuing
-from identifier.run import History
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
@@ -23,6 +23,7 @@ from mpc.export.processor import measure_mpc, mpc_figures_text, time_here, with_
 from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
 from tireid.progress import Progress
+from tireid.run import Run
 
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 COSTS, TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
@@ -76,7 +77,7 @@ class Exported:
 
 
 def export(
-    source: History | TireModel | Method,
+    source: Run | TireModel | Method,
     folder: str | PathLike[str],
     *,
     vehicle: Vehicle | None = None,
@@ -122,10 +123,10 @@ def export(
     if not overwrite and target.is_dir() and any(target.iterdir()):
         raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
     start: TireModel | None = None
-    if isinstance(source, History):
-        method, car = source.design, vehicle or source.vehicle
+    if isinstance(source, Run):
+        method, car = source.method, vehicle or source.vehicle
         try:
-            start = source.calibrated() if band else source.freeze()
+            start = source.tire if band else source.freeze()
         except CannotFreezeError:  # a filter of forces learns nothing that a run could begin with
             start = None
         if method.whole and start is not None:
@@ -313,7 +314,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
 
 
-class SelfTestError(RuntimeError):
+class SelfTestError(TireidError, RuntimeError):
     """A package does not compile or fails its own test; the message holds what was printed."""
 
 

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.writing import naming, write_file
 from models.extras import needs
 from models.files import resolved
@@ -32,7 +33,7 @@ FORMAT = "tireid output 1"
 SPARE_NAMES = 1000  # results-2, results-3, ...
 
 
-class OutputError(ValueError):
+class OutputError(TireidError, ValueError):
     """The output folder cannot be used; the message says why and what to do."""
 
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from codegen.escape import visible
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit
-from identifier.stored import stored_verdict
-from identifier.tire_model import AXLES, Axle
+from identifier.tire_model import AXLES, Axle, stored_verdict
 from identifier.verdict import Number, Verdict
 from identifier.verdict.verdict import MOST_MISSED, PERCENT
 from tireid.output import text_table

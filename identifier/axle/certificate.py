@@ -12,21 +12,29 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
-from identifier.axle.learning import FLOAT, LARGEST_Q, LEAN, MOST_SLOW, SLOW_Q, Bounds, unit_slopes
-from identifier.axle.prior import friction_direction
+from identifier.axle.learning import (
+    FLOAT,
+    LARGEST_Q,
+    LEAN,
+    MOST_SLOW,
+    SLOW_Q,
+    Bounds,
+    ChangeDetector,
+    Regression,
+    unit_slopes,
+)
+from identifier.axle.prior import Prior, friction_direction
+from identifier.axle.watch import Watch
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from identifier.axle.design import AxleIdentifier  # which asks for this
 
 LARGEST_SLIP = 1.5  # rad
 CELLS = 2000  # of slip, each a part wider than the one before
@@ -34,6 +42,42 @@ SMALLEST_CELL = 1e-5  # rad, from zero slip
 ON_BOUND = 1e-9  # of a bound, within which a corner lies on it
 LONGEST = 60.0  # s, beyond which a drop is not followed
 FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
+
+
+class Design(Protocol):
+    """What of an `AxleIdentifier` the proofs follow from; words and units are of its fields."""
+
+    @property
+    def prior(self) -> Prior:
+        """What is believed before the first sample."""
+
+    @property
+    def bounds(self) -> Bounds:
+        """Limits of what is learnt."""
+
+    @property
+    def regression(self) -> Regression:
+        """Filter, error model and memory."""
+
+    @property
+    def change(self) -> ChangeDetector:
+        """Detector of a change of friction."""
+
+    @property
+    def watch(self) -> Watch:
+        """When what is measured is not what was learnt, and how long to wait for it."""
+
+    @property
+    def ladder(self) -> tuple[float, ...]:
+        """Slip scales of the units [rad]."""
+
+    @property
+    def rising_until(self) -> float | None:
+        """Slip at which force curves do not fall yet [rad]; None bounds no slope."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
 
 
 @cache
@@ -179,7 +223,7 @@ class FrictionDrop:
     errors: float = 1.0
 
     def time(
-        self, design: "AxleIdentifier", vehicle: Vehicle, friction: float, v_x: float
+        self, design: Design, vehicle: Vehicle, friction: float, v_x: float
     ) -> float:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
@@ -227,7 +271,7 @@ class FrictionDrop:
         return math.inf
 
 
-def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
+def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
     """Return what is proven of a design, whatever is measured unless a title says more.
 
     Of a car with downforce without the time that a drop of friction takes.
@@ -309,7 +353,7 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
     return proven if vehicle.has_downforce else (*proven, _drop(design, vehicle, driving))
 
 
-def _drop(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> Property:
+def _drop(design: Design, vehicle: Vehicle, driving: Driving) -> Property:
     """Return how long the drop of friction of a car takes whose loads are the static ones."""
     follows = FrictionDrop().time(design, vehicle, driving.friction, driving.v_x)
     by_memory = design.regression.memory * math.log(2.0)
@@ -325,7 +369,7 @@ def _drop(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> Prope
     )
 
 
-def jump_by_learning(design: "AxleIdentifier") -> float:
+def jump_by_learning(design: Design) -> float:
     """Return by how much learning changes a force in one sample at most [static axle loads].
 
     The step that is let through, and its lean to the center: no partial sum of weights is further
@@ -339,7 +383,7 @@ def jump_by_learning(design: "AxleIdentifier") -> float:
     return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
 
 
-def _lean_over_rounding(design: "AxleIdentifier") -> float:
+def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
     numbers = b.of_ladder(design.ladder, design.rising_until)

@@ -1,4 +1,4 @@
-"""A drive as the estimate reads it: signals of at most 100 Hz, smoothed alike, and where they count.
+"""A drive as the estimate reads it: at most 100 Hz, smoothed alike, and where samples count.
 
 The balance is linear in its signals but for slip: the same zero-phase mean over all of them costs
 nothing and takes noise away.
@@ -49,7 +49,13 @@ class Drive:
 
     @classmethod
     def of(
-        cls, recording: Recording, vehicle: Vehicle, part: slice = ALL, *, replay: bool = False
+        cls,
+        recording: Recording,
+        vehicle: Vehicle,
+        part: slice = ALL,
+        *,
+        replay: bool = False,
+        fastest: float = FASTEST,
     ) -> "Drive":
         """Return a recording with a v_y as the estimate reads it.
 
@@ -57,9 +63,10 @@ class Drive:
         ----------
         part : samples that are read.
         replay : whether each sample is asked about, down to the lowest speed; else those that
-            come faster than 100 Hz are averaged, and slow ones do not count.
+            come faster are averaged, and slow ones do not count.
+        fastest : sampling interval to which they are averaged [s].
         """
-        every = 1 if replay else max(1, round(FASTEST / recording.dt))
+        every = 1 if replay else max(1, round(fastest / recording.dt))
         slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
@@ -79,7 +86,12 @@ class Drive:
         )
 
     def on(self, ln_m: Array | float) -> "Drive":
-        """Return the drive on roads of other frictions: ln of each over that of the curves."""
+        """Return the drive on roads of other frictions.
+
+        Parameters
+        ----------
+        ln_m : ln of each sample's friction over that of the curves, (n,) or one.
+        """
         signals = self.signals.copy()
         signals[:, 7] = ln_m
         return replace(self, signals=signals)
@@ -121,13 +133,24 @@ def _piece(
 
 
 def gradient(signal: Array, dt: float) -> Array:
-    """Return d/dt by central differences, (n,)."""
+    """Return d/dt by central differences, (n,).
+
+    Parameters
+    ----------
+    signal : (n,).
+    dt : [s].
+    """
     slope: Array = np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
     return slope
 
 
 def box(signal: Array, count: float) -> Array:
-    """Return the centered mean over an odd count of samples, edges held, (n,)."""
+    """Return the centered mean over an odd count of samples, edges held, (n,).
+
+    Parameters
+    ----------
+    signal : (n,).
+    """
     width = max(1, int(count) | 1)
     if width == 1:
         return np.array(signal, dtype=np.float64)

@@ -1,22 +1,29 @@
 """Tires from one log or several: blocks of ten minutes, their information added up."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.drive import Drive
+from identifier.estimate.drive import FASTEST, Drive
 from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import Priors
+from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
-from identifier.estimate.solve import estimate, simulate
+from identifier.estimate.solve import ENOUGH, estimate, simulate
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
 BLOCK = 600.0  # [s] that are estimated at once
+ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
+LONG, COARSE = (
+    3600.0,
+    2.0,
+)  # [s] of logs from which samples are averaged to intervals so much longer
 REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
 MISSED = 0.06  # of the force, by which drives of one car differ from one model; of one log a belief
 
@@ -57,7 +64,8 @@ def fit(
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
-        found = estimate(drives, vehicle, beliefs, begin)
+        enough = ENOUGH if begin is None else ENOUGH_MORE
+        found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
         segments += _segments(drives, roads)
         reach = reach.and_of(drives, found, vehicle)
@@ -126,16 +134,20 @@ def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[
     """Yield drives of at most `BLOCK` together."""
     group: list[Drive] = []
     length = 0.0
+    coarse = COARSE if sum(one.duration for one in recordings) > LONG else 1.0
+    scale = min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
     for recording in recordings:
         n = max(round(BLOCK / recording.dt), 1)
         count = -(-len(recording) // n)
         edges = np.linspace(0, len(recording), count + 1).astype(int)
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in itertools.pairwise(edges):
             seconds = (end - begin) * recording.dt
             if group and length + seconds > BLOCK:
                 yield group
                 group, length = [], 0.0
-            group.append(Drive.of(recording, vehicle, slice(int(begin), int(end))))
+            part = slice(int(begin), int(end))
+            fastest = FASTEST * (coarse if coarse * scale >= 1.0 else 1.0)
+            group.append(Drive.of(recording, vehicle, part, fastest=fastest))
             length += seconds
     if group:
         yield group

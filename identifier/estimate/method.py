@@ -34,8 +34,8 @@ class FitMethod(Method):
 
     Parameters
     ----------
-    dt : sampling interval of the log [s].
     min_speed : below this speed [m/s] forces read zero.
+    dt : sampling interval of the log [s].
 
     Raises
     ------

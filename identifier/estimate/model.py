@@ -1,4 +1,4 @@
-"""The tires that an estimate found, frozen: curve, lag, sway, load transfer, ellipse, sensors."""
+"""The tires that an estimate found, frozen: curve, lag, sway, load, ellipse and sensors."""
 
 import math
 from dataclasses import dataclass, replace
@@ -14,6 +14,7 @@ from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
 from identifier.axle.curve import EDGES, LADDER, unit_matrix
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
+from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
@@ -46,6 +47,8 @@ BEYOND = 0.02  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
+SMALL = 1e-4  # rad, over which a slope is taken
+SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering that is noted
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LARGEST = 1e6  # of the numbers in a file
 
@@ -139,7 +142,8 @@ class FittedModel(TireModel):
         """
         phi, slope, J = [], [], []
         for i, axle in enumerate("fr"):
-            found = _curve_function()(self._curve_numbers(axle), alpha[:, i][None])
+            numbers = np.tile(self._curve_numbers(axle)[:, None], (1, len(alpha)))
+            found = _curve_function()(numbers, alpha[:, i][None])
             values = [np.array(one) for one in found]
             phi.append(values[0].ravel())
             slope.append(values[1].ravel())
@@ -147,7 +151,12 @@ class FittedModel(TireModel):
         return np.column_stack(phi), np.column_stack(slope), np.array(J)
 
     def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
         return phi * self._loads
 
@@ -287,7 +296,7 @@ class FittedModel(TireModel):
         """Least and largest speed [m/s] of the drives that taught, (2,)."""
         return self.speeds
 
-    def on_another_road(self, t: Array) -> NDArray[np.bool_]:
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times [s] of the drive that taught the road was another one, (n,)."""
         found = np.zeros(t.shape, dtype=bool)
         for one in self.segments:
@@ -295,13 +304,27 @@ class FittedModel(TireModel):
         return found
 
     @property
-    def road_notes(self) -> tuple[str, ...]:
-        """What a drive that taught told of other roads, a line each."""
-        return tuple(
-            f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
-            f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given"
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
+        listed = [
+            (
+                "another_road",
+                f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
+                f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given",
+            )
             for one in self.segments
-        )
+        ]
+        gain, k = self["steering_gain"], INDEX["steering_gain"]
+        sd = float(np.sqrt(self.covariance[k, k]))
+        if abs(gain) > max(SURELY * sd, NOTED_GAIN):
+            listed.append(
+                (
+                    "steering_gain",
+                    f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
+                    "says: check the steering ratio; the curves allow for it",
+                )
+            )
+        return tuple(listed)
 
     def at_bounds(self) -> tuple[Reached, ...]:
         """Return the numbers of the tires that rest at the bounds of what tires have."""
@@ -341,7 +364,12 @@ class FittedModel(TireModel):
         return sd
 
     def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         both = np.column_stack([alpha, alpha])
         prior = self._curve_sd(both, _prior_covariance(self.vehicle))
         ratio: Array = self._curve_sd(both, self.covariance) / np.maximum(prior, 1e-12)
@@ -371,7 +399,12 @@ class FittedModel(TireModel):
     def with_calibration(
         self, calibration: BandCalibration | None, force_missed: Array | None = None
     ) -> "FittedModel":
-        """Return the model with what it misses of the drives that taught."""
+        """Return the model with what it misses of the drives that taught.
+
+        Parameters
+        ----------
+        force_missed : share of the force [-], (2,).
+        """
         del calibration
         return replace(self, force_missed=force_missed)
 
@@ -382,6 +415,11 @@ class FittedModel(TireModel):
 
         It has the doubt of the curve and of the sensors' zeros, and the share `missed` of the force
         by which drives of a car differ.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        v_x : [m/s].
 
         Raises
         ------
@@ -399,7 +437,13 @@ class FittedModel(TireModel):
         return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
 
     def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N]."""
+        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
+
+        Parameters
+        ----------
+        slip : [rad], (n, 2).
+        v_x : [m/s], (n,).
+        """
         pressed = self.vehicle.load_ratio(v_x)
         return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
 
@@ -458,7 +502,8 @@ class FittedModel(TireModel):
     def cornering_stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
         _, slope, _ = self.curve_at(np.zeros((1, 2)))
-        return slope[0] * self._loads
+        stiffness: Array = slope[0] * self._loads
+        return stiffness
 
     @property
     def relaxation_length(self) -> Array:
@@ -501,7 +546,7 @@ class FittedModel(TireModel):
             listed.append(
                 Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
             )
-        zeros = (
+        zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
             ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
             ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
         )
@@ -516,15 +561,15 @@ class FittedModel(TireModel):
                     now,
                     unit,
                     0.0,
-                    now <= DECIDED * prior,  # type: ignore[arg-type]
+                    now <= DECIDED * prior,
                 )
             )
         return tuple(listed)
 
     def _curve_slope_sd(self, covariance: Array) -> Array:
         """Return the standard deviation of the slope at zero [static loads/rad], (2,)."""
-        small = np.full((1, 2), 1e-4)
-        return self._curve_sd(small, covariance)[0] / 1e-4
+        sd: Array = self._curve_sd(np.full((1, 2), SMALL), covariance)[0] / SMALL
+        return sd
 
     def facts(self) -> tuple[Fact, ...]:
         """Return what `summary` says beside the estimates."""
@@ -543,7 +588,7 @@ class FittedModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle, segments=())
+        return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
@@ -556,7 +601,28 @@ class FittedModel(TireModel):
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
-        return replace(self, p=p, driven=ratio * self.driven, segments=())
+        driven = ratio * self.driven
+        return replace(self, p=p, driven=driven, segments=(), force_missed=None)
+
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "FittedModel":
+        """Return the model for a road whose friction is not that of the drive that taught.
+
+        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
+
+        Parameters
+        ----------
+        sd_friction : standard deviation of ln μ between the roads [-].
+
+        Raises
+        ------
+        ValueError
+            Where it is negative or not finite.
+        """
+        if not 0.0 <= sd_friction < math.inf:
+            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
+        covariance, k = self.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += sd_friction**2
+        return replace(self, covariance=covariance)
 
     def beside_v_y(self) -> AxleModel:
         """Return the model as the axle identifier goes on learning from it."""
@@ -736,32 +802,19 @@ def _curve_index(axle: str) -> list[int]:
 
 @cache
 def _curve_function() -> ca.Function:
-    """Return (numbers (9,), slips (1, k)) -> φ (1, k), dφ/dx (1, k), ∂φ/∂numbers (9, k)."""
+    """Return (numbers (9,), slip) -> φ, dφ/dx, ∂φ/∂numbers (9,)."""
     numbers, x, phi, slope = curve_symbols()
     vector = ca.vertcat(*numbers)
     gradient = ca.densify(ca.jacobian(phi, vector)).T
-    one = ca.Function("curve", [vector, x], [phi, slope, gradient])
-    return _Mapped(one)  # type: ignore[return-value]
-
-
-class _Mapped:
-    """A function over columns of its second argument."""
-
-    def __init__(self, one: ca.Function) -> None:
-        self._one = one
-
-    def __call__(self, numbers: Array, slips: Array) -> tuple[Any, ...]:
-        k = slips.shape[1]
-        found: tuple[Any, ...] = self._one(np.tile(numbers[:, None], (1, k)), slips)
-        return found
+    return ca.Function("curve", [vector, x], [phi, slope, gradient])
 
 
 def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
     """Return φ and dφ/dx at a slip, as expressions."""
     symbols, x, phi, slope = curve_symbols()
     one = ca.Function("curve", [ca.vertcat(*symbols), x], [phi, slope])
-    found: tuple[Any, Any] = one(ca.DM(numbers), slip)
-    return found
+    phi_there, slope_there = one(ca.DM(numbers), slip)
+    return phi_there, slope_there
 
 
 def _prior_covariance(vehicle: Vehicle) -> Array:

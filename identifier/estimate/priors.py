@@ -6,7 +6,7 @@ plant and confirmed once on recordings.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -68,9 +68,11 @@ ALIKE = {  # standard deviation of front less rear
     "compliance": (0.003, "L"),
     "sway_share": (0.1, ""),
 }
-# At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
+# At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds differ.
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
+TYPED = [INDEX["steering_gain"]]
+TAILS = 2.0  # degrees of freedom of their priors
 FAULTS = (  # what no log leaves open but one that shows it
     "v_y_delay", "steering_delay", "r_bias", "r_delay", "v_x_factor", "cg_shift", "ln_inertia",
     "bank",
@@ -152,9 +154,22 @@ class Priors:
         )
 
     def cost(self, p: Array) -> float:
-        """Return -ln of the prior's density over that at its mean [nats]."""
+        """Return -ln of the prior's density over that at its mean [nats].
+
+        A number that somebody typed may be off by much more than its doubt: its prior is Student's.
+        """
         away = p - self.mean
-        return float(0.5 * away @ self.information @ away)
+        typed = self.information[TYPED, TYPED] * away[TYPED] ** 2
+        gaussian = away @ self.information @ away - typed.sum()
+        return float(0.5 * gaussian + 0.5 * (TAILS + 1.0) * np.log1p(typed / TAILS).sum())
+
+    def around(self, p: Array) -> tuple[Array, Array]:
+        """Return gradient (p,) and positive curvature (p, p) of the cost at parameters."""
+        away, curvature = p - self.mean, self.information.copy()
+        typed = self.information[TYPED, TYPED]
+        curvature[TYPED, TYPED] *= (TAILS + 1.0) / (TAILS + typed * away[TYPED] ** 2)
+        gradient: Array = curvature @ away
+        return gradient, curvature
 
 
 def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:

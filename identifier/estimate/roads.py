@@ -1,9 +1,9 @@
 """Where the friction of the road changes inside drives: segments with a grip of their own.
 
 At the estimate without segments the loss of each residual is computed for a grid of frictions m
-(the curve is m φ(x/m)); the piecewise constant friction of least loss, with a price for each change,
-is found by dynamic programming (Viterbi). The segments are then estimated with all parameters, and
-kept where that gains more than the price.
+(the curve is m φ(x/m)); the piecewise constant friction of least loss, with a price for each
+change, is found by dynamic programming (Viterbi). The segments are then estimated with all
+parameters, and kept where that gains more than the price.
 """
 
 from collections.abc import Sequence
@@ -19,8 +19,9 @@ from identifier.estimate.priors import Priors
 from identifier.estimate.solve import NU, Problem, estimate
 from models.vehicle import Vehicle
 
-GRID = np.linspace(-1.4, 0.7, 22)  # ln m: 0.25 to 2
+GRID = np.linspace(-1.35, 0.6, 14)  # ln m: 0.26 to 1.8
 PRICE = 12.0  # [nats] of a change of friction
+BIN = 10  # residuals, half a second, on one road
 LEAST = 0.1  # |ln m|, below which segments are one road
 MOST_SCALE, MOST_MEMORY = 1.5, 4.0  # S [-] and T [s] of residuals, in search of segments
 ROUNDS = 2  # of finding segments anew at the better estimate
@@ -78,9 +79,11 @@ def _segments(
     S2, T = np.minimum(at.scale, MOST_SCALE) ** 2, np.minimum(at.memory, MOST_MEMORY)
     loss = np.empty((len(GRID), len(weight)))
     for k, ln_m in enumerate(GRID):
-        e = problem.residuals(at.p, float(ln_m)).e
+        e = problem.missed(at.p, float(ln_m))
         loss[k] = (weight / T * (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))).sum(axis=1)
-    path = cheapest(loss, PRICE)
+    count = loss.shape[1]
+    bins = np.arange(0, count, BIN)
+    path = cheapest(np.add.reduceat(loss, bins, axis=1), PRICE).repeat(BIN)[:count]
     found, begin = [], 0
     for k, one in enumerate(drives):
         length = problem.lengths[k]

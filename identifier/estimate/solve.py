@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from codegen import Scan
@@ -88,22 +87,36 @@ class Problem:
         found: NDArray[np.intp] = self._kept[k] * self._strides[k]
         return found
 
-    def residuals(self, p: Array, road: float = 0.0) -> Residuals:
+    def missed(self, p: Array, road: float) -> Array:
+        """Return what the balance misses over its size where the friction is another, (m, 2).
+
+        Parameters
+        ----------
+        p : parameters.
+        road : ln of the friction over that of the curves.
+        """
+        scan = motion_scan()
+        e = []
+        for k, one in enumerate(self.drives):
+            driven = one.on(road)
+            given = arguments(driven, p, self._car, scan)
+            out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
+            e.append(out["missed"][self._kept[k]])
+        return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
+
+    def residuals(self, p: Array) -> Residuals:
         """Return what the balance misses, and its slopes.
 
         Parameters
         ----------
         p : parameters, and behind them ln of the friction of other roads.
-        road : added to ln of all frictions.
         """
         e, slopes = [], []
-        ln_m = np.concatenate([[0.0], p[len(NAMES) :]]) + road
+        ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
         for k, one in enumerate(self.drives):
             stride, kept = self._strides[k], self._kept[k]
             roads = None if self.labels is None else self.labels[k]
-            driven = (
-                one if roads is None and not road else one.on(ln_m[0 if roads is None else roads])
-            )
+            driven = one if roads is None else one.on(ln_m[roads])
             out = self._scan(
                 len(driven.signals),
                 arguments(driven, p[: len(NAMES)], self._car, self._scan),
@@ -126,7 +139,12 @@ class Problem:
             )
 
     def memory(self, e: Array) -> Array:
-        """Return T of both axles [s], (2,), from the correlation of residuals (m, 2)."""
+        """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        """
         found = np.empty(2)
         step = self.weight[0]
         lags = int(LONGEST_MEMORY / step) + 1
@@ -152,7 +170,12 @@ class Problem:
         return np.maximum(found, SHORTEST_MEMORY)
 
     def scale(self, e: Array) -> Array:
-        """Return S² of both axles, (2,), by expectation maximization."""
+        """Return S² of both axles, (2,), by expectation maximization.
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        """
         S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, LEAST_SCALE) ** 2
         total = self.weight.sum()
         for _ in range(8):
@@ -161,13 +184,27 @@ class Problem:
         return S2
 
     def cost(self, e: Array, p: Array, T: Array) -> float:
-        """Return J of residuals at parameters when a second of them counts 1/T times [nats]."""
+        """Return J of residuals at parameters when a second of them counts 1/T times [nats].
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        p : (p,).
+        T : [s], (2,).
+        """
         S2 = self.scale(e)
         scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
         return self.misfit(e, S2, T) + _beliefs(self.priors, p) + scales
 
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
-        """Return Σ w/T ρ(e) [nats]."""
+        """Return Σ w/T ρ(e) [nats].
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        S2 : [-], (2,).
+        T : [s], (2,).
+        """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
 
@@ -180,7 +217,13 @@ def car_numbers(vehicle: Vehicle) -> Array:
 
 
 def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
-    """Return the inputs of a compiled motion over a drive."""
+    """Return the inputs of a compiled motion over a drive.
+
+    Parameters
+    ----------
+    p : as `motion.parameters` lists them (p,).
+    car : of `car_numbers`, (6,).
+    """
     more = {}
     if "tangent" in scan.carry:
         more = {"tangent": np.zeros(scan.step.numel_in("tangent"))}
@@ -197,7 +240,12 @@ def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
 
 
 def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
-    """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port."""
+    """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port.
+
+    Parameters
+    ----------
+    p : as `motion.parameters` lists them (p,).
+    """
     scan = motion_scan()
     return scan(
         len(one.signals),
@@ -213,6 +261,7 @@ def estimate(
     begin: Array | None = None,
     *,
     labels: Labels | None = None,
+    enough: float = ENOUGH,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
 
@@ -224,12 +273,13 @@ def estimate(
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights
         show v_y or steering off zero, also from there.
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
+    enough : improvement of the cost, below which it ends [nats].
     """
     priors = Priors.of(vehicle) if priors is None else priors
     problem = Problem(drives, vehicle, priors, labels)
     starts = _starts(problem) if begin is None else [begin]
     starts = [np.concatenate([one[: len(NAMES)], np.zeros(problem.roads)]) for one in starts]
-    found = [_descend(problem, start) for start in starts]
+    found = [_descend(problem, start, enough) for start in starts]
     return min(found, key=lambda one: one.cost)
 
 
@@ -255,11 +305,10 @@ def _starts(problem: Problem) -> list[Array]:
     return [np.clip(one, low, high) for one in starts]
 
 
-def _descend(problem: Problem, start: Array) -> Posterior:
+def _descend(problem: Problem, start: Array, enough: float) -> Posterior:
     """Return the optimum that is found from a start."""
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
-    P = priors.information[np.ix_(index, index)]
     p, damping = start.copy(), 1e-3
     now = problem.residuals(p)
     T = problem.memory(now.e)
@@ -269,9 +318,9 @@ def _descend(problem: Problem, start: Array) -> Posterior:
         T = np.sqrt(T * problem.memory(now.e)) if iterations > 1 else T
         cost = problem.misfit(now.e, S2, T) + _beliefs(priors, p)
         H, gradient = _normal(problem, now, S2, T)
-        soft, soft_slopes = softness(p)
-        H = H + P + (soft_slopes.T @ soft_slopes)[np.ix_(index, index)]
-        gradient = gradient + (priors.information @ (p - priors.mean) + soft @ soft_slopes)[index]
+        of_beliefs, curvature = _around_beliefs(priors, p)
+        H = H + curvature[np.ix_(index, index)]
+        gradient = gradient + of_beliefs[index]
         better = None
         for _ in range(8):
             step = _bounded(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
@@ -287,20 +336,21 @@ def _descend(problem: Problem, start: Array) -> Posterior:
             break
         p, now, gained = better
         damping = max(damping / 5.0, 1e-6)
-        if gained < ENOUGH and iterations > 3:
+        if gained < enough and (iterations > 3 or enough > ENOUGH):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e)
-    data, _ = _normal(problem, now, S2, T)
+    H = _normal(problem, now, S2, T)[0] + _around_beliefs(priors, p)[1][np.ix_(index, index)]
     cost = problem.cost(now.e, p, T)
     whole = np.zeros((len(p), len(p)))
-    whole[np.ix_(index, index)] = np.linalg.inv(data + P)
+    whole[np.ix_(index, index)] = np.linalg.inv(H)
     n, tires = len(NAMES), problem.tires
+    told = np.asarray(np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]), np.float64)
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
         covariance=whole[:n, :n],
         index=index[:tires],
-        information=np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]),
+        information=told,
         roads=p[n:],
         road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
@@ -316,10 +366,21 @@ def _beliefs(priors: Priors, p: Array) -> float:
     return priors.cost(p) + 0.5 * float(soft @ soft)
 
 
+def _around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
+    """Return gradient (p,) and positive curvature (p, p) of `_beliefs`."""
+    gradient, curvature = priors.around(p)
+    soft, slopes = softness(p)
+    return gradient + soft @ slopes, curvature + slopes.T @ slopes
+
+
 def softness(p: Array) -> tuple[Array, Array]:
     """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
 
     No tire has less than a quarter of C there: play in the steering looks so.
+
+    Parameters
+    ----------
+    p : (p,).
 
     Returns
     -------
@@ -341,15 +402,10 @@ def softness(p: Array) -> tuple[Array, Array]:
 
 def _normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
-    n = at.slopes.shape[2]
-    H, gradient = np.zeros((n, n)), np.zeros(n)
-    for axle in range(2):
-        e, J = at.e[:, axle], at.slopes[:, axle, :]
-        w = problem.weight / T[axle] * (NU + 1.0) / (NU * S2[axle] + e**2)
-        weighted = J * w[:, None]
-        H += weighted.T @ J
-        gradient += weighted.T @ e
-    return H, gradient
+    w = problem.weight[:, None] / T * (NU + 1.0) / (NU * S2 + at.e**2)
+    J = at.slopes.reshape(-1, at.slopes.shape[2])
+    weighted = J * w.reshape(-1, 1)
+    return weighted.T @ J, weighted.T @ at.e.ravel()
 
 
 def _bounded(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import shown
 from codegen.package import NAME, c_files, one_file
 from identifier.export.c_source import ORDER, PREFIX, C
@@ -35,11 +36,11 @@ class Status(IntEnum):
     STALE = 6
 
 
-class NoCompilerError(RuntimeError):
+class NoCompilerError(TireidError, RuntimeError):
     """There is no C compiler to build the package with."""
 
 
-class PackageFileError(ValueError):
+class PackageFileError(TireidError, ValueError):
     """A folder does not hold a package."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import visible
 from identifier.axle.band import (
     AT_SPEEDS,
@@ -40,7 +41,7 @@ OPSET = 13
 IR_VERSION = 7  # of the file format that came with opset 13
 
 
-class MissingOnnxError(ImportError):
+class MissingOnnxError(TireidError, ImportError):
     """The package onnx is not installed; the message says how to install it."""
 
 
@@ -384,7 +385,7 @@ BANDED: Mapping[str, Callable[[Any, bool], bytes]] = {  # likewise with the band
 }
 
 
-class NoOnnxError(ValueError):
+class NoOnnxError(TireidError, ValueError):
     """A frozen model of a kind that has no ONNX form."""
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from codegen import CompilationError
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.package import manifest_with_figures, renamed
 from codegen.writing import write_file
 from identifier.export.c_source import PREFIX
@@ -72,7 +73,7 @@ class Replay(NamedTuple):
     most_instructions: int
 
 
-class ReplayError(RuntimeError):
+class ReplayError(TireidError, RuntimeError):
     """A machine did not come to the end of a recording."""
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
 from identifier.method import Method
@@ -447,7 +448,7 @@ COMMENTS = {
 }
 
 
-class DesignFileError(ValueError):
+class DesignFileError(TireidError, ValueError):
     """A file does not hold a design; the message names file, key and rule."""
 
 

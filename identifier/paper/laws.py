@@ -21,6 +21,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.rules import require_within
 
 Direction = Callable[[Any, Any], Any]
@@ -358,7 +359,7 @@ LEAST, LARGEST = 1e-15, 1e12  # of a gain that is not 0, in its unit, whatever U
 # With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
 
 
-class NotHurwitzError(ValueError):
+class NotHurwitzError(TireidError, ValueError):
     """A_d has an eigenvalue whose real part is not negative."""
 
 

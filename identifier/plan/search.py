@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.plan.information import asked, covariance_after, expected_error
 from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, hold_of, simulate, steps_of
 from identifier.plan.tires import PlausibleTires
@@ -42,7 +43,7 @@ LARGEST_HEADING = math.radians(60.0)  # at the entry
 FEWEST, MOST = 3, 14  # changes of the angle; where a pass has more, they are driven mirrored
 
 
-class PlanError(ValueError):
+class PlanError(TireidError, ValueError):
     """No maneuver is possible as asked; the message says what would be."""
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from codegen.errors import TireidError
 from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
 from identifier.stability.loop import root
@@ -35,7 +36,7 @@ LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag thro
 FASTEST = 0.2  # largest a dt
 
 
-class DesignError(ValueError):
+class DesignError(TireidError, ValueError):
     """What is asked of the gains cannot be had at this sampling interval."""
 
 

@@ -30,6 +30,7 @@ from identifier.axle.band import (
 from identifier.axle.learning import Regression
 from identifier.run import History
 from identifier.tire_model import TireModel
+from identifier.verdict.judging import judge
 from identifier.verdict.motion import Evidence, Windows, evidence, modelled_force
 from identifier.verdict.parts import asked_run, taught_elsewhere
 from models.recordings import Recording
@@ -103,6 +104,9 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     ValueError
         Where the recording begins after that time.
     """
+    if history.design.whole:
+        model, missed = history.freeze(t), judge(history, t).force_missed
+        return model.with_calibration(None, None if missed is None else np.array(missed))
     run = asked_run(history, t)
     model, recording = run.model, run.portion.recording
     if not model.has_band:
@@ -111,7 +115,7 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     if found is None:
         return model
     if history.design.whole:
-        found = found.where(~model.on_another_road(recording.t)[found.windows.starts])
+        found = found.where(~model.road_differs(recording.t)[found.windows.starts])
         return model.with_calibration(None, found.but_a_stretch()[0].missed)
 
     def teach(halting: Recording) -> TireModel:

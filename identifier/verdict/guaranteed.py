@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.axle.guarantee import (
     ForceBound,
     Guarantee,
@@ -35,7 +36,7 @@ SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
 OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
-class BoundViolatedError(ValueError):
+class BoundViolatedError(TireidError, ValueError):
     """No tire's curve keeps the bound that was told: the drive contradicts it."""
 
 

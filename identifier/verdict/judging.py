@@ -105,8 +105,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
         return _too_short(model)
     state = {} if history.design.whole else history.state_at(end)
     reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
-    roads = [Objection("another_road", None, text, False) for text in model.road_notes]
-    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *roads], whole)
+    notes = [Objection(code, None, text, False) for code, text in model.notes]
+    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *notes], whole)
 
 
 def judge_prediction(
@@ -137,8 +137,8 @@ def _asked(
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model.vehicle))
     if own and found is not None:
-        other = model.on_another_road(recording.t[part.samples])
-        found = found.where(other[found.windows.starts] < 0.5)
+        other = model.road_differs(recording.t[part.samples])
+        found = found.where(~other[found.windows.starts])
     if found is None or len(found.windows) < FEWEST:
         return None
     judged, some = found.but_a_stretch()

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
 from models.rules import require_positive
@@ -26,7 +27,7 @@ SPIKE_EVERY = 0.13  # s
 SPIKE_LASTS = 0.0098  # s: one sample at 100 Hz
 
 
-class FaultError(ValueError):
+class FaultError(TireidError, ValueError):
     """A fault breaks a rule; the message names the field, the rule and the value."""
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.errors import TireidError
 from models.limits import limits
 
 PREFIX = 4  # bytes
@@ -29,7 +30,7 @@ BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
 Definitions = Mapping[str, tuple[Any, list[tuple[str, Any]]]]
 
 
-class CdrError(ValueError):
+class CdrError(TireidError, ValueError):
     """A message or definition cannot be read; the message says why."""
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import shown, visible
 
 SOME = 12  # names in a message
@@ -22,7 +23,7 @@ LONGEST = 200  # characters of them
 T = TypeVar("T")
 
 
-class RecordingError(ValueError):
+class RecordingError(TireidError, ValueError):
     """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.logs.grouped import require_room
 from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
@@ -44,7 +45,7 @@ LARGEST_DIMENSION = 2**40
 Load = Callable[[], memoryview]
 
 
-class DamagedError(ValueError):
+class DamagedError(TireidError, ValueError):
     """The file is not what it says."""
 
 

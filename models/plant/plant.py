@@ -11,6 +11,7 @@ import numpy as np
 
 from codegen import Scan, Stepper, compiler
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.graph import lifted
 from models.friction import Friction
 from models.maneuvers import Maneuver
@@ -137,7 +138,7 @@ class PlantRun:
 OverTime = float | Callable[[Array], Array]  # a number, or a function of the times (n,) [s]
 
 
-class PlantError(ArithmeticError):
+class PlantError(TireidError, ArithmeticError):
     """The car left the range of its equations; the message says when."""
 
 

@@ -5,15 +5,15 @@ ISO axes: x forward, y left, z up; r and delta turn left when positive, forces p
 """
 
 import csv
+import importlib
 import io
 import math
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,6 @@ from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
 from models.rules import LARGEST_FORCE
-
-if TYPE_CHECKING:
-    from models.recordings.map import LogMap
 
 MINIMUM_SAMPLES = 10
 PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
@@ -151,43 +148,6 @@ class Recording:
                     f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
                 )
 
-    @classmethod
-    def from_dataframe(
-        cls,
-        data: Any,
-        *,
-        name: str = "recording",
-        run: str | None = None,
-        dt: float = 0.01,
-        check: bool = True,
-        columns: Mapping[str, str] | None = None,
-        log_map: "LogMap | str | PathLike[str] | None" = None,
-    ) -> "Recording":
-        """Return one run of a data frame, checked and brought to a uniform time as a file is.
-
-        Parameters
-        ----------
-        data : a pandas data frame, or a mapping of arrays of one length, by column. Names, units
-            and signs are those of `read_recording`; `delta_r` may be missing. Times of the
-            calendar and durations count from the first.
-        name : of the recording, in place of a file's.
-        run : which run of the column "run", where there are several.
-        dt : sample time T_s to resample to [s].
-        check : whether data that contradict physics, once they are repaired, are refused.
-        columns : by our name of a column, its name in `data` and, behind it, unit, factor, offset
-            or ratio, as of `read_recording`.
-        log_map : how the data are read, or the path of a log.toml; its repair is not applied.
-
-        Raises
-        ------
-        RecordingError
-            One line: name and run, column, rule, value, remedy.
-        """
-        from models.recordings.reader import map_of, recording_from_arrays, with_columns
-
-        told = with_columns(map_of(log_map), columns or {})
-        return recording_from_arrays(name, data, told, run=run, dt=dt, check=check)
-
     def __len__(self) -> int:
         """Return the number of samples."""
         return int(self.t.size)
@@ -311,6 +271,40 @@ class Recording:
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
         return self.taken(keep)
+
+    def __getitem__(self, times: slice) -> "Recording":
+        """Return the part between two times [s], both included, as label slices of pandas have it.
+
+        Parameters
+        ----------
+        times : `log[5.0:20.0]`, on the recording's own clock; what is left out is the begin or end.
+
+        Raises
+        ------
+        TypeError
+            Where it is no slice of two times.
+        RecordingError
+            If fewer than 10 samples are left.
+        """
+        if not isinstance(times, slice) or times.step is not None:
+            raise TypeError(f"a recording is sliced by time in s, as log[5.0:20.0], not {times!r}")
+        t0 = self.t[0] if times.start is None else times.start
+        t1 = self.t[-1] if times.stop is None else times.stop
+        return self.between(float(t0), float(t1))
+
+    def to_dataframe(self) -> Any:
+        """Return it as a data frame of pandas, by the columns of `write_recording`.
+
+        Raises
+        ------
+        ImportError
+            Where pandas is not installed.
+        """
+        try:
+            pandas = importlib.import_module("pandas")
+        except ImportError:
+            raise ImportError("a data frame needs pandas: pip install pandas") from None
+        return pandas.DataFrame(_columns(self))
 
     def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a stretch begins.
@@ -544,6 +538,13 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
         raise RecordingError(f"{path}: the name must end in .csv or .csv.gz")
+    text = _csv(_columns(recording))
+    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
+    return path
+
+
+def _columns(recording: Recording) -> dict[str, Array]:
+    """Return the signals that there are, by the standard names of columns."""
     signals = {
         "t": recording.t,
         "vx": recording.v_x,
@@ -556,9 +557,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
-    text = _csv(columns)
-    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
-    return path
+    return columns
 
 
 def _csv(columns: Mapping[str, Array]) -> Iterator[bytes]:

@@ -15,6 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from codegen.errors import TireidError
 from codegen.escape import shown
 from models.schema import read_bytes
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
@@ -116,7 +117,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")  # alone: str.splitlines also ends a comme
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?")
 
 
-class TirError(ValueError):
+class TirError(TireidError, ValueError):
     """A tire property file cannot be used; one line naming the file and the reason."""
 
 

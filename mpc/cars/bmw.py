@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from codegen.errors import TireidError
 from models.extras import needs
 from models.tires import TireForces
 from models.vehicle import GRAVITY, Chassis, Vehicle
@@ -14,7 +15,7 @@ from models.vehicle import GRAVITY, Chassis, Vehicle
 # The package commonroad-vehicle-models, which not everybody has installed.
 
 
-class MissingCommonRoadError(ImportError):
+class MissingCommonRoadError(TireidError, ImportError):
     """The package is not installed; the message says how to install it."""
 
 

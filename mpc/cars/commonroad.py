@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.friction import Friction, place_change
 from models.plant import Driver
 from mpc.cars.bmw import CommonRoadTire, bmw, bmw_parameters, bmw_tire, scale_friction
@@ -46,7 +47,7 @@ def friction_at(friction: Friction, t: float, X: float) -> float:
     return scale + float(place_change(friction.over_place(), X)) if friction.by_place else scale
 
 
-class CommonRoadError(ArithmeticError):
+class CommonRoadError(TireidError, ArithmeticError):
     """Their car left the range of its equations; the message says when."""
 
 

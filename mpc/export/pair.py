@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from codegen.errors import TireidError
 from codegen.package import c_files, defines, generated, header
 from codegen.template import Words, filled
 from identifier.axle.model import AxleModel
@@ -29,7 +30,7 @@ EXAMPLES: Mapping[str, str] = dict.fromkeys(
 )
 
 
-class NoHandoverError(ValueError):
+class NoHandoverError(TireidError, ValueError):
     """What a method learns cannot be handed over in C."""
 
 

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.schema import require_few
 
 
-class PathError(ValueError):
+class PathError(TireidError, ValueError):
     """A path or its source breaks a rule; one line: file or name, place, rule, value, remedy."""
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from codegen import load_library
 from codegen.arrays import Array
 from codegen.compiler import keep, kept
+from codegen.errors import TireidError
 from mpc.prediction import state_size
 from mpc.problem import N_ERRORS, Guards, Problem
 from mpc.realtime.c_source import c_sources, python_file
@@ -251,7 +252,7 @@ FLAGS = (
 )
 
 
-class NoCompilerError(RuntimeError):
+class NoCompilerError(TireidError, RuntimeError):
     """There is no C compiler to build the tracker with."""
 
 

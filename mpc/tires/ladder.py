@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.estimate.model import FittedModel
@@ -213,7 +214,7 @@ SAMPLES = 400
 SMALL = 1e-3  # rad; the slope at zero is read here, well above rounding
 
 
-class CurveFitError(ValueError):
+class CurveFitError(TireidError, ValueError):
     """A force curve is not one that a ladder of tanh can follow."""
 
 

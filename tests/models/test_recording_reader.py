@@ -357,8 +357,8 @@ def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored
     names = {"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f", "ay": "a_y"}
     data = {column: getattr(log, name) for column, name in names.items()}
     with pytest.raises(RecordingError, match="ay "):
-        Recording.from_dataframe(data, log_map=STILL_WRONG)
-    assert len(Recording.from_dataframe(data, log_map=RIGHT)) == len(log)
+        read_recording(data, log_map=STILL_WRONG)
+    assert len(read_recording(data, log_map=RIGHT)) == len(log)
 
 
 def test_at_a_coarse_interval_a_stretch_of_too_few_samples_is_left_out(tmp_path: Path) -> None:

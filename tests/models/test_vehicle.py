@@ -108,7 +108,7 @@ def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):
 
 
 def test_a_missing_file_says_so(tmp_path):
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(VehicleError, match="there is no such file"):
         Vehicle.from_toml(tmp_path / "none.toml")
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from tests.conftest import without_ink
 from tireid.cli import main
 

@@ -267,7 +267,7 @@ def test_the_same_seed_finds_the_same(words, numbers, tmp_path, undrawn):
 @pytest.mark.parametrize(
     ("extra", "said"),
     [
-        (["--method", "magic"], "--method magic is none of axle, "),
+        (["--method", "magic"], "--method magic is none of fit, axle, "),
         (["--sweep", "-1"], "--sweep must be at least 0, it is -1"),
         (["--jobs", "0"], "--jobs must be at least 1"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
@@ -284,7 +284,8 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(
         extra = [str(logs / "slalom.csv")]
     out = tmp_path / "out"
     first, *rest = words
-    named = [first, *extra, *rest] if extra[0].endswith(".csv") else [*words, *extra]
+    logs_named = [one for one in extra if one.endswith(".csv")]
+    named = [first, *logs_named, *rest, *(one for one in extra if one not in logs_named)]
     assert main([*named, "--out", str(out)]) == 2
     lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
     assert len(lines) == 1
@@ -310,24 +311,24 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
     logs, tmp_path, capsys, undrawn
 ):
     log = read_recording(logs / "slalom.csv")
-    write_recording(replace(log, v_y=log.v_y + 0.6), tmp_path / "biased.csv")
-    words = ["compare", str(tmp_path / "biased.csv"), "--vehicle", str(logs / "car.toml")]
+    write_recording(replace(log, v_y=-log.v_y), tmp_path / "mirrored.csv")
+    words = ["compare", str(tmp_path / "mirrored.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--jobs", "1", "--floor", "0", "--no-check", "--method", "linear"]
     assert main([*words, "--out", str(tmp_path / "another")]) == 0
     assert "verdict" not in capsys.readouterr().out
-    words.append("axle")
+    words.append("fit")
     assert main([*words, "--out", str(tmp_path / "refused")]) == 3
     assert "0 of 1" in (tmp_path / "refused" / "report.html").read_text(encoding="utf-8")
-    assert "default learnt on biased: verdict: NOT VALID" in capsys.readouterr().out
+    assert "default learnt on mirrored: verdict: NOT VALID" in capsys.readouterr().out
     assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
     found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]
-    assert found["biased"]["valid"] is False
+    assert found["mirrored"]["valid"] is False
 
 
 def test_the_registry_has_every_name_that_is_promised():
     promised = "linear eso ekf_force stiffness_rls magic_formula_ekf dugoff_ekf instantaneous "
     promised += "integral instantaneous_scaled pi_lead kreisselmeier kreisselmeier_newton rls "
-    promised += "concurrent axle inertial linear_kf joint_ekf washout mhe"
+    promised += "concurrent fit axle inertial linear_kf joint_ekf washout mhe"
     assert set(METHODS) == set(promised.split())
 
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import tireid as ti
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.files import digest
 from models.friction import Friction
 from models.vehicle import sedan

@@ -22,7 +22,7 @@ from benchmarks.local_cluster import free_port, start
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import reference_of
 from identifier.axle.prior import fiala_weights
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from identifier.verdict import judge_prediction
 from models.recordings import read_recording, write_recording
 from models.vehicle import sedan

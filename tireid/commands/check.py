@@ -148,11 +148,11 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
-        description="Say what is certified of an identifier; without options, of the default of "
-        "tireid identify: boxes, curve, jumps, the time to follow a drop of friction; with --along "
-        "LOG, also of the tires that it learns there: sector, and the largest error of the force. "
-        "Gains of the paper's laws (--paper, --method NAME, --design FILE) are "
-        "judged at the worst regressor: poles, sampling, gain and phase margin, damping, drift, "
+        description="Say what is certified of an identifier; without options, of the axle "
+        "identifier, the default in a car: boxes, curve, jumps, the time to follow a drop of "
+        "friction; with --along LOG, also of the tires that it learns there: sector, and the "
+        "largest error of the force. Gains of the paper's laws (--paper, --method NAME, --design "
+        "FILE) are judged at the worst regressor: poles, sampling, gain and phase margin, damping, drift, "
         "proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With --tune, "
         "find gains and write them.",
     )
@@ -243,7 +243,7 @@ def _require_drive(options: argparse.Namespace) -> None:
 def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
-        return chosen_method(options, vehicle, usual=LIVE)
+        return chosen_method(options, vehicle, online=True)
     if options.design is not None:
         raise ValueError("--tune finds gains: give no --design FILE to judge with it")
     law = options.method or REFERENCE

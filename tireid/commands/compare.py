@@ -193,7 +193,7 @@ def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[
     recordings : that are compared on.
     vehicle : that drove them.
     """
-    return {one.name: identify(one, vehicle, check=False).verdict() for one in recordings}
+    return {one.name: identify(one, vehicle, check=False).verdict for one in recordings}
 
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.verdict import Verdict, judge, judge_prediction
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -98,7 +98,7 @@ def demo_report(
     Parameters
     ----------
     story : the noisy drives, learnt by both methods.
-    verdict : on what the default learnt.
+    verdict : on what the axle identifier learnt.
     shipped : what was learnt, as a C package.
     study : the paper's study.
     driven : on what was learnt, by folder.
@@ -106,8 +106,8 @@ def demo_report(
     folder : with films and the figures of the certificate.
     command : as it was typed.
     """
-    learnt = story.default.learnt
-    model, runs = learnt.freeze(FREEZE), [learnt, *story.default.others]
+    learnt = story.axle.learnt
+    model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
     return Report(
         title=TITLE,
         summary=SUMMARY,
@@ -115,7 +115,7 @@ def demo_report(
             verdict_headline(verdict),
             *missed_headline(verdict),
             *number_headlines(verdict),
-            *identify_headlines(model, runs, story.default.frozen[FREEZE]),
+            *identify_headlines(model, runs, story.axle.frozen[FREEZE]),
             *drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
@@ -155,10 +155,12 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
-                "from motion alone; what was never excited keeps what is believed of any tire."
+                "from motion alone; what was never excited keeps what is believed of any tire. It "
+                "learns sample by sample, in a car too; tireid identify makes one "
+                "estimate of a whole log."
             ),
             curve_drawing(figures, verdict),
-            *learnt_blocks("the default method", model, figures)[1:],
+            *learnt_blocks("the axle identifier", model, figures)[1:],
             drawing(
                 figures["forces"],
                 "Axle forces: online above, and below replayed with the weights frozen at "
@@ -181,7 +183,7 @@ def _predict(story: Story) -> Section:
             "share of the rms force.",
             header=[
                 "drive",
-                "default, online",
+                "axle, online",
                 "frozen",
                 "of rms",
                 "paper, online",
@@ -191,7 +193,7 @@ def _predict(story: Story) -> Section:
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    for history in story.default.others:
+    for history in story.axle.others:
         name = history.recording.name
         said = name.replace("_", " ")
         figure = side_by_side_figure(story.side_by_side(name))
@@ -241,8 +243,8 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
             "The law is the integral law of the paper: A_d is "
             f"{gains.A_d[0][0]:.4g} s⁻¹ times the identity, λ = {gains.forgetting:.4g} s⁻¹, η₁ = "
             f"{gains.eta_W:.4g} s⁻⁴, η₂ = {gains.eta_V:.4g} kN⁻² s⁻⁴, ρ₁ = {gains.rho_W:.4g} and "
-            f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the default "
-            "method above; its figures are in the folder paper_network."
+            f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the axle "
+            "identifier above; its figures are in the folder paper_network."
         ),
         drawing(
             paper[SCHEME],
@@ -359,7 +361,7 @@ def run(options: argparse.Namespace) -> None:
         for one in folders.values():
             one.mkdir()
         parts = {"identify": story.default, "paper_network": story.paper}
-        verdicts = {name: part.learnt.verdict(FREEZE) for name, part in parts.items()}
+        verdicts = {name: judge(part.learnt, FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in parts.items():
             model = part.learnt.freeze(FREEZE)

@@ -152,7 +152,7 @@ def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, floa
 
 
 def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> Driven:
-    learnt = story.default.learnt.freeze(FREEZE)
+    learnt = story.axle.learnt.freeze(FREEZE)
     conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
     runs = [run_drive(label, conditions, learnt) for label in labels]
     folder.mkdir()
@@ -198,7 +198,7 @@ class Shipped(NamedTuple):
 
 
 def ship(story: Story, folder: Path) -> Shipped:
-    """Export what the default method learnt, compile it and test it.
+    """Export what the axle identifier learnt, compile it and test it.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def ship(story: Story, folder: Path) -> Shipped:
     SelfTestError
         Where the package does not compile or does not pass.
     """
-    learnt = story.default.learnt
+    learnt = story.axle.learnt
     model = learnt.freeze(FREEZE)
     package = build_package(learnt.design, story.car, model)
     costs = measure(package)
@@ -261,7 +261,7 @@ def package_section(shipped: Shipped) -> Section:
     name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(
-            text="The default method, beginning with what it has just learnt, is written as a C99 "
+            text="The axle identifier, beginning with what it has just learnt, is written as a C99 "
             f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
             f"README, every symbol begins with {name}_; hash {about['hash']}. It is what "
             "tireid export writes."

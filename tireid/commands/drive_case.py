@@ -9,8 +9,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from identifier.frozen import VEHICLE_KEYS
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from models.faults import SIZED, FaultError, SensorFault
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
@@ -307,10 +306,10 @@ def frozen_tires(
             lateral=conditions.lateral(),
             progress=progress,
         )
-    history = identify(recording, setup.vehicle, method, check=False)
-    warn_of(history.verdict(), f"what {law} learnt to drive on")
+    run = identify(recording, setup.vehicle, method, check=False)
+    warn_of(run.verdict, f"what {law} learnt to drive on")
     assert recording.a_y is not None
-    learnt = history.calibrated() if conditions.caution > 0.0 else history.freeze()
+    learnt = run.tire if conditions.caution > 0.0 else run.freeze()
     return (
         f"frozen ones learnt by {law} on {recording.duration:.0f} s of random steering on an open "
         f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"

@@ -5,8 +5,7 @@ from typing import Any
 
 from identifier.method import Method
 from identifier.methods import LIVE, continuing
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from models.vehicle import Vehicle
 from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS
@@ -110,5 +109,5 @@ def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     """Return the method that is asked for; else the one that goes on from the model."""
     if start is None or method_is_given(options):
-        return chosen_method(options, vehicle, usual=LIVE).method
+        return chosen_method(options, vehicle, online=True).method
     return continuing(start, vehicle)

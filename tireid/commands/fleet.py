@@ -6,8 +6,7 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from identifier.stored import load_model
-from identifier.tire_model import STIFFNESS
+from identifier.tire_model import STIFFNESS, load_model
 from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle

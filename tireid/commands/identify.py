@@ -10,7 +10,6 @@ from codegen.escape import visible
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
-from identifier.methods import DEFAULT, WITHOUT_V_Y
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -21,9 +20,8 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History, check_recording
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.tire_model import TireModel, load_model
+from identifier.verdict import Verdict, judge, judge_prediction
 from models.recordings import (
     Recording,
     Repair,
@@ -41,6 +39,7 @@ from tireid.commands.identify_results import (
     file_name,
     guaranteed_text,
     network_table,
+    no_truth,
     write_network_results,
     write_results,
 )
@@ -149,7 +148,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = read_vehicle(options)
     seed = None if options.seed is None else seed_of(options)
-    law, design = chosen_method(options, vehicle, seed)
+    beside = options.network is not None  # of which something learns online
+    law, design = chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     bound = None if options.bound is None else AskedBound.of(options.bound)
@@ -168,7 +168,7 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        law, design = chosen_method(options, vehicle, seed, usual=WITHOUT_V_Y)
+        law, design = chosen_method(options, vehicle, seed, without_v_y=True)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):
         check_recording(one, design)
@@ -178,8 +178,7 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
-        usual = WITHOUT_V_Y if without_v_y else DEFAULT
-        law, design = chosen_method(options, vehicle, seed, usual=usual)
+        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y, online=beside)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
@@ -201,9 +200,12 @@ def run(options: argparse.Namespace) -> int:
         histories: list[History] = []
         pieces: list[History] = []
         for k, one in enumerate((recording, *others)):
+            if design.whole and histories:
+                histories.append(histories[0].asked(one, freeze_times[-1]))
+                continue
             share = progress.within(k / count, (k + 1) / count)
             histories.append(  # checked when they were read
-                identify(one, vehicle, design, start=start, check=False, progress=share)
+                identify(one, vehicle, design, start=start, check=False, progress=share).history
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(JUDGING)
@@ -221,7 +223,7 @@ def run(options: argparse.Namespace) -> int:
             for t in freeze_times:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = learnt.verdict(freeze_times[-1])
+            verdict = judge(learnt, freeze_times[-1])
             asked = _asked(learnt.freeze(freeze_times[-1]), others)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
             figures = write_results(
@@ -303,11 +305,13 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
+    reach = f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)"
+    if not learnt.online:
+        return reach
     told = side_slip_text(learnt)
     return (f"{told}\n" if told else "") + (
-        f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)\n"
-        f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
-        "covariance stay in their boxes by construction (summary.json lists them)"
+        f"{reach}\ncertificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets "
+        "and covariance stay in their boxes by construction (summary.json lists them)"
     )
 
 
@@ -370,7 +374,7 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            note = "" if sizes[name] is not None else "(against online, no truth)"
+            note = no_truth(error, sizes[name])
             cells = error_cells(error, sizes[name])
             rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
             sides = result.reproduction

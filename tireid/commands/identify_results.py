@@ -27,7 +27,7 @@ from identifier.reproducibility import (
 from identifier.run import History
 from identifier.setup import Block
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, calibrated, guaranteed
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -63,8 +63,13 @@ def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
     }
 
 
-def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any]:
-    """Return the verdict on a method, and which bounds hold of it whatever is measured."""
+def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | None:
+    """Return the verdict on a method, and which bounds hold of it whatever is measured.
+
+    None of a method that learns from whole logs: nothing learns in a car.
+    """
+    if design.whole:
+        return None
     certificate = certify(design, vehicle)
     return {"verdict": certificate.verdict, "held_by_construction": certificate.held}
 
@@ -234,9 +239,9 @@ def write_results(
     BoundViolatedError
         Where no curve keeps a bound that was told.
     """
-    calibrated = learnt.calibrated(max(frozen))
+    tire = calibrated(learnt, max(frozen))
     if bound is not None:
-        calibrated = learnt.guaranteed(bound.told, max(frozen), calibrated)
+        tire = guaranteed(learnt, bound.told, max(frozen), tire)
     write_json(
         folder / "summary.json",
         summarize(
@@ -251,7 +256,7 @@ def write_results(
     )
     for t in frozen:
         last = "" if t == max(frozen) else f"_{freeze_key(t)}s"
-        model = learnt.freeze(t) if last else calibrated
+        model = learnt.freeze(t) if last else tire
         judged = verdict if t == max(frozen) else None
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
@@ -260,7 +265,7 @@ def write_results(
     told = progress or Progress("curves")
     _write_curves(folder, learnt, others, frozen, curves, told, tracks)
     say("drawing figures")
-    return _draw(folder, learnt, others, frozen, calibrated, tracks)
+    return _draw(folder, learnt, others, frozen, tire, tracks)
 
 
 def file_name(recording: Recording) -> str:
@@ -273,14 +278,29 @@ def file_name(recording: Recording) -> str:
     return re.sub(r"[^\w.-]+", "_", recording.name)
 
 
-def error_cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
+def no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
+    """Return the note beside an error: against what, where there is no true force.
+
+    Parameters
+    ----------
+    error : None where there is none.
+    size : rms of the true forces [N], None without truth.
+    """
+    if size is not None:
+        return ""
+    return "(no truth)" if error is None else "(against online, no truth)"
+
+
+def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str]:
     """Return front and rear error as text, with their share of the rms force where it is known.
 
     Parameters
     ----------
-    error : [N].
+    error : [N]; None leaves a dash.
     size : rms of the true forces [N], None without truth.
     """
+    if error is None:
+        return "-", "-"
     forces = (0.0, 0.0) if size is None else (size.front, size.rear)
     front, rear = (
         f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
@@ -310,6 +330,9 @@ def _write_curves(
     if OBSERVED in learnt.outputs:
         found = learnt.blocks()
         write_table(folder / f"errors.{curves}", (_error_columns(learnt, one) for one in found))
+
+    if not learnt.online:
+        return
 
     def weights() -> Iterator[dict[str, Array]]:
         for block in learnt.blocks():
@@ -389,7 +412,7 @@ def _force_columns(
         "alpha_r_rad": alpha[:, 1],
     }
     columns |= {name: values[part] for name, values in told.items()}
-    curves = {"online": history.axle_force}
+    curves = {"online": history.axle_force} if history.online else {}
     curves |= {label: replay.axle_force for label, replay in replays.items()}
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
@@ -439,14 +462,14 @@ def _draw(
     learnt: History,
     others: Sequence[History],
     frozen: Frozen,
-    calibrated: TireModel,
+    tire: TireModel,
     tracks: DrawnRun | None,
 ) -> dict[str, Figure]:
     name, last = learnt.recording.name, max(frozen)
     own = {t: replays[name] for t, replays in frozen.items()}
     figures = {
         "forces": force_figure(learnt, own),
-        "slip": slip_figure(calibrated, learnt.recording, learnt),
+        "slip": slip_figure(tire, learnt.recording, learnt),
         "inputs": inputs_figure(learnt.recording),
     }
     if OBSERVED in learnt.outputs:
@@ -459,10 +482,15 @@ def _draw(
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen), tracks)
     for other in others:
         replay = frozen[last][other.recording.name]
-        figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, other)
+        figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, _beside(other))
     for label, figure in figures.items():
         save_figure(figure, folder / f"{label}.png")
     return figures
+
+
+def _beside(run: History) -> History | None:
+    """Return a run where it has forces of its own to compare with."""
+    return run if run.online else None
 
 
 # What `tireid identify --network` finds: a network of one's own over recordings.
@@ -514,8 +542,8 @@ def write_network_results(
         name, own = file_name(recording), replays[recording.name]
         last = "" if history is histories[0] else f"_{name}"
         write_forces(folder / f"forces{last}.{curves}", history, {NETWORK: own})
-        figures[f"slip{last}"] = slip_figure(model, recording, history)
-        figures[f"replay_{name}"] = prediction_figure(own, history)
+        figures[f"slip{last}"] = slip_figure(model, recording, _beside(history))
+        figures[f"replay_{name}"] = prediction_figure(own, _beside(history))
     figures["inputs"] = inputs_figure(histories[0].recording)
     for label, figure in figures.items():
         save_figure(figure, folder / f"{label}.png")
@@ -535,8 +563,10 @@ def network_table(law: str, histories: Sequence[History], replays: Mapping[str, 
     for history in histories:
         name, size, online = history.recording.name, force_rms(history), online_error(history)
         own = replays[name]
+        rows: list[tuple[str, AxleRmse | None]]
         rows = [(NETWORK, own.against_truth or own.against_online)]
         rows += [] if online is None else [(f"{law}, learning online", online)]
-        note = "" if size is not None else "(against online, no truth)"
-        table += [[title, name, *error_cells(error, size), note] for title, error in rows]
+        table += [
+            [title, name, *error_cells(error, size), no_truth(error, size)] for title, error in rows
+        ]
     return text_table(table, "<<>>")

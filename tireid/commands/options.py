@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 from identifier.method import Method
 from identifier.methods import (
     DEFAULT,
+    LIVE,
     METHODS,
     REFERENCE,
+    WITHOUT_V_Y,
     draws_weights,
     make_method,
 )
@@ -258,14 +260,16 @@ def chosen_method(
     vehicle: Vehicle,
     seed: int | None = None,
     *,
-    usual: str = DEFAULT,
+    without_v_y: bool = False,
+    online: bool = False,
 ) -> Chosen:
     """Return what --method, --paper or --design say, the default where none is given.
 
     Parameters
     ----------
     seed : of initial weights; None where nobody asks for one.
-    usual : the default.
+    without_v_y : whether a log has no lateral velocity, which changes the default.
+    online : whether the default is the one that learns sample by sample.
 
     Raises
     ------
@@ -278,6 +282,7 @@ def chosen_method(
             raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
         design = read_design(options.design)
         return Chosen(design.law, design)
+    usual = WITHOUT_V_Y if without_v_y else LIVE if online else DEFAULT
     name = options.method or (REFERENCE if options.paper else usual)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")

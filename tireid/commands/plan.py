@@ -12,7 +12,7 @@ from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
 from identifier.plan import STEERING_LAG, Plan, hold_of
 from identifier.plan.search import REAR
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.files import digest
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from codegen.arrays import Array, blocks
 from codegen.escape import visible
 from identifier.frozen import vehicle_numbers
-from identifier.reproducibility import Prediction, beyond_known
-from identifier.stored import load_model
-from identifier.tire_model import UNCALIBRATED, TireModel
+from identifier.prediction import Prediction
+from identifier.reproducibility import beyond_known
+from identifier.tire_model import UNCALIBRATED, TireModel, load_model
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__
@@ -82,11 +82,11 @@ def run(options: argparse.Namespace) -> int:
         run_name=options.run_name,
         check=not options.no_check,
     )
-    prediction = replay(model, recording)
+    prediction = replay(recording, model)
     recording = prediction.recording
     if recording.estimated:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
-    verdict = prediction.verdict()
+    verdict = prediction.verdict
     half, friction = model.half_band_over(recording), verdict.friction
     with output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))

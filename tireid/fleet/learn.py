@@ -37,7 +37,7 @@ from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
 from identifier.run import identify, learn
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.verdict import Verdict, judge, judge_prediction
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
@@ -372,7 +372,7 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
     if recording.logged_v_y is None or telling.judging == "full":
         history = identify(recording, vehicle, method, telling.start)
         recording, model = history.recording, history.freeze()
-        verdict = history.verdict() if telling.judging == "full" else None
+        verdict = judge(history) if telling.judging == "full" else None
     else:
         model = learn(recording, vehicle, method, telling.start)
     if not isinstance(model, AxleModel):

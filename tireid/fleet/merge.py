@@ -15,6 +15,7 @@ from datetime import date
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.curve import EDGES
 from identifier.axle.information import Information, Total, merged, posterior, reference_of
@@ -30,7 +31,7 @@ PASSES = 60  # of expectation and maximization
 WORTH = 2.0  # cars that the identifier's prior counts as
 
 
-class MergeError(ValueError):
+class MergeError(TireidError, ValueError):
     """Rows do not make a model together; the message says which, and what to do."""
 
 

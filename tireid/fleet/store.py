@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.writing import naming
 from identifier.axle import AxleModel
 from identifier.axle.information import Information
@@ -40,7 +41,7 @@ HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted a
 WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "oci", "memory"}  # see _put
 
 
-class StoreError(ValueError):
+class StoreError(TireidError, ValueError):
     """The store cannot be used; the message names it, and says why and what to do."""
 
 

@@ -141,8 +141,9 @@ def _how_learnt(learnt: History) -> str:
     lateral = "acceleration" if estimated else "velocity"
     told = side_slip_text(learnt)
     more = f" Nobody measured lateral velocity: {told}." if estimated and told else ""
+    how = "learnt sample by sample" if learnt.online else "one estimate of tires and sensors"
     return (
-        f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from speed, "
+        f"{learnt.recording.duration:.4g} s of driving, {how} from speed, "
         f"lateral {lateral}, yaw rate and steering.{more}"
     )
 
@@ -239,7 +240,7 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
         name, recording = run.recording.name, run.recording
         if run.diverged_at is not None:
             said.append(f"{name}: learning diverged at {freeze_key(run.diverged_at)} s.")
-        if recording.axle_force is None:
+        if recording.axle_force is None and run.online:
             said.append(
                 f"{name} has no true forces: errors are against what was identified online over "
                 "it, which asks only whether the model agrees with itself."
@@ -381,24 +382,26 @@ def _errors(
     frozen: Mapping[str, Mapping[str, Replay]],
     figures: Mapping[str, Figure],
 ) -> list[Block]:
-    rows = []
+    rows, online = [], runs[0].online
     for run in runs:
         name, size = run.recording.name, force_rms(run)
-        rows.append([name, "online", *_cells(online_error(run), size)])
+        if online:
+            rows.append([name, "online", *_cells(online_error(run), size)])
         for when, replays in frozen.items():
             error = replays[name].against_truth or replays[name].against_online
             rows.append([name, f"frozen, {when}", *_cells(error, size)])
     blocks: list[Block] = [
         Table(
             caption="RMSE of the axle force, and its share of the rms force where there is a "
-            "truth; without one it is against what was identified online.",
+            "truth" + ("; without one it is against what was identified online." * online or "."),
             header=["drive", "", "front [N]", "share", "rear [N]", "share"],
             rows=rows,
         )
     ]
     if "forces" in figures:
-        caption = "Axle forces over time: online, and replayed with frozen weights."
-        blocks.append(drawing(figures["forces"], caption, READ["forces"]))
+        caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
+        read = READ["forces" if online else "replay"]
+        blocks.append(drawing(figures["forces"], caption, read))
     for name, figure in figures.items():
         if name.startswith("replay_"):
             caption = f"The frozen model asked about {name.removeprefix('replay_')}."

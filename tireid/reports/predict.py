@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from identifier.measured import with_doubt
-from identifier.reproducibility import Prediction
+from identifier.prediction import Prediction
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest

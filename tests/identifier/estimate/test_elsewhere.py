@@ -138,7 +138,7 @@ def test_a_run_of_a_fit_is_exported_to_go_on_learning(drive, fitted, tmp_path, m
     monkeypatch.setattr(exporting, "export_method", lambda method, car, start, *_, **__: (
         method, method.setup(car, start)
     ))  # fmt: skip
-    run = identify(drive, CAR, FitMethod.for_vehicle(CAR))
+    run = ti.identify(drive, CAR, FitMethod.for_vehicle(CAR))
     method, begun = ti.export(run, tmp_path / "ecu")
     assert isinstance(method, AxleIdentifier)
     np.testing.assert_allclose(begun.carry["W"], fitted.in_units(LADDER).W)
