@@ -24,6 +24,7 @@ from identifier.baselines import (
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.method import FitMethod
+from identifier.estimate.model import FittedModel
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
@@ -81,6 +82,7 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
     AxleModel.kind: lambda model, vehicle, dt: (
         InertialIdentifier if model.tells_v_y else AxleIdentifier
     ).for_vehicle(vehicle, dt=dt),
+    FittedModel.kind: lambda _, vehicle, dt: AxleIdentifier.for_vehicle(vehicle, dt=dt),
     NetworkModel.kind: lambda model, vehicle, dt: PaperIdentifier.for_vehicle(
         vehicle, network=model.network, dt=dt
     ),

@@ -247,7 +247,7 @@ class AxleIdentifier(Method):
 
     def _resumed(self, start: TireModel) -> AxleModel:
         """Return stored weights to begin with, of this structure."""
-        return resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+        return resumed(start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
 
     def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.

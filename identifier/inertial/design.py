@@ -170,7 +170,7 @@ class InertialIdentifier(Method):
         ----------
         model : its weights.
         """
-        return fits(model, AxleModel, ladder=self.ladder)
+        return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
 
     def possible_tires(self) -> HalfSpaces:
         """Return the weights that the curve of a tire can have, within the bounds."""
@@ -231,7 +231,9 @@ class InertialIdentifier(Method):
         sensors = np.zeros(len(SENSORS))
         sensors[SENSORS.index("roll")] = self.beliefs.roll
         if start is not None:
-            stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+            stored = resumed(
+                start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
+            )
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
             sensors[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]] = own[:, 2]
         size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
