@@ -6,7 +6,7 @@ plant and confirmed once on recordings.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -71,6 +71,8 @@ ALIKE = {  # standard deviation of front less rear
 # At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
+TYPED = ("steering_gain",)  # numbers that a person typed: right to their sd, or plainly wrong
+TAIL = 1.0  # degrees of freedom of the Student belief in them
 FAULTS = (  # what no log leaves open but one that shows it
     "v_y_delay", "steering_delay", "r_bias", "r_delay", "v_x_factor", "cg_shift", "ln_inertia",
     "bank",
@@ -86,6 +88,7 @@ class Priors:
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
+    typed : parameters whose belief is a Student one, of the same curvature at its mean.
     """
 
     mean: Array
@@ -93,6 +96,7 @@ class Priors:
     high: Array
     information: Array
     moves: NDArray[np.bool_]
+    typed: tuple[int, ...] = ()
 
     @classmethod
     def of(
@@ -133,7 +137,8 @@ class Priors:
             b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
             _couple(information, each, SHARED_ERROR)
-        return cls(mean=mean, low=low, high=high, information=information, moves=moves)
+        typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
+        return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
 
     def with_roads(self, count: int) -> "Priors":
         """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
@@ -143,7 +148,8 @@ class Priors:
         information[: len(self.mean), : len(self.mean)] = self.information
         extra = np.arange(len(self.mean), n)
         information[extra, extra] = 1.0 / ANOTHER_ROAD**2
-        return Priors(
+        return replace(
+            self,
             mean=np.concatenate([self.mean, np.zeros(count)]),
             low=np.concatenate([self.low, low]),
             high=np.concatenate([self.high, high]),
@@ -154,7 +160,20 @@ class Priors:
     def cost(self, p: Array) -> float:
         """Return -ln of the prior's density over that at its mean [nats]."""
         away = p - self.mean
-        return float(0.5 * away @ self.information @ away)
+        cost = 0.5 * away @ self.information @ away
+        for k in self.typed:
+            z2 = self.information[k, k] * away[k] ** 2
+            cost += 0.5 * ((TAIL + 1.0) * np.log1p(z2 / (TAIL + 1.0)) - z2)
+        return float(cost)
+
+    def at(self, p: Array) -> Array:
+        """Return the information (p, p) that counts at parameters: less where typed is wrong."""
+        found = self.information
+        for k in self.typed:
+            found = found.copy() if found is self.information else found
+            z2 = found[k, k] * (p[k] - self.mean[k]) ** 2
+            found[k, k] *= (TAIL + 1.0) / (TAIL + 1.0 + z2)
+        return found
 
 
 def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:

@@ -259,7 +259,6 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     """Return the optimum that is found from a start."""
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
-    P = priors.information[np.ix_(index, index)]
     p, damping = start.copy(), 1e-3
     now = problem.residuals(p)
     T = problem.memory(now.e)
@@ -270,8 +269,9 @@ def _descend(problem: Problem, start: Array) -> Posterior:
         cost = problem.misfit(now.e, S2, T) + _beliefs(priors, p)
         H, gradient = _normal(problem, now, S2, T)
         soft, soft_slopes = softness(p)
-        H = H + P + (soft_slopes.T @ soft_slopes)[np.ix_(index, index)]
-        gradient = gradient + (priors.information @ (p - priors.mean) + soft @ soft_slopes)[index]
+        belief = priors.at(p)
+        H = H + belief[np.ix_(index, index)] + (soft_slopes.T @ soft_slopes)[np.ix_(index, index)]
+        gradient = gradient + (belief @ (p - priors.mean) + soft @ soft_slopes)[index]
         better = None
         for _ in range(8):
             step = _bounded(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
@@ -293,7 +293,7 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     data, _ = _normal(problem, now, S2, T)
     cost = problem.cost(now.e, p, T)
     whole = np.zeros((len(p), len(p)))
-    whole[np.ix_(index, index)] = np.linalg.inv(data + P)
+    whole[np.ix_(index, index)] = np.linalg.inv(data + priors.at(p)[np.ix_(index, index)])
     n, tires = len(NAMES), problem.tires
     return Posterior(
         vehicle=problem.vehicle,
