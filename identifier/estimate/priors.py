@@ -68,7 +68,7 @@ ALIKE = {  # standard deviation of front less rear
     "compliance": (0.003, "L"),
     "sway_share": (0.1, ""),
 }
-# At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
+# At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds differ.
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
 TYPED = ("steering_gain",)  # numbers that a person typed: right to their sd, or plainly wrong
