@@ -23,6 +23,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "speed": [],
     "long_logs": ["--long"],
     "recorded_cars": [],
+    "estimate": [],
     "learn_and_extrapolate": [],
     "sensor_faults": [],
     "beginnings": [],

@@ -5,6 +5,7 @@ returns a method whose numbers follow from the vehicle alone.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from identifier.axle.design import AxleIdentifier
@@ -13,6 +14,7 @@ from identifier.baselines import (
     ExtendedStateObserver,
     ForceEkf,
     HorizonEstimator,
+    LaggedEkf,
     LinearBaseline,
     StiffnessRls,
     Washout,
@@ -67,6 +69,8 @@ METHODS: Mapping[str, Factory] = {
     "linear": _seedless(LinearBaseline.for_vehicle),
     "stiffness_rls": _seedless(StiffnessRls.for_vehicle),
     "magic_formula_ekf": _seedless(magic_formula_ekf),
+    "textbook_ekf": _seedless(partial(magic_formula_ekf, textbook=True)),
+    "lagged_ekf": _seedless(LaggedEkf.for_vehicle),
     "dugoff_ekf": _seedless(dugoff_ekf),
     "eso": _seedless(ExtendedStateObserver.for_vehicle),
     "ekf_force": _seedless(ForceEkf.for_vehicle),

@@ -92,6 +92,7 @@ class Priors:
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
+    typed : parameters whose belief is a Student one, of the same curvature at its mean.
     """
 
     mean: Array
@@ -99,6 +100,7 @@ class Priors:
     high: Array
     information: Array
     moves: NDArray[np.bool_]
+    typed: tuple[int, ...] = ()
 
     @classmethod
     def of(
@@ -141,7 +143,8 @@ class Priors:
             b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
             _couple(information, each, SHARED_ERROR)
-        return cls(mean=mean, low=low, high=high, information=information, moves=moves)
+        typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
+        return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
 
     def with_roads(self, count: int) -> "Priors":
         """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
@@ -151,7 +154,8 @@ class Priors:
         information[: len(self.mean), : len(self.mean)] = self.information
         extra = np.arange(len(self.mean), n)
         information[extra, extra] = 1.0 / ANOTHER_ROAD**2
-        return Priors(
+        return replace(
+            self,
             mean=np.concatenate([self.mean, np.zeros(count)]),
             low=np.concatenate([self.low, low]),
             high=np.concatenate([self.high, high]),
