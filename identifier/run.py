@@ -201,9 +201,7 @@ class History:
             raise ValueError("an online run is beside another drive as of identify")
         model = self.freeze(t)
         force = model.axle_force(recording)
-        return replace(
-            self, recording=recording, axle_force=force, models={len(recording): model}
-        )
+        return replace(self, recording=recording, axle_force=force, models={len(recording): model})
 
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
         """Return the run over each of the recordings that the drive was joined of.

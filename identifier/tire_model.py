@@ -389,6 +389,11 @@ class TireModel(ABC):
         return False
 
     @property
+    def band_origin(self) -> str:
+        """Where the width of the band comes from, in words."""
+        return "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
+
+    @property
     def band_calibrated(self) -> bool:
         """Whether the width of `band` was found on parts of the drive that did not teach.
 
@@ -663,7 +668,7 @@ class TireModel(ABC):
             cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
             lines.append("  ".join(cells).rstrip())
         if self.has_band:
-            how = "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
+            how = self.band_origin
             lines.append(f"band: {how}")
         if self.vehicle.estimates:
             lines.append(self.vehicle.estimates)

@@ -397,6 +397,15 @@ class FittedModel(TireModel):
         return True
 
     @property
+    def band_origin(self) -> str:
+        """Where the width of the band comes from, in words."""
+        front, rear = (100.0 * float(share) for share in self.missed)
+        return (
+            f"what the drives leave open, and {front:.0f} / {rear:.0f} % of the force, by which "
+            "drives of one car differ"
+        )
+
+    @property
     def band_calibrated(self) -> bool:
         """Whether the width of its band is more than noise of the sensors: always."""
         return True

@@ -5,8 +5,9 @@ car of 1:10; a stiffness that a vehicle file gives does not enter. Chosen on ran
 plant and confirmed once on recordings.
 """
 
+import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +76,7 @@ ALIKE = {  # standard deviation of front less rear
 # At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds differ.
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
-TYPED = [INDEX["steering_gain"]]
+TYPED = ("steering_gain",)
 TAILS = 2.0  # degrees of freedom of their priors
 FAULTS = (  # what no log leaves open but one that shows it
     "v_y_delay", "steering_delay", "r_bias", "r_delay", "v_x_factor", "cg_shift", "ln_inertia",
@@ -169,15 +170,18 @@ class Priors:
         A number that somebody typed may be off by much more than its doubt: its prior is Student's.
         """
         away = p - self.mean
-        typed = self.information[TYPED, TYPED] * away[TYPED] ** 2
-        gaussian = away @ self.information @ away - typed.sum()
-        return float(0.5 * gaussian + 0.5 * (TAILS + 1.0) * np.log1p(typed / TAILS).sum())
+        cost = 0.5 * float(away @ self.information @ away)
+        for k in self.typed:
+            z2 = float(self.information[k, k] * away[k] ** 2)
+            cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / TAILS) - z2)
+        return cost
 
     def around(self, p: Array) -> tuple[Array, Array]:
-        """Return gradient (p,) and positive curvature (p, p) of the cost at parameters."""
+        """Return gradient (p,) and positive curvature (p, p) of the cost at parameters `p` (p,)."""
         away, curvature = p - self.mean, self.information.copy()
-        typed = self.information[TYPED, TYPED]
-        curvature[TYPED, TYPED] *= (TAILS + 1.0) / (TAILS + typed * away[TYPED] ** 2)
+        for k in self.typed:
+            z2 = self.information[k, k] * away[k] ** 2
+            curvature[k, k] *= (TAILS + 1.0) / (TAILS + z2)
         gradient: Array = curvature @ away
         return gradient, curvature
 

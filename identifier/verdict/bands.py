@@ -114,6 +114,7 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     found = evidence(model, recording, run.road)
     if found is None:
         return model
+
     def teach(halting: Recording) -> TireModel:
         return run.taught(halting, history.vehicle)
 

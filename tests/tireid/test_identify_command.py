@@ -308,7 +308,7 @@ def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
         assert model.band_calibrated  # the weights file keeps it
         page = (result / "report.html").read_text()
         assert "nine of ten forces of other drives" in page
-        assert ("had not taught the model" in page) == (law == "axle")
+        assert model.band_origin in page
 
 
 def test_figures_are_written(result):

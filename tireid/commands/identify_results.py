@@ -188,7 +188,7 @@ def guaranteed_text(model: TireModel) -> str:
     """
     sentence = guaranteed_sentence(model)
     return sentence or (
-        "no guaranteed band: it takes a method that learns curves of slip, a lateral velocity that "
+        "no guaranteed band: it takes --method axle, a lateral velocity that "
         "was measured, and enough driving"
     )
 

@@ -321,14 +321,10 @@ def band_sentence(model: TireModel) -> str:
         return ""
     at = model.force(known)
     shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
-    how = (
-        "its width was found on parts of the drive that had not taught the model, by the motion"
-        if model.band_calibrated
-        else "the drive was too short to check its width, which is what learning believes"
-    )
     return (
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
-        f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear); {how}. "
+        f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
+        f"width: {model.band_origin}. "
         "Where slip is not known it widens to what was believed before the drive."
     )
 
