@@ -222,9 +222,7 @@ class FrictionDrop:
     direction: float = 1.5
     errors: float = 1.0
 
-    def time(
-        self, design: Design, vehicle: Vehicle, friction: float, v_x: float
-    ) -> float:
+    def time(self, design: Design, vehicle: Vehicle, friction: float, v_x: float) -> float:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
         While both are, the mean of squared errors rises at least as fast as here, the alarm with
