@@ -8,7 +8,7 @@ import pytest
 from codegen.arrays import blocks
 from identifier.estimate.model import FittedModel
 from identifier.frozen import FrozenModelError
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from tests.identifier.estimate.conftest import driven
 
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from identifier.verdict.causes import CAUSES, PATIENCE, Suspect, _least
-from identifier.verdict.rules import Drive, findings
 
 import identifier.verdict
 from identifier.estimate.method import FitMethod
@@ -151,71 +149,30 @@ def test_an_offset_is_estimated_with_its_size_and_the_forces_are_right(drive, na
     model, speed = run.freeze(), float(np.mean(faulty.v_x))
     found = model["v_y_bias"] + model["v_y_angle"] * speed
     assert found == pytest.approx(size if name == "bias of v_y" else size * speed, rel=0.05)
-    assert run.verdict().valid
+    assert judge(run).valid
     assert share_missed(model, faulty).max() < 0.08
 
 
-@pytest.mark.parametrize("name", PLANTED)
-def test_a_planted_fault_is_refused_and_named_with_its_size(drive, name):
-    plant, said, sizes = PLANTED[name]
+@pytest.mark.parametrize(
+    "plant",
+    [
+        lambda d: late(d, "delta_f", 0.15),
+        lambda d: late(d, "r", 0.12),
+        lambda d: replace(d, v_y=-d.v_y),
+    ],
+    ids=["late steering", "late yaw rate", "mirrored v_y"],
+)
+def test_a_fault_that_the_estimate_cannot_take_out_is_refused(drive, plant):
     verdict = judge(answer(plant(drive)))
     assert not verdict.valid
     assert "force_missed" in codes(verdict)
 
 
-@pytest.mark.parametrize("degrees", [5.0, -5.0])
-def test_at_a_speed_that_changes_a_turned_sensor_is_told_from_a_bias(changing, degrees):
-    assert judge(answer(changing)).valid
-    cause = likely(judge(answer(turned(changing, degrees))))
-    found = re.search(rf"turned by {NUMBER} degrees", cause)
-    assert found, cause
-    assert float(found[1]) == pytest.approx(degrees, rel=0.4)
-
-
-def test_a_wrong_inertia_is_refused_and_named(drive):
-    """Its size is told by doubling what is tried, so within a factor of two and a half."""
+def test_a_wrong_inertia_is_refused(drive):
     car = replace(sedan(), yaw_inertia=10.0 * sedan().yaw_inertia)
     verdict = judge(answer(drive, car))
-    assert not verdict.valid
-    (told,) = [one for one in verdict.findings if one.code == "yaw_inertia"]
-    assert not told.refuses
-    found = re.search(rf"told yaw inertia is about {NUMBER} times the true", likely(verdict))
-    assert found
-    assert 4.0 < float(found[1]) < 25.0
-
-
-def test_a_cause_is_said_by_its_side_and_by_where_a_number_comes_from():
-    by_code = {cause.code: cause for cause in CAUSES}
-    for size, side in ((-0.58, "ahead of"), (0.58, "behind")):
-        said = Suspect(by_code["center_of_gravity"], size, 0.5).text
-        assert f"0.58 m {side} the told one" in said and "-" not in said
-    inertia = by_code["yaw_inertia"]
-    assert Suspect(inertia, 1.0, 0.5).text.startswith("the told yaw inertia is about 2.7")
-    left_out = replace(sedan(), estimated=("yaw_inertia",))
-    said = Suspect(inertia, 1.0, 0.5, "", left_out.origin("yaw_inertia")).text
-    assert said.startswith("the estimated yaw inertia")
-
-
-def test_the_size_of_a_cause_is_doubled_and_then_bent_to_the_least():
-    bias = next(one for one in CAUSES if one.code == "v_y_bias")
-    for size in (0.11, -0.2):
-        found, left = _least(lambda x, to=size: 1.0 + (x - to) ** 2, 1.0 + size**2, bias)
-        assert (found, left) == (pytest.approx(size), pytest.approx(1.0))
-    assert _least(lambda x: 1.0 + abs(x), 1.0, bias)[0] == pytest.approx(0.0, abs=0.02)
-    far, _ = _least(lambda x: -x, 0.0, bias)
-    asked = []
-    _least(lambda x: asked.append(x) or 2.0, 1.0, bias)
-    apart = [one for one in asked if abs(one) > 1e-9]
-    assert len(apart) == 2 * PATIENCE, "what only gets worse is not asked for ever"
-    assert 0.5 * bias.most < far <= bias.most
-
-
-def test_a_delay_is_taken_out_by_whole_samples(drive):
-    late = next(one for one in CAUSES if one.code == "steering_late")
-    mended = late.mend(drive, sedan(), 0.05).recording
-    k = round(0.05 / drive.dt)
-    np.testing.assert_array_equal(mended.delta_f[:-k], drive.delta_f[k:])
-    assert (mended.delta_f[-k:] == drive.delta_f[-1]).all()
+    assert codes(verdict) == {"force_missed"}
+    assert "tireid doctor looks for the cause" in verdict.lines[2]
 
 
 def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
@@ -237,44 +194,6 @@ def test_a_drive_of_a_moment_is_too_short(drive):
     assert codes(judge(answer(drive.between(6.0, 6.9)))) == {"too_short"}
 
 
-def test_a_y_that_contradicts_the_motion_is_noticed(drive):
-    banked = replace(drive, a_y=drive.a_y + 3.0)
-    verdict = judge(answer(banked))
-    (one,) = [finding for finding in verdict.findings if finding.code == "a_y_disagrees"]
-    assert "+3 m/s²" in one.text
-    assert "a_y_disagrees" not in codes(judge(answer(drive)))
-
-
-def test_swapped_axles_are_noticed_by_the_center_of_gravity(drive):
-    car = sedan()
-    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
-    verdict = judge(answer(drive, swapped))
-    assert codes(verdict) == {"center_of_gravity"}
-    assert verdict.measures["center_of_gravity_m"] == pytest.approx(car.l_f - car.l_r, rel=0.4)
-
-
-def test_a_downforce_that_is_not_told_is_the_likely_cause_and_told_the_answer_is_valid():
-    log, car = pressed(0.3, np.random.default_rng(3))
-    verdict = judge(answer(log, car))
-    assert not verdict.valid
-    named = [one.text for one in verdict.findings if "downforce" in one.text]
-    told = dict(re.findall(r"(downforce_area_\w+) = ([\d.]+)", named[0]))
-    right = areas_of(car, 0.3)
-    assert set(told) == set(right)
-    for name, area in told.items():
-        assert float(area) == pytest.approx(right[name], rel=0.25)
-    assert "center_of_gravity" not in codes(verdict)
-    written = replace(car, **{key: float(area) for key, area in told.items()})
-    assert judge(answer(log, written)).valid
-
-
-def test_without_downforce_none_is_blamed(drive):
-    car = sedan()
-    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
-    (one,) = judge(answer(drive, swapped)).findings
-    assert "downforce" not in one.text
-
-
 def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
     """The stiffness of the plant's tires at their static load, within three sigma."""
     told = dict(zip(("front", "rear"), sedan().bicycle[4:], strict=True))
@@ -293,7 +212,7 @@ def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
 
 
 def test_a_number_of_a_refused_axle_is_not_valid(drive):
-    verdict = judge(answer(replace(drive, v_y=drive.v_y + 2.0)))
+    verdict = judge(answer(drive, replace(sedan(), yaw_inertia=25000.0)))
     assert not [number for number in verdict.numbers if number.valid]
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
     assert len(tires) == 4
@@ -309,79 +228,9 @@ def moved(model, **by):
     return replace(model, p=p)
 
 
-def looked_at(clean, **changes):
-    model, recording = clean.freeze(), clean.recording
-    found = evidence(model, recording)
-    assert found is not None
-    parts = {"suspects": (), "center": None, "elsewhere": None, "apart": None, "learns": True}
-    parts |= {"model": model, "recording": recording, "found": found} | changes
-    return {(one.code, one.axle) for one in findings(Drive(**parts))}
-
-
-def test_no_rule_speaks_where_nothing_is_wrong(clean):
-    assert looked_at(clean) == set()
-    assert looked_at(clean, elsewhere=np.array([0.1, 0.1]), apart=np.array([0.05, 0.05])) == set()
-
-
-def test_halves_that_teach_different_things_are_refused(clean):
-    found = looked_at(clean, elsewhere=np.array([0.1, 0.7]))
-    assert found == {("not_repeated", "rear")}
-
-
-def test_a_model_that_was_still_moving_is_refused(clean):
-    assert looked_at(clean, apart=np.array([0.4, 0.1])) == {("online_apart", "front")}
-
-
-def with_weights(clean, change):
-    model = clean.freeze()
-    return replace(model, W=change(model.W.copy()))
-
-
-def test_a_dead_axle_is_no_tire(clean):
-    dead = with_weights(clean, lambda W: W * np.array([[1.0], [1e-9]]))
-    assert looked_at(clean, model=dead) == {("no_tire", "rear")}
-
-
-def test_a_rear_axle_of_five_times_the_front_is_noticed(clean):
-    stiff = with_weights(clean, lambda W: W * np.array([[0.6], [3.0]]))
-    assert looked_at(clean, model=stiff) == {("front_against_rear", None)}
-
-
-@pytest.mark.parametrize("wheelbases", [0.97, 1.03])
-def test_a_force_that_lags_by_more_than_a_wheelbase_is_no_tires(clean, wheelbases):
-    model = clean.freeze()
-    wanted = wheelbases * model.vehicle.wheelbase - model.relaxation_length[1]
-    slope = model.stiffness[1] / model.vehicle.axle_loads[1]
-    own = model.own + np.array([[0.0, 0.0, 0.0], [wanted / slope, 0.0, 0.0]])
-    late = replace(model, own=own)
-    assert late.relaxation_length[1] == pytest.approx(wheelbases * model.vehicle.wheelbase)
-    assert (("lags_too_far", "rear") in looked_at(clean, model=late)) == (wheelbases > 1.0)
-
-
-@pytest.mark.parametrize(("estimated", "blamed"), [((), "v_y is measured"), (("v_y",), "r or a_y")])
-def test_what_lags_too_far_is_blamed_on_a_sensor_that_is_there(clean, estimated, blamed):
-    model = clean.freeze()
-    late = replace(model, own=model.own + np.array([[0.0] * 3, [0.5, 0.0, 0.0]]))
-    recording = replace(clean.recording, estimated=estimated)
-    said = [one for one in judge_prediction(late, recording).findings if one.code == "lags_too_far"]
-    assert said and blamed in said[0].text
-
-
-def test_a_v_y_from_the_roof_of_a_car_that_rolls_is_refused(whole):
-    roll = -0.012 * whole.a_y  # 6.7 degrees at 1 g, 1.5 m below the sensor
-    shaken = replace(whole, v_y=whole.v_y + 1.5 * np.gradient(roll, whole.dt), axle_force=None)
-    car = sedan()
-    verdict = judge(identify(shaken, car, make_method("axle", car)))
-    assert "lags_too_far" in {one.code for one in verdict.findings if one.refuses}
-
-
-def test_a_curve_that_stiffens_with_slip_is_noticed(clean):
-    def s_shape(W):
-        slope = W[0] / np.array(clean.design.ladder)
-        W[0, 0] -= 0.85 * slope.sum() * clean.design.ladder[0]
-        return W
-
-    assert ("curve_stiffens", "front") in looked_at(clean, model=with_weights(clean, s_shape))
+def judged(clean, model):
+    """The verdict where the run had come to another model."""
+    return judge(replace(clean, models={len(clean.recording): model}))
 
 
 def test_what_is_still_believed_is_refused_where_the_force_is(clean):
@@ -446,16 +295,7 @@ def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
     assert share.max() < 1.0 / 7.0 or not valid
     assert np.allclose(verdict.measures["force_missed"], share, atol=0.05)
     learnt = {number.learnt for number in verdict.numbers}
-    assert learnt == ({False} if name == "linear" else {True})
-
-
-def test_a_run_that_went_on_from_a_stored_model_is_judged_with_it(clean, drive):
-    """What these seconds teach of the rear axle repeats nowhere; what was stored is known."""
-    short, car = drive.between(12.0, 14.5), sedan()
-    assert codes(judge(answer(short))) == {"not_repeated"}
-    went_on = identify(short, car, AxleIdentifier.for_vehicle(car), clean.freeze())
-    assert went_on.start is not None
-    assert judge(went_on).valid
+    assert (True in learnt) == (name != "linear")
 
 
 def test_a_stretch_that_a_sensor_needed_to_settle_is_a_note(drive):
