@@ -5,6 +5,7 @@ returns a method whose numbers follow from the vehicle alone.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from identifier.axle.design import AxleIdentifier
@@ -13,6 +14,7 @@ from identifier.baselines import (
     ExtendedStateObserver,
     ForceEkf,
     HorizonEstimator,
+    LaggedEkf,
     LinearBaseline,
     StiffnessRls,
     Washout,
@@ -24,6 +26,7 @@ from identifier.baselines import (
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.method import FitMethod
+from identifier.estimate.model import FittedModel
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
@@ -66,6 +69,8 @@ METHODS: Mapping[str, Factory] = {
     "linear": _seedless(LinearBaseline.for_vehicle),
     "stiffness_rls": _seedless(StiffnessRls.for_vehicle),
     "magic_formula_ekf": _seedless(magic_formula_ekf),
+    "textbook_ekf": _seedless(partial(magic_formula_ekf, textbook=True)),
+    "lagged_ekf": _seedless(LaggedEkf.for_vehicle),
     "dugoff_ekf": _seedless(dugoff_ekf),
     "eso": _seedless(ExtendedStateObserver.for_vehicle),
     "ekf_force": _seedless(ForceEkf.for_vehicle),
@@ -81,6 +86,7 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
     AxleModel.kind: lambda model, vehicle, dt: (
         InertialIdentifier if model.tells_v_y else AxleIdentifier
     ).for_vehicle(vehicle, dt=dt),
+    FittedModel.kind: lambda _, vehicle, dt: AxleIdentifier.for_vehicle(vehicle, dt=dt),
     NetworkModel.kind: lambda model, vehicle, dt: PaperIdentifier.for_vehicle(
         vehicle, network=model.network, dt=dt
     ),

@@ -184,6 +184,27 @@ class History:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
 
+    def asked(self, recording: Recording, t: float | None = None) -> "History":
+        """Return what the model frozen at a time says of another recording, which teaches nothing.
+
+        Parameters
+        ----------
+        recording : another drive of the car.
+        t : time of the freeze in this recording's own clock [s]; None is the end.
+
+        Raises
+        ------
+        ValueError
+            Where the run is online: then `identify` runs over the other recording, too.
+        """
+        if self.online:
+            raise ValueError("an online run is beside another drive as of identify")
+        model = self.freeze(t)
+        force = model.axle_force(recording)
+        return replace(
+            self, recording=recording, axle_force=force, models={len(recording): model}
+        )
+
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
         """Return the run over each of the recordings that the drive was joined of.
 

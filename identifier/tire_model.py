@@ -238,6 +238,18 @@ class TireModel(ABC):
         """Return the model as one that goes on learning where a lateral velocity is told."""
         return self
 
+    def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
+        """Return the model in the hidden units of the axle identifier where it projects on them.
+
+        What is in such units already, and what cannot be, is returned as it is.
+
+        Parameters
+        ----------
+        ladder : slip scales of the units [rad]; None takes those that come closest.
+        """
+        del ladder
+        return self
+
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
@@ -325,7 +337,7 @@ class TireModel(ABC):
         return None
 
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
         return np.zeros(t.shape, dtype=bool)
 
     @property

@@ -96,7 +96,7 @@ def export(
     Parameters
     ----------
     source : a run, whose method goes on from its end; a tire model, from which the method that
-        made it goes on; or a method, which begins afresh.
+        made it goes on; or a method, which begins afresh. From a fit the axle identifier goes on.
     folder : to write.
     vehicle : the car; None takes that of the run or the model, for a method the sedan.
     name : prefix of every symbol.
@@ -129,6 +129,8 @@ def export(
             start = source.tire if band else source.freeze()
         except CannotFreezeError:  # a filter of forces learns nothing that a run could begin with
             start = None
+        if method.whole and start is not None:
+            method = continuing(start, car, method.dt)
     elif isinstance(source, TireModel):
         start, car = source, vehicle or source.vehicle
         method = continuing(source, car)

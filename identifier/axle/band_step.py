@@ -42,23 +42,20 @@ class BandNumbers(NamedTuple):
     per_froude: Any
 
 
-def band_numbers(calibration: BandCalibration, froude_speed: float) -> Array:
-    """Return the numbers of `BandNumbers`, (2, 5).
+def band_numbers(calibration: BandCalibration, froude_speed: float) -> BandNumbers:
+    """Return the numbers of a step.
 
     Parameters
     ----------
     calibration : of the band.
     froude_speed : sqrt(g L) [m/s].
     """
-    steering = np.array([calibration.noise[2] ** 2, 0.0])
-    return np.column_stack(
-        [
-            calibration.color - 1.0,
-            np.full(2, calibration.speed),
-            calibration.noise[:2] ** 2,
-            steering,
-            np.full(2, 1.0 / froude_speed),
-        ]
+    return BandNumbers(
+        color=calibration.color - 1.0,
+        speed=np.full(2, calibration.speed),
+        sideways=calibration.noise[:2] ** 2,
+        steering=np.array([calibration.noise[2] ** 2, 0.0]),
+        per_froude=np.full(2, 1.0 / froude_speed),
     )
 
 

@@ -21,9 +21,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import larger, smaller, within
 from identifier.axle.learning import RegressionNumbers, filtered
 from models.rules import require_positive_fields
@@ -69,25 +67,23 @@ class RoadSlope:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `SlopeNumbers`, (9,).
+    def at(self, dt: float) -> "SlopeNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        return np.array(
-            [
-                -math.expm1(-dt / self.time),
-                self.level,
-                self.roll,
-                self.most,
-                self.step,
-                self.largest,
-                self.share**2,
-                self.doubt**2,
-                -math.expm1(-dt / self.memory),
-            ]
+        return SlopeNumbers(
+            gain=-math.expm1(-dt / self.time),
+            level=self.level,
+            roll=self.roll,
+            most=self.most,
+            step=self.step,
+            largest=self.largest,
+            share=self.share**2,
+            doubt=self.doubt**2,
+            memory=-math.expm1(-dt / self.memory),
         )
 
 

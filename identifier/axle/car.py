@@ -37,7 +37,8 @@ def car_numbers(vehicle: Vehicle) -> Array:
     load = np.array(vehicle.axle_loads)
     yaw = np.array([1.0, -1.0]) * vehicle.yaw_inertia / (vehicle.wheelbase * load)
     arm = np.array([vehicle.l_f, -vehicle.l_r])
-    return np.column_stack([arm, load / vehicle.weight, yaw, load])
+    columns = Car(arm=arm, share=load / vehicle.weight, inertia=yaw, load=load)
+    return np.column_stack(columns)
 
 
 def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:

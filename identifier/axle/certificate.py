@@ -240,7 +240,7 @@ class FrictionDrop:
         told = r.error + r.relative_error * friction + r.noise * self.slope / v_x
         sure = r.error + r.relative_error * friction * self.to
         samples, step = r.correlation_time / dt, (1.0 - LEAN) * r.rate * dt
-        _, fast_gain, slow_gain, inflation, _ = change.numbers(dt)
+        at = change.at(dt)
         q = min(((wrong - self.noise) / told) ** 2, LARGEST_Q) if wrong > self.noise else 0.0
         prior = design.prior.covariance(vehicle, design.ladder)[:, :n, :n]
         widest = r.widest * np.trace(prior, axis1=1, axis2=2)
@@ -250,11 +250,11 @@ class FrictionDrop:
         room = float((self.free * widest / along**2).min())
         fast, slow, a, added = 0.0, self.errors, 0.0, 0.0
         for k in range(1, math.ceil(LONGEST / dt) + 1):
-            fast += fast_gain * (q - fast)
-            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * slow_gain), MOST_SLOW)
+            fast += at.fast * (q - fast)
+            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * at.slow), MOST_SLOW)
             alarm = min(max(fast / (slow * change.threshold) - 1.0, 0.0), 1.0)
-            if added + alarm * inflation <= room:
-                added, a = added + alarm * inflation, a + alarm * inflation * self.seen**2
+            if added + alarm * at.inflation <= room:
+                added, a = added + alarm * at.inflation, a + alarm * at.inflation * self.seen**2
             pull = max(a - self.unsure * math.sqrt(a), 0.0)
             move = min(
                 pull / (samples * slow * sigma**2 + a) * min(error - self.noise, r.clip * sigma)
@@ -385,5 +385,7 @@ def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
     numbers = b.of_ladder(design.ladder, design.rising_until)
-    per_distance = numbers[5:9] if design.rising_until is not None else numbers[[5, 8]]
-    return float(LEAN / per_distance.max() / (8.0 * n * FLOAT * b.weight))
+    per_distance = [numbers.per_grip, numbers.per_weight]
+    if design.rising_until is not None:
+        per_distance += [numbers.per_falling, numbers.per_rising]
+    return float(LEAN / max(per_distance) / (8.0 * n * FLOAT * b.weight))

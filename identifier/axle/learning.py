@@ -74,31 +74,29 @@ class Regression:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `RegressionNumbers`, (14,).
+    def at(self, dt: float) -> "RegressionNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
         e = math.exp(-self.bandwidth * dt)
-        return np.array(
-            [
-                self.bandwidth,
-                e,
-                0.5 * (1.0 - e),
-                math.expm1(dt / self.memory),
-                self.error,
-                self.relative_error,
-                self.correlation_time / dt,
-                self.lateness * self.bandwidth,
-                self.noise,
-                self.sure * self.error,
-                math.exp(-dt / self.sure_time),
-                min(dt / self.moment, 1.0),
-                self.clip,
-                1.0 / (self.rate * dt),
-            ]
+        return RegressionNumbers(
+            bandwidth=self.bandwidth,
+            e=e,
+            half=0.5 * (1.0 - e),
+            forgetting=math.expm1(dt / self.memory),
+            error=self.error,
+            relative_error=self.relative_error,
+            samples=self.correlation_time / dt,
+            lateness=self.lateness * self.bandwidth,
+            noise=self.noise,
+            least_force=self.sure * self.error,
+            decay=math.exp(-dt / self.sure_time),
+            smooth=min(dt / self.moment, 1.0),
+            clip=self.clip,
+            per_step=1.0 / (self.rate * dt),
         )
 
 
@@ -251,22 +249,19 @@ class ChangeDetector:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `ChangeNumbers`, (5,).
+    def at(self, dt: float) -> "ChangeNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        inflation = dt * self.step**2 / self.step_time
-        return np.array(
-            [
-                1.0 / self.threshold,
-                min(dt / self.fast, 1.0),
-                min(dt / self.slow, 1.0),
-                inflation,
-                dt / self.offset_time,
-            ]
+        return ChangeNumbers(
+            per_threshold=1.0 / self.threshold,
+            fast=min(dt / self.fast, 1.0),
+            slow=min(dt / self.slow, 1.0),
+            inflation=dt * self.step**2 / self.step_time,
+            offset=dt / self.offset_time,
         )
 
 
@@ -374,8 +369,8 @@ class Bounds:
             if not least < most:
                 raise ValueError(f"least_{of} must be below most_{of}, they are {least}, {most}")
 
-    def numbers(self, n: int, slopes: float, rising_until: float | None) -> Array:
-        """Return the numbers of `BoundNumbers`, (12,).
+    def at(self, n: int, slopes: float, rising_until: float | None) -> "BoundNumbers":
+        """Return the numbers of a step.
 
         n products of weights that lie in the box sum up to within n + 8 roundings.
 
@@ -407,38 +402,36 @@ class Bounds:
                 f"a ladder of {n} units of equal weight has a stiffness of {center * slopes:g} "
                 f"loads/rad, outside of {self.least_stiffness:g} to {self.most_stiffness:g}"
             )
-        return np.array(
-            [
-                least,
-                most,
-                flattest,
-                steepest,
-                center,
-                2.0 / (most - least),
-                1.0 / (center - flattest),
-                1.0 / (steepest - center),
-                1.0 / radius,
-                inward(self.compliance),
-                inward(self.steering),
-                inward(self.v_y),
-            ]
+        return BoundNumbers(
+            least_grip=least,
+            most_grip=most,
+            least_slope=flattest,
+            most_slope=steepest,
+            center=center,
+            per_grip=2.0 / (most - least),
+            per_falling=1.0 / (center - flattest),
+            per_rising=1.0 / (steepest - center),
+            per_weight=1.0 / radius,
+            compliance=inward(self.compliance),
+            steering=inward(self.steering),
+            v_y=inward(self.v_y),
         )
 
-    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> Array:
-        """Return the numbers of `BoundNumbers` for a ladder, (12,).
+    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
+        """Return the numbers of a step with a ladder.
 
         Parameters
         ----------
         ladder : slip scales of the units [rad].
-        rising_until : as of `numbers`.
+        rising_until : as of `at`.
 
         Raises
         ------
         ValueError
-            As `numbers` does.
+            As `at` does.
         """
         slopes = unit_slopes(ladder, rising_until or 0.0)
-        return self.numbers(len(ladder), float(slopes.sum()), rising_until)
+        return self.at(len(ladder), float(slopes.sum()), rising_until)
 
 
 def unit_slopes(ladder: tuple[float, ...], slip: float) -> Array:

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import Car, within
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
@@ -194,10 +192,16 @@ class Sway:
         """
         return cls(frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * FASTEST))
 
-    def numbers(self) -> Array:
-        """Return the numbers of `SwayNumbers`, (5,)."""
+    def numbers(self) -> "SwayNumbers":
+        """Return the numbers of a step."""
         omega, most = self.frequency, MOST_SWAY * GRAVITY
-        return np.array([omega**2, 2.0 * self.damping * omega, omega**-2, most, omega * most])
+        return SwayNumbers(
+            stiffness=omega**2,
+            damping=2.0 * self.damping * omega,
+            compliance=omega**-2,
+            most=most,
+            most_rate=omega * most,
+        )
 
 
 class SwayNumbers(NamedTuple):

@@ -21,9 +21,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import larger, smaller
 from models.rules import require_positive_fields
 
@@ -62,23 +60,21 @@ class Watch:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `WatchNumbers`, (7,).
+    def at(self, dt: float) -> "WatchNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        return np.array(
-            [
-                min(dt / self.moment, 1.0),
-                self.noticed,
-                self.calm,
-                min(dt / self.behind, 1.0),
-                self.again,
-                self.known,
-                self.give_up,
-            ]
+        return WatchNumbers(
+            gain=min(dt / self.moment, 1.0),
+            noticed=self.noticed,
+            calm=self.calm,
+            follow=min(dt / self.behind, 1.0),
+            again=self.again,
+            known=self.known,
+            give_up=self.give_up,
         )
 
 

@@ -24,6 +24,7 @@ BANK_MEAN = 1.0  # [s]: roads bank slowly
 LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is a bank in full
 MOST_ROLL = 0.08  # per g, by which a body rolls outwards
 EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
+ACROSS, ALONG = (0.8, 1.2), (0.8, 1.25)  # its slope on that motion; a body rolls and pitches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,6 +120,10 @@ def _piece(
     v_x = np.where(on, v_x, slowest)
     n3 = LONGITUDINAL / dt
     a_x = box(gradient(box(v_x, n3 / 2), dt), n3) - box(v_y * r, n3)
+    if recording.a_x is not None:
+        felt = box(thinned(recording.a_x), count)
+        if _slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, ALONG) is not None:
+            a_x = felt
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
     bank = np.zeros_like(v_x)
     if recording.a_y is not None:
@@ -161,24 +166,35 @@ def box(signal: Array, count: float) -> Array:
     return mean
 
 
+def _slope_on(
+    motion: Array, felt: Array, on: NDArray[np.bool_], dt: float, within: tuple[float, float]
+) -> float | None:
+    """Return the slope of what an accelerometer feels on the motion, of what is fast in both.
+
+    None where it shows no such motion: a slope out of bounds, or too much that it misses.
+    """
+    n1, n3 = BANK_MEAN / dt, LONGITUDINAL / dt
+    fast, fast_felt = ((box(one, n3) - box(one, n1))[on] for one in (motion, felt))
+    power = float(fast @ fast)
+    if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
+        return None
+    slope = float(fast @ fast_felt) / power
+    missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
+    return slope if within[0] < slope < within[1] and missed < EXPLAINED else None
+
+
 def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], dt: float) -> Array:
     """Return the side force of a banked road [m/s²], what motion shows and no accelerometer, (n,).
 
     What roll and a sensor off level show instead is taken off; a channel that does not show the
     fast motion is left out.
     """
-    nothing = np.zeros_like(v_x)
-    n1, n3 = BANK_MEAN / dt, LONGITUDINAL / dt
-    motion = gradient(box(v_y, n3 / 3), dt) + v_x * r
+    n1 = BANK_MEAN / dt
+    motion = gradient(box(v_y, LONGITUDINAL / dt / 3), dt) + v_x * r
+    gain = _slope_on(motion, a_y, on, dt, ACROSS)
+    if gain is None:
+        return np.zeros_like(v_x)
     slow, felt = box(motion, n1), box(a_y, n1)
-    fast, fast_felt = (box(motion, n3) - slow)[on], (box(a_y, n3) - felt)[on]
-    power = float(fast @ fast)
-    if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
-        return nothing
-    gain = float(fast @ fast_felt) / power
-    missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
-    if not (0.8 < gain < 1.2 and missed < EXPLAINED):
-        return nothing
     gap = slow - felt / (1.0 + min(max(gain - 1.0, 0.0), MOST_ROLL))
     off = 10.0 * LEVEL
     gap = gap - min(max(float(np.median(gap[on])), -off), off)

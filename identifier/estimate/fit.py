@@ -70,7 +70,7 @@ def fit(
         reach = reach.and_of(drives, found, vehicle)
         information = np.zeros_like(beliefs.information)
         information[np.ix_(found.index, found.index)] = found.information
-        beliefs = replace(beliefs, mean=found.p, information=information)
+        beliefs = replace(beliefs, mean=found.p, information=information, typed=())
         done += sum(len(one.signals) * one.dt for one in drives)
         if progress is not None:
             progress(min(done / max(total, 1e-9), 1.0))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array, blocks, large
 from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
-from identifier.axle.curve import EDGES
+from identifier.axle.curve import EDGES, LADDER, unit_matrix
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import SD_FRICTION
@@ -39,8 +39,10 @@ from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle
 
-UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256, 0.512)  # rad, of the projection
+UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
+LEAST_REACH = 0.032  # rad, up to which it follows the curves at least
 WIDEST = 0.6  # rad, as far as it is fitted
+LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
 BEYOND = 0.02  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
@@ -164,7 +166,7 @@ class FittedModel(TireModel):
         axle: Axle | None = None,
         *,
         v_x: float | None = None,
-        a_x: float = 0.0,
+        a_x: float | None = None,
     ) -> float | Array:
         """Return the steady lateral force at slip angles, the wheels straight ahead [N].
 
@@ -172,24 +174,29 @@ class FittedModel(TireModel):
         ----------
         alpha, axle, v_x : as of `TireModel.force`.
         a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
-            shift load between the axles.
+            shift load between the axles. None is of tires that push nothing lengthwise, as those
+            of a car that coasts.
         """
         found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
+        if a_x is None:
+            return found if found.ndim else float(found)
         speed = self.curve_speed if v_x is None else v_x
-        ratio = self.ratio(np.array([speed]), np.array([a_x]))[0]
-        ratio = ratio / self.ratio(np.array([speed]), np.zeros(1))[0]
+        coasting = -self.vehicle.drag * speed**2
+        moving, plain = self.ratio(np.full(2, speed), np.array([a_x, coasting]))
+        ratio = moving / plain
         scaled: Array = found * (ratio if axle is None else ratio[AXLES.index(axle)])
         return float(scaled) if scaled.ndim == 0 else scaled
 
     def ratio(self, v_x: Array, a_x: Array) -> Array:
-        """Return λ G, load and ellipse: force over that at static load and a_x = 0, (k, 2).
+        """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
 
         Parameters
         ----------
         v_x : speeds [m/s], (k,).
         a_x : longitudinal accelerations [m/s²], (k,).
         """
-        car, f = self.vehicle, np.asarray(a_x) / GRAVITY
+        car = self.vehicle
+        f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
         moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
         load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
         drive = np.array([self["driving_f"], self["driving_r"]])
@@ -622,14 +629,30 @@ class FittedModel(TireModel):
         covariance[k, k] += sd_friction**2
         return replace(self, covariance=covariance)
 
-    def in_units(self) -> AxleModel:
-        """Return the tires in the hidden units of the axle identifier, for C, FMU and tracker.
+    def beside_v_y(self) -> AxleModel:
+        """Return the model as the axle identifier goes on learning from it."""
+        return self.in_units(LADDER)
 
-        Curve, lag, sway and zeros of the sensors; without load transfer, ellipse, lever and gain.
+    def in_units(self, ladder: tuple[float, ...] | None = None) -> AxleModel:
+        """Return the tires in the hidden units of the axle identifier.
+
+        Curve, lag, sway and zeros of the sensors, that of v_y at the speed of the drives; without
+        load transfer, ellipse, lever and gain of the steering.
+
+        Parameters
+        ----------
+        ladder : slip scales of the units [rad]; None takes `UNITS`, whose curves are within
+            0.3 % of the static load.
         """
-        reach = np.maximum(self.known_slip, UNITS[2])
-        W = np.stack([self._units_of(axle, reach[i]) for i, axle in enumerate("fr")])
-        bias = self["v_y_bias"] + self["v_y_angle"] * self.reference_speed
+        ladder = UNITS if ladder is None else ladder
+        fits = [_units_fit(ladder, float(reach)) for reach in self._reach]
+        W = np.stack(
+            [
+                pseudo @ self.curve_at(np.column_stack([slip, slip]))[0][:, i]
+                for i, (slip, pseudo) in enumerate(fits)
+            ]
+        )
+        bias = self["v_y_bias"] + self["v_y_angle"] * self.speeds.mean()
         limits = Plausibility.for_vehicle(self.vehicle)
         own = np.array(
             [
@@ -643,47 +666,38 @@ class FittedModel(TireModel):
         excitation[:, 0] = self.driven
         return AxleModel(
             vehicle=self.vehicle,
-            ladder=UNITS,
+            ladder=ladder,
             sway=self._sway,
             plausibility=limits,
             W=W,
             own=own,
-            covariance=self._units_covariance(self.covariance),
-            prior_covariance=self._units_covariance(_prior_covariance(self.vehicle)),
+            covariance=self._units_covariance(fits, self.covariance),
+            prior_covariance=self._units_covariance(fits, _prior_covariance(self.vehicle)),
             excitation=excitation,
         )
 
-    def _units_fit(self, reach: float) -> tuple[Array, Array]:
-        """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
-        m = math.exp(self["ln_road"])
-        slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
-        weight = np.where(slip <= reach, 1.0, BEYOND)
-        T = np.tanh(slip[:, None] / (m * np.array(UNITS)))
-        damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(UNITS))])
-        pseudo: Array = np.linalg.pinv(damped)[:, : slip.size] * weight
-        return slip, pseudo
+    @property
+    def _reach(self) -> Array:
+        """Slip up to which its projection follows the curves [rad], (2,)."""
+        return np.maximum(self.known_slip, LEAST_REACH)
 
-    def _units_of(self, axle: str, reach: float) -> Array:
-        slip, pseudo = self._units_fit(reach)
-        phi, _, _ = self.curve_at(np.column_stack([slip, slip]))
-        W: Array = pseudo @ phi[:, "fr".index(axle)]
-        return W
-
-    def _units_covariance(self, covariance: Array) -> Array:
+    def _units_covariance(self, fits: list[tuple[Array, Array]], covariance: Array) -> Array:
         """Return the covariance of [W, own] (2, n + 3, n + 3), never singular."""
-        n = len(UNITS)
+        n = len(fits[0][1])
         found = np.empty((2, n + 3, n + 3))
-        for i, axle in enumerate("fr"):
-            slip, pseudo = self._units_fit(max(float(self.known_slip[i]), UNITS[2]))
+        for i, (axle, (slip, pseudo)) in enumerate(zip("fr", fits, strict=True)):
             _, _, J = self.curve_at(np.column_stack([slip, slip]))
-            offset = "steering_zero" if i == 0 else "v_y_bias"
-            own = [INDEX[f"compliance_{axle}"], INDEX[f"sway_share_{axle}"], INDEX[offset]]
-            index = [*_curve_index(axle), *own]
+            zeros = {"steering_zero": 1.0}
+            if axle == "r":
+                zeros = {"v_y_bias": 1.0, "v_y_angle": float(self.speeds.mean())}
+            names = [f"compliance_{axle}", f"sway_share_{axle}", *zeros]
+            index = [*_curve_index(axle), *(INDEX[name] for name in names)]
             to = np.zeros((n + 3, len(index)))
             to[:n, :9] = pseudo @ J[i]
-            to[n:, 9:] = np.eye(3)
+            to[n, 9] = to[n + 1, 10] = 1.0
+            to[n + 2, 11:] = list(zeros.values())
             P = to @ covariance[np.ix_(index, index)] @ to.T
-            found[i] = P + np.diag(np.full(n + 3, 1e-8))
+            found[i] = P + np.diag(np.full(n + 3, LEAST_VARIANCE))
         return found
 
     def setup(self, dt: float) -> Setup:
@@ -699,7 +713,7 @@ class FittedModel(TireModel):
                 "parameters": self.p,
                 "dt": np.array(dt),
                 "car": car_numbers(self.vehicle),
-                "plausibility": limits.numbers(),
+                "plausibility": np.array(limits.numbers()),
                 "loads": self._loads,
             },
             ends_run=limits.rest(dt),
@@ -712,7 +726,7 @@ class FittedModel(TireModel):
         return {
             "format": FORMAT,
             "kind": self.kind,
-            "vehicle": vehicle_numbers(self.vehicle),
+            "vehicle": vehicle_numbers(self.vehicle.without_chassis()),
             "parameters": {
                 one.name: {"value": float(value), "unit": one.unit, "sd": float(math.sqrt(var))}
                 for one, value, var in zip(
@@ -770,6 +784,17 @@ class FittedModel(TireModel):
 
 _CURVE = ("ln_stiffness", "ln_grip", "shape", "curvature")
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
+
+
+@cache
+def _units_fit(ladder: tuple[float, ...], reach: float) -> tuple[Array, Array]:
+    """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
+    slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
+    weight = np.where(slip <= reach, 1.0, BEYOND)
+    T = unit_matrix(slip, ladder)
+    damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(ladder))])
+    pseudo: Array = np.asarray(np.linalg.pinv(damped)[:, : slip.size] * weight, dtype=np.float64)
+    return slip, pseudo
 
 
 @cache

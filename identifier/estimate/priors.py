@@ -16,6 +16,10 @@ from codegen.arrays import Array
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import Vehicle
 
+LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
+LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
+SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
+SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse where a share is told: of it; least
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
 
@@ -88,6 +92,7 @@ class Priors:
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
+    typed : parameters whose belief is a Student one, of the same curvature at its mean.
     """
 
     mean: Array
@@ -95,6 +100,7 @@ class Priors:
     high: Array
     information: Array
     moves: NDArray[np.bool_]
+    typed: tuple[int, ...] = ()
 
     @classmethod
     def of(
@@ -122,6 +128,8 @@ class Priors:
             k, size = INDEX[name], unit[belief.per]
             mean[k], sd[k] = size * belief.mean, size * belief.sd
             low[k], high[k] = size * belief.low, size * belief.high
+        for name, (value, doubt) in _told(vehicle).items():
+            mean[INDEX[name]], sd[INDEX[name]] = value, doubt
         for name, value in wide.items():
             sd[INDEX[name]] = value
         for name in fixed:
@@ -135,7 +143,8 @@ class Priors:
             b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
             _couple(information, each, SHARED_ERROR)
-        return cls(mean=mean, low=low, high=high, information=information, moves=moves)
+        typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
+        return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
 
     def with_roads(self, count: int) -> "Priors":
         """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
@@ -145,7 +154,8 @@ class Priors:
         information[: len(self.mean), : len(self.mean)] = self.information
         extra = np.arange(len(self.mean), n)
         information[extra, extra] = 1.0 / ANOTHER_ROAD**2
-        return Priors(
+        return replace(
+            self,
             mean=np.concatenate([self.mean, np.zeros(count)]),
             low=np.concatenate([self.low, low]),
             high=np.concatenate([self.high, high]),
@@ -170,6 +180,26 @@ class Priors:
         curvature[TYPED, TYPED] *= (TAILS + 1.0) / (TAILS + typed * away[TYPED] ** 2)
         gradient: Array = curvature @ away
         return gradient, curvature
+
+
+def _told(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of what follows from numbers that a car tells, by name.
+
+    An axle of share s that pushes f weights uses s W f/μ of its grip, W weights per static load.
+    """
+    L, grip = vehicle.wheelbase, np.exp(OF_AXLES["ln_grip"].mean)
+    told: dict[str, tuple[float, float]] = {}
+    if (height := vehicle.lengthwise("cg_height")) is not None:
+        told["load_transfer"] = LESS_LOAD * height / L, SURE_HEIGHT
+    for name, share in (("driving", "drive_front_share"), ("braking", "brake_front_share")):
+        if (front := vehicle.lengthwise(share)) is not None:
+            for axle, part, W in (
+                ("f", front, L / vehicle.l_r),
+                ("r", 1.0 - front, L / vehicle.l_f),
+            ):
+                use = float(LESS_USE * part * W / grip)
+                told[f"{name}_{axle}"] = use, max(SURE_SHARE * use, LEAST_USE)
+    return told
 
 
 def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:

@@ -102,7 +102,9 @@ class Problem:
             given = arguments(driven, p, self._car, scan)
             out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
             e.append(out["missed"][self._kept[k]])
-        return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
+        whole: Array = np.concatenate(e) / self.size[:, None]
+        found: Array = np.nan_to_num(whole, nan=1e3, posinf=1e3)
+        return found
 
     def residuals(self, p: Array) -> Residuals:
         """Return what the balance misses, and its slopes.
@@ -210,10 +212,12 @@ class Problem:
 
 
 def car_numbers(vehicle: Vehicle) -> Array:
-    """Return the numbers of `CarNumbers`, (6,)."""
+    """Return the numbers of `CarNumbers`, (7,)."""
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
     omega = min(5.0 * np.sqrt(GRAVITY / vehicle.wheelbase), 60.0)
-    return np.array(CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce))
+    return np.array(
+        CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce, vehicle.drag)
+    )
 
 
 def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:

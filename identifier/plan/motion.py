@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.slip import SHORTEST, SwayNumbers
+from identifier.axle.slip import SHORTEST
 from identifier.plan.tires import PlausibleTires
 from models.vehicle import GRAVITY
 
@@ -140,7 +140,7 @@ def simulate(
     loads = np.array(car.axle_loads)
     to_v, to_r = loads / car.mass, np.array([car.l_f, -car.l_r]) * loads / car.yaw_inertia
     arm = np.array([car.l_f, -car.l_r])[:, None, None]
-    stiffness, damping, soft, *_ = SwayNumbers(*tires.method.sway.numbers())
+    stiffness, damping, soft, *_ = tires.method.sway.numbers()
     shortest = SHORTEST * car.wheelbase
     lanes, axles = np.zeros((m, k)), np.zeros((2, m, k))
     v_y = r = rho = rho_dot = asked = delta = lanes

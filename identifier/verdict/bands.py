@@ -105,8 +105,8 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
         Where the recording begins after that time.
     """
     if history.design.whole:
-        model, missed = history.freeze(t), judge(history, t).force_missed
-        return model.with_calibration(None, None if missed is None else np.array(missed))
+        share = judge(history, t).force_missed
+        return history.freeze(t).with_calibration(None, None if share is None else np.array(share))
     run = asked_run(history, t)
     model, recording = run.model, run.portion.recording
     if not model.has_band:
@@ -114,10 +114,6 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     found = evidence(model, recording, run.road)
     if found is None:
         return model
-    if history.design.whole:
-        found = found.where(~model.road_differs(recording.t)[found.windows.starts])
-        return model.with_calibration(None, found.but_a_stretch()[0].missed)
-
     def teach(halting: Recording) -> TireModel:
         return run.taught(halting, history.vehicle)
 

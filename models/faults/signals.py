@@ -422,7 +422,7 @@ class ClockJump:
         stamps, taken = stamps[keep], taken[keep]
         logged = {
             name: np.interp(taken, t, getattr(recording, name))
-            for name in CHANNELS
+            for name in (*CHANNELS, "a_x")
             if getattr(recording, name) is not None
         }
         force = recording.axle_force

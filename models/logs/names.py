@@ -202,6 +202,16 @@ RULES: Mapping[str, Rule] = {
         (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, "x", "gyro", "twist",
          "magnetic"),
     ),
+    "a_x": Rule(
+        ("ax", "accx", "accelx", "xaccel", "accelerationx", "longacc", "longaccel", "acclong",
+         "acclon", "glong", "longg", "gforcelong", "laengsbeschleunigung", "alaengs", "blaengs",
+         "carax", "longitudinalacceleration", "longitudinalacc", "accelerometerx", "axcog", "axcg",
+         "axb", "longitudinalg", "alon", "axsm", "axveh"),
+        (f"{LONGITUDINAL};{ACCELERATIONS}|g", "linear;acceleration;x", "laengsbeschleunigung"),
+        (),
+        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, *LATERAL.split("|"), "gyro",
+         "twist", "magnetic", "pedal", "latitude", "longitude"),
+    ),
     "Fyf": Rule(
         ("fyf", "fyfront", "fyfrontaxle", "fyfinv"),
         ("fy|flat;front|f|va", "lateral|side;force;front"),
@@ -646,12 +656,13 @@ def _beside_turning(
             else _in_turning(name, {**best, name: guess}, seen)
             for guess in candidates[name]
         ]
-    forward = next((one for one in mended["v_x"] if one.channel == _channel_of(best, "v_x")), None)
-    if forward is not None and forward.unit and not _is_told(best["v_x"]):
-        mended["v_y"] = [
-            guess if _is_told(guess) else replace(_said(guess, "as v_x"), unit=forward.unit)
-            for guess in candidates["v_y"]
-        ]
+    for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
+        first = next((one for one in mended[like] if one.channel == _channel_of(best, like)), None)
+        if first is not None and first.unit and not _is_told(best[like]):
+            mended[name] = [
+                guess if _is_told(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
+                for guess in candidates[name]
+            ]
     return mended
 
 

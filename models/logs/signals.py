@@ -1,7 +1,7 @@
 """What a log must tell of a car, and how one of these signals is read from channels.
 
-SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y [m/s²], axle
-forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
+SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y, a_x [m/s²],
+axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
 """
 
 import math
@@ -30,12 +30,18 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "delta_f": ANGLE,
         "delta_r": ANGLE,
         "a_y": ACCELERATION,
+        "a_x": ACCELERATION,
         "Fyf": FORCE,
         "Fyr": FORCE,
         **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
     }
 )
-COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay"}  # what a column is called where it differs
+COLUMNS = {
+    "v_x": "vx",
+    "v_y": "vy",
+    "a_y": "ay",
+    "a_x": "ax",
+}  # what a column is called where it differs
 MEANINGS: Mapping[str, str] = MappingProxyType(
     {
         "v_x": "forward speed",
@@ -45,6 +51,7 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "delta_f": "front steering angle",
         "delta_r": "rear steering angle",
         "a_y": "lateral acceleration",
+        "a_x": "longitudinal acceleration",
         "Fyf": "front axle force",
         "Fyr": "rear axle force",
         "wheel_fl": "speed of the front left wheel",
@@ -54,6 +61,7 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "wheel": "speed of the wheels, by one encoder",
     }
 )
+SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
 LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 

@@ -261,7 +261,8 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     slip, delta, F_lagged, a_x_lagged, integral = x[8:12], x[12:14], x[14:16], x[16], x[17]
 
     demand, integral_dot = driver.demand(v_ref - v_x, integral)
-    drive = [m * demand * share for share in (c.drive_front_share, 1.0 - c.drive_front_share)]
+    front = ca.if_else(demand > 0.0, c.drive_front_share, c.brake_front_share)
+    drive = [m * demand * share for share in (front, 1.0 - front)]
     pressed = downforce(vehicle, v_x)
     F_z = wheel_loads(vehicle, roll, roll_rate, F_lagged, a_x_lagged, pressed)
 

@@ -18,6 +18,7 @@ from models.logs.signals import (
     INSTEAD,
     NEEDED,
     QUANTITIES,
+    SPARED,
     WHEELS,
     Signal,
     require_fitting,
@@ -202,6 +203,8 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
     found = {}
     for name in QUANTITIES:
         column = column_of(name)
+        if f"{column} (2)" in names and name in SPARED:
+            continue
         if f"{column} (2)" in names:
             raise RecordingError(f"{log.path}: column {column} appears more than once")
         if column in names and name != BETA:

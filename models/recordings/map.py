@@ -39,7 +39,7 @@ from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
 from models.schema import Table, read_toml
 
-AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
+AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
 REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
 MEND = "mend"  # what may become of stamps that do not rise
 TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
@@ -52,8 +52,8 @@ class LogMap:
 
     Parameters
     ----------
-    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, Fyf, Fyr) how it is
-        read.
+    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, a_x, Fyf, Fyr) how
+        it is read.
     axes : of the file: "ISO" (y to the left, z up) or "SAE" (y to the right, z down).
     run : which of the file's runs; empty where there is one.
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.

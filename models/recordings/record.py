@@ -30,7 +30,7 @@ JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share
 
 
 ALL = slice(None)
-OPTIONAL = ("v_y", "a_y", "axle_force")
+OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
 MISSING = {
     "v_y": "so slip angles are not known; tireid identify --method inertial estimates it",
     "a_y": "which is needed where vy is not measured",
@@ -44,6 +44,7 @@ LARGEST = {
     "r": 1e4,
     "delta_f": 1e5,
     "delta_r": 1e5,
+    "a_x": 1e5,
     "a_y": 1e5,
     "axle_force": LARGEST_FORCE,
 }
@@ -72,6 +73,8 @@ class Recording:
     a_y : what an accelerometer at the center of gravity shows [m/s^2], positive to the left, shape
         (n,), or None when it was not logged. It feels tires and wind: v̇_y + v_x r on a level road,
         less g sin of its angle on one that falls to the left.
+    a_x : the same forward [m/s^2], shape (n,), or None when it was not logged. It feels what tires
+        push lengthwise, less the drag of the air: v̇_x - v_y r on a level road.
     axle_force : front and rear lateral axle force [N], positive to the left, shape (n, 2), or
         None when there is no truth.
     breaks : index of the first sample of each stretch but the first, rising.
@@ -94,6 +97,7 @@ class Recording:
     delta_f: Array
     delta_r: Array
     a_y: Array | None = None
+    a_x: Array | None = None
     axle_force: Array | None = None
     breaks: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
@@ -387,8 +391,8 @@ def peak(signal: Array) -> float:
     return max(abs(float(signal.min())), abs(float(signal.max())))
 
 
-CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")  # what sensors show
-SIGNALS = ("t", *CHANNELS, "axle_force")
+CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")  # what may be faulty, and repaired
+SIGNALS = ("t", *CHANNELS, "a_x", "axle_force")
 
 
 def joined(recordings: Sequence[Recording], name: str | None = None) -> Recording:
@@ -436,7 +440,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
         for name in SIGNALS[1:]
         if all(getattr(one, name) is not None for one in recordings)
     }
-    for missing in ("v_y", "a_y"):
+    for missing in ("v_y", "a_y", "a_x"):
         without = [one.name for one in recordings if getattr(one, missing) is None]
         if missing not in signals and len(without) < len(recordings):
             column = missing.replace("_", "")
@@ -512,7 +516,7 @@ def _off_grid(t: Array, step: float) -> float:
 
 
 def write_recording(recording: Recording, path: str | Path) -> Path:
-    """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay [m/s^2], Fyf, Fyr [N].
+    """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay, ax [m/s^2], Fyf, Fyr [N].
 
     Columns that the recording lacks are left out. Numbers are the shortest that read back the
     same: `read_recording` gives the recording back bit for bit at its own interval, a drive in
@@ -553,6 +557,7 @@ def _columns(recording: Recording) -> dict[str, Array]:
         "delta_f": recording.delta_f,
         "delta_r": recording.delta_r,
         "ay": recording.a_y,
+        "ax": recording.a_x,
     }
     columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:

@@ -203,6 +203,7 @@ def bmw() -> Vehicle:
         relaxation_length_rear=0.05,
         steering_lag=INSTANT,
         drive_front_share=p.T_se,
+        brake_front_share=p.T_sb,
     )
     return Vehicle(
         name="BMW 320i",

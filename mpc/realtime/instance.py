@@ -296,6 +296,11 @@ class Instance:
         self.solve_arguments = (*self._step[:3], pointer(self.start), *map(pointer, road))
         self._library.mpc_init(self._step[0])
 
+    @property
+    def numbers(self) -> tuple[NDArray[Any], ...]:
+        """State, parameters and input: all that the next solution depends on, unprepared."""
+        return self.state, self.params, self.input
+
     def step(self) -> int:
         """Take the measurement in `input`; return the status, and set `steering`."""
         return int(self._library.mpc_step(*self._step))

@@ -89,6 +89,7 @@ class Tracker:
         self.caution = require_caution("caution", caution)
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
+        self._preview: Instance | None = None  # what would be planned with another tire
         params = self.instance.params
         guards = guards or Guards()
         set_params(params, problem, guards)
@@ -152,11 +153,43 @@ class Tracker:
         ValueError
             Where the structure is another, or a number not finite.
         """
+        self._write_tire(self.instance, tire)
+        self.tire = tire
+
+    def previewed_rate(self, tire: PredictionTire) -> float:
+        """Return the first steering rate of the plan after one more iteration with a tire [rad/s].
+
+        An instance of its own is asked, on the plan and the road of the last step; the one that
+        steers is read and not written.
+
+        Parameters
+        ----------
+        tire : of the same structure.
+
+        Raises
+        ------
+        ValueError
+            Where the structure is another, or a number not finite.
+        """
+        now = self.instance
+        if self._preview is None:
+            single = now.state["u"].dtype == np.float32
+            self._preview = Instance(self.tire.structure, self.problem.horizon, single=single)
+        asked = self._preview
+        for there, here in zip(asked.numbers, now.numbers, strict=True):
+            there[...] = here
+        self._write_tire(asked, tire)
+        asked.start[:] = now.state["x"][0]
+        asked.solve()
+        return float(asked.state["u"][0])
+
+    def _write_tire(self, instance: Instance, tire: PredictionTire) -> None:
+        """Write weights, car, and the slip that is of use; what was prepared is of another tire."""
         if tire.structure != self.tire.structure:
             raise ValueError(
                 f"the tracker is built for {self.tire.structure}, not {tire.structure}"
             )
-        weights, car, params = np.asarray(tire.weights), tire.car, self.instance.params
+        weights, car, params = np.asarray(tire.weights), tire.car, instance.params
         if weights.shape != params["weights"].shape:
             raise ValueError(f"weights must be {params['weights'].size}, not {weights.shape}")
         if not (np.isfinite(weights).all() and np.isfinite(car).all()):
@@ -165,8 +198,7 @@ class Tracker:
         valid = valid_slip(tire, self.problem.limits.slip)
         params["max_slip"], params["rise"] = valid.slip, valid.rise
         set_caution(params, tire, self.caution)
-        self.instance.state["prepared"] = 0  # by the tire before
-        self.tire = tire
+        instance.state["prepared"] = 0
 
     def reset(self, steering: float = 0.0) -> None:
         """Forget what was planned and steered; faults are kept.

@@ -7,13 +7,14 @@ import numpy as np
 
 from identifier.axle.model import AxleModel
 from identifier.baselines.curves import CurveModel
+from identifier.estimate.model import FittedModel
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
 from mpc.tires.curves import DugoffAxles, FialaAxles, LaggedAxles, MagicAxles, linear_tire
-from mpc.tires.ladder import axle_tire, mounted_tire
+from mpc.tires.ladder import axle_tire, fit_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
 from mpc.tires.tire import PredictionTire
 
@@ -88,6 +89,7 @@ def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
     NetworkModel.kind: network_tire,
     AxleModel.kind: axle_tire,
+    FittedModel.kind: fit_tire,
     CurveModel.kind: curve_tire,
     OnnxModel.kind: onnx_tire,
 }

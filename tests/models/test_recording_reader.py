@@ -310,6 +310,26 @@ def test_columns_of_another_name_are_read_when_named(tmp_path):
         read_recording(log, columns={"rate": "yaw_rate"})
 
 
+def test_ax_is_read_forward_in_either_axes_and_left_aside_where_it_cannot_be(tmp_path):
+    lines = [f"{k * 0.01:.6f},20,0.5,0,0,0.1,{0.01 * k:.2f}" for k in range(60)]
+    header = HEADER + ",ay,ax"
+    good = write(tmp_path / "good.csv", header, lines)
+    expected = 0.01 * np.arange(60)
+    np.testing.assert_allclose(read_recording(good, check=False).a_x, expected)
+    sae = read_recording(good, check=False, log_map=LogMap(axes="SAE"))
+    np.testing.assert_allclose(sae.a_x, expected)
+    np.testing.assert_allclose(sae.a_y, -0.1)
+    lines[30] = lines[30].rpartition(",")[0] + ","
+    holed = write(tmp_path / "holed.csv", header, lines)
+    got = read_recording(holed, check=False)
+    assert got.a_x is None and got.a_y is not None
+    assert sum(note.startswith("ax is left aside: ") for note in got.notes) == 1
+    with pytest.raises(RecordingError, match="ax must be finite"):
+        read_recording(holed, check=False, columns={"ax": "ax"})
+    twice = write(tmp_path / "twice.csv", header + ",ax", [line + ",0" for line in lines])
+    assert read_recording(twice, check=False).a_x is None
+
+
 def test_inverse_forces_stand_in_where_none_were_measured(tmp_path):
     log = tmp_path / "log.csv"
     rows = [f"{0.01 * k:.2f},10,0,0.01,0.002,3,4" for k in range(100)]

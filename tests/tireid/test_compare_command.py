@@ -326,7 +326,8 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
 
 
 def test_the_registry_has_every_name_that_is_promised():
-    promised = "linear eso ekf_force stiffness_rls magic_formula_ekf dugoff_ekf instantaneous "
+    promised = "linear eso ekf_force stiffness_rls magic_formula_ekf textbook_ekf "
+    promised += "lagged_ekf dugoff_ekf instantaneous "
     promised += "integral instantaneous_scaled pi_lead kreisselmeier kreisselmeier_newton rls "
     promised += "concurrent fit axle inertial linear_kf joint_ekf washout mhe"
     assert set(METHODS) == set(promised.split())

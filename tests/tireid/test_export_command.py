@@ -19,6 +19,7 @@ from models.vehicle import sedan
 from tireid import exporting
 from tireid.cli import main
 from tireid.commands import export as export_command
+from tireid.run import Run
 
 CAR = sedan()
 
@@ -192,7 +193,7 @@ def test_the_band_is_exported_as_it_was_calibrated(tmp_path, logs, capsys):
     assert manifest["band"] == calibrated(run).calibration.to_dict()
     assert "half_band" in (tmp_path / "told" / "include" / "tireid_config.h").read_text()
     assert exporting.UNCALIBRATED not in capsys.readouterr().err
-    again = exporting.export(run, tmp_path / "run", band=True)
+    again = exporting.export(Run(history=run), tmp_path / "run", band=True)
     assert again.package.specialized.band == manifest["band"]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
-from identifier.methods import REFERENCE, certify
+from identifier.methods import LIVE, REFERENCE, certify
 from identifier.paper.design import (
     PHASE_MARGIN,
     VARIANTS,
@@ -157,7 +157,7 @@ def add_parser(commands: Any) -> None:
         "find gains and write them.",
     )
     add_vehicle(parser)
-    add_method(parser)
+    add_method(parser, LIVE)
     parser.add_argument(
         "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
     )

@@ -360,7 +360,7 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
-        parts = {"identify": story.default, "paper_network": story.paper}
+        parts = {"identify": story.axle, "paper_network": story.paper}
         verdicts = {name: judge(part.learnt, FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in parts.items():

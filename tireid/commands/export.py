@@ -4,7 +4,7 @@ import argparse
 from typing import Any
 
 from identifier.method import Method
-from identifier.methods import continuing
+from identifier.methods import LIVE, continuing
 from identifier.tire_model import TireModel, load_model
 from models.vehicle import Vehicle
 from mpc.realtime.caution import require_caution
@@ -39,7 +39,7 @@ def add_parser(commands: Any) -> None:
         "that went in.",
     )
     add_vehicle(parser)
-    add_method(parser)
+    add_method(parser, LIVE)
     add_weights(parser, "begin with it, as identified")
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
     parser.add_argument("--single", action="store_true", help="float unless the build says double")
@@ -109,5 +109,5 @@ def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     """Return the method that is asked for; else the one that goes on from the model."""
     if start is None or method_is_given(options):
-        return chosen_method(options, vehicle).method
+        return chosen_method(options, vehicle, online=True).method
     return continuing(start, vehicle)

@@ -469,7 +469,7 @@ def _draw(
     own = {t: replays[name] for t, replays in frozen.items()}
     figures = {
         "forces": force_figure(learnt, own),
-        "slip": slip_figure(tire, learnt.recording, learnt),
+        "slip": slip_figure(tire, learnt.recording, _beside(learnt)),
         "inputs": inputs_figure(learnt.recording),
     }
     if OBSERVED in learnt.outputs:

@@ -212,18 +212,19 @@ def jobs_of(options: argparse.Namespace) -> int:
 # What learns: a method by its name, the paper's, or the design in a file.
 
 
-def add_method(parser: argparse.ArgumentParser) -> None:
+def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
     Parameters
     ----------
     parser : of a command.
+    usual : the default.
     """
     parser.add_argument(
         "--method",
         choices=METHODS,
         metavar="NAME",
-        help=f"what learns: {', '.join(METHODS)} (default: {DEFAULT})",
+        help=f"what learns: {', '.join(METHODS)} (default: {usual})",
     )
     parser.add_argument(
         "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"

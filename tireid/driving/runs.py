@@ -321,7 +321,7 @@ def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionT
     if label == ORACLE:
         return setup.oracle()
     assert learnt is not None
-    return prediction_tire(learnt, setup.vehicle)
+    return prediction_tire(learnt.beside_v_y() if label == LEARNING else learnt, setup.vehicle)
 
 
 def run_drive(

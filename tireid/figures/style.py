@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, ParamSpec
 import numpy as np
 from matplotlib import font_manager, get_data_path, style
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -166,45 +165,6 @@ def _lay_out(figure: Figure) -> None:
         figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
 
 
-ASKED_OFTEN = ("_update_ticks", "_get_ticklabel_bboxes")  # of an axis, ten times a drawing
-
-
-@contextmanager
-def _ticks_found_once(figure: Figure) -> Iterator[None]:
-    """Let axes remember their ticks, and the boxes of their labels, for as long as they stay put.
-
-    Matplotlib finds them anew for the axis, its label, each title and each spine.
-
-    Parameters
-    ----------
-    figure : that is laid out and drawn meanwhile, and not changed.
-    """
-    every = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
-    # They are not promised by Matplotlib: where it has them no more it finds what it finds.
-    known = [(axis, name) for axis in every for name in ASKED_OFTEN if hasattr(axis, name)]
-    for axis, name in known:
-        setattr(axis, name, _remembered(axis, getattr(axis, name)))
-    try:
-        yield
-    finally:
-        for axis, name in known:
-            delattr(axis, name)
-
-
-def _remembered(axis: Axis, find: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that finds something of an axis again only where it has moved."""
-    found: list[Any] = [None, None]
-
-    def find_once(*args: Any) -> Any:
-        panel = axis.axes
-        place = (*axis.get_view_interval(), *panel.bbox.bounds, panel.figure.dpi)
-        if found[0] != place:
-            found[:] = place, find(*args)
-        return found[1]
-
-    return find_once
-
-
 @contextmanager
 def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
     """Lay a figure out, and let it be drawn in the look of the project meanwhile.
@@ -214,7 +174,7 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
     figure : as a function of this package returns it.
     look : what differs from Matplotlib's own.
     """
-    with style.context(["default", dict(look)]), _ticks_found_once(figure):
+    with style.context(["default", dict(look)]):
         _lay_out(figure)
         yield
 

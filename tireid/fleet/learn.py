@@ -1,6 +1,6 @@
 """Learning from thousands of logs: which they are, what is learnt of one, and who does it.
 
-A log is read, learnt and frozen by the default method as `tireid identify` does it, without
+A log is read, learnt and frozen by the axle identifier as `tireid identify` does it, without
 figures; then it is gone through once more for what it tells of the tires, with its own frozen model
 as the reference (`identifier.axle.information`). A log that cannot be used becomes a row with its
 error. Work is done by processes of this machine or by a Dask cluster; a process that dies loses

@@ -96,8 +96,8 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     ratio = segment.ratio if begins else 1.0 / segment.ratio
     assert 0.4 < ratio < 0.75
     at = np.array([DROP - 5.0, DROP + 5.0])
-    assert wet.in_segment(at).tolist() == [not begins, begins]
-    (note,) = wet.road_notes
+    assert wet.road_differs(at).tolist() == [not begins, begins]
+    (note,) = (text for _, text in wet.notes)
     assert f"{segment.ratio:.2f} ±" in note
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from identifier.axle import AxleIdentifier
-from identifier.axle.slip import SHORTEST, SwayNumbers
+from identifier.axle.slip import SHORTEST
 from identifier.plan import PlanError, PlausibleTires, Space, hold_of, make_plan
 from identifier.plan import search as search_module
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
@@ -63,7 +63,7 @@ def driven(tires):
 def equations(tires, k, planned):
     """d/dt of v_y, r, X, Y, ψ, δ, ρ, dρ/dt, and of both axles x, ∂x/∂s, ∂x/∂k."""
     ladder, W, (s, share) = np.array(tires.method.ladder), tires.W[k], tires.own[:, :2].T
-    stiffness, damping, soft, *_ = SwayNumbers(*tires.method.sway.numbers())
+    stiffness, damping, soft, *_ = tires.method.sway.numbers()
     loads, arms = np.array(CAR.axle_loads), np.array([CAR.l_f, -CAR.l_r])
     flattest = LEAST_SLOPE * (W / ladder).sum(axis=1)
 
