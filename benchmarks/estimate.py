@@ -259,7 +259,7 @@ def missed(
     """
     error, size = np.zeros(2), np.zeros(2)
     for one in asked:
-        truth, force = one.axle_force, ti.replay(tire, one).axle_force
+        truth, force = one.axle_force, ti.replay(one, tire).axle_force
         assert truth is not None
         counts = (one.t >= since) & (one.v_x >= max(slow, tire.min_speed))
         error += np.sum((force - truth)[counts] ** 2, axis=0)
@@ -371,7 +371,7 @@ def judge_circle(targets: Targets) -> None:
             pulls = (np.abs(a_x) > A_X) & (ask.v_x > SLOW)
             pair = []
             for priors in (None, slip_alone):
-                force = ti.replay(fit([learn], DART, priors).model, ask).axle_force
+                force = ti.replay(ask, fit([learn], DART, priors).model).axle_force
                 error, size = (np.sum(one[pulls, 1] ** 2) for one in (force - truth, truth))
                 pair.append(100.0 * float(np.sqrt(error / size)))
             rows.append(pair)
@@ -426,7 +426,7 @@ def judge_ratio(targets: Targets) -> None:
             )
             history = ti.identify(log, CARMAKER, check=False)
             stiff = [one for one in history.freeze().estimates() if one.title == STIFFNESS]
-            found[ratio] = stiff, history.verdict().valid
+            found[ratio] = stiff, history.verdict.valid
         right = [one.value for one in found[RATIO][0]]
         for ratio in WRONG_RATIOS:
             stiff, valid = found[ratio]

@@ -2,7 +2,7 @@
 
     python -m benchmarks.guaranteed [--each N] [--drives N] [--first SEED] [--record]
 
-Random cars of four classes learn on a drive with good sensors, and `run.guaranteed()` states which
+Random cars of four classes learn on a drive with good sensors, and `run.guarantee()` states which
 forces they can have, by the motion alone. Then other random drives of each, of other speeds: one
 counts as outside where at any instant the true force of an axle is outside of `guaranteed_force`,
 known slip or not, with exact signals, as the band says nothing of sensors. Half the width of the

@@ -66,7 +66,7 @@ def missed(model, exact):
 
 
 def test_a_log_without_v_y_is_learnt_on_by_the_inertial_identifier(history, exact):
-    assert isinstance(history.design, InertialIdentifier)
+    assert isinstance(history.method, InertialIdentifier)
     assert (missed(history.freeze(), exact) < 0.08).all()
     away = np.degrees((history.recording.v_y - exact.v_y)[500:] / 20.0)
     assert np.sqrt(np.mean(away**2)) < 0.25

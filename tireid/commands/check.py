@@ -152,9 +152,9 @@ def add_parser(commands: Any) -> None:
         "identifier, the default in a car: boxes, curve, jumps, the time to follow a drop of "
         "friction; with --along LOG, also of the tires that it learns there: sector, and the "
         "largest error of the force. Gains of the paper's laws (--paper, --method NAME, --design "
-        "FILE) are judged at the worst regressor: poles, sampling, gain and phase margin, "
-        "damping, drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad "
-        "input. With --tune, find gains and write them.",
+        "FILE) are judged at the worst regressor: poles, sampling, gain and phase margin, damping, "
+        "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
+        "--tune, find gains and write them.",
     )
     add_vehicle(parser)
     add_method(parser, LIVE)
