@@ -35,9 +35,9 @@ from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import AXLES, TireModel, brisk_speed
+from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
 from models.vehicle import Vehicle
 

@@ -497,7 +497,8 @@ class FittedModel(TireModel):
     def cornering_stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
         _, slope, _ = self.curve_at(np.zeros((1, 2)))
-        return slope[0] * self._loads
+        stiffness: Array = slope[0] * self._loads
+        return stiffness
 
     @property
     def relaxation_length(self) -> Array:
@@ -540,7 +541,7 @@ class FittedModel(TireModel):
             listed.append(
                 Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
             )
-        zeros = (
+        zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
             ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
             ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
         )
@@ -555,7 +556,7 @@ class FittedModel(TireModel):
                     now,
                     unit,
                     0.0,
-                    now <= DECIDED * prior,  # type: ignore[arg-type]
+                    now <= DECIDED * prior,
                 )
             )
         return tuple(listed)
@@ -563,7 +564,8 @@ class FittedModel(TireModel):
     def _curve_slope_sd(self, covariance: Array) -> Array:
         """Return the standard deviation of the slope at zero [static loads/rad], (2,)."""
         small = np.full((1, 2), 1e-4)
-        return self._curve_sd(small, covariance)[0] / 1e-4
+        sd: Array = self._curve_sd(small, covariance)[0] / 1e-4
+        return sd
 
     def facts(self) -> tuple[Fact, ...]:
         """Return what `summary` says beside the estimates."""
@@ -794,8 +796,8 @@ class _Mapped:
 
     def __call__(self, numbers: Array, slips: Array) -> tuple[Any, ...]:
         k = slips.shape[1]
-        found: tuple[Any, ...] = self._one(np.tile(numbers[:, None], (1, k)), slips)
-        return found
+        found: Any = self._one(np.tile(numbers[:, None], (1, k)), slips)
+        return tuple(found)
 
 
 def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:

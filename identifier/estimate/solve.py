@@ -329,12 +329,13 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     whole = np.zeros((len(p), len(p)))
     whole[np.ix_(index, index)] = np.linalg.inv(data + P)
     n, tires = len(NAMES), problem.tires
+    information: Array = np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])])
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
         covariance=whole[:n, :n],
         index=index[:tires],
-        information=np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]),
+        information=information,
         roads=p[n:],
         road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
