@@ -25,9 +25,9 @@ from identifier.driving import Driving
 from identifier.inertial.beliefs import Beliefs, Body, Trust, TrustNumbers
 from identifier.inertial.motion import MOVING, SENSORS, of_axles, size
 from identifier.inertial.step import CARRY, OVER, PORTS, build_step, heard_size
-from identifier.method import OTHER_STRUCTURE, Method, Reached, Track, fits, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle

@@ -105,8 +105,8 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
         Where the recording begins after that time.
     """
     if history.design.whole:
-        model, missed = history.freeze(t), judge(history, t).force_missed
-        return model.with_calibration(None, None if missed is None else np.array(missed))
+        model, shares = history.freeze(t), judge(history, t).force_missed
+        return model.with_calibration(None, None if shares is None else np.array(shares))
     run = asked_run(history, t)
     model, recording = run.model, run.portion.recording
     if not model.has_band:
