@@ -329,7 +329,8 @@ def _descend(problem: Problem, start: Array) -> Posterior:
     whole = np.zeros((len(p), len(p)))
     whole[np.ix_(index, index)] = np.linalg.inv(data + P)
     n, tires = len(NAMES), problem.tires
-    information: Array = np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])])
+    kept = np.ix_(index[:tires], index[:tires])
+    information = np.linalg.inv(whole[kept]).astype(np.float64, copy=False)
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
