@@ -6,8 +6,8 @@ The sedan, driven by its front wheels, by its rear wheels and by all, 60 to 40, 
 with good sensors whose driver steers at random and brakes and pulls as he does, with half the grip
 at most. Then it brakes in a bend, pulls in one, and drives through them at one speed; what it is
 told of itself is mass, axles and inertia ("nothing"), or height, shares and drag too ("told"). A
-second set of drives teaches at one speed: what is said of braking there is what was told. Errors: rms over
-that of the axle's force, over both directions and two sizes of each bend.
+second set of drives teaches at one speed: what is said of braking there is what was told. Errors:
+rms over that of the axle's force, over both directions and two sizes of each bend.
 """
 
 import argparse
