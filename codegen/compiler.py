@@ -54,10 +54,6 @@ def cache_folder() -> Path:
 def distrust(path: Path) -> str | None:
     """Return why another user could have written a file or what is in a folder; None if none could.
 
-    Parameters
-    ----------
-    path : of the file or folder itself, not of a link.
-
     Raises
     ------
     OSError
@@ -78,12 +74,6 @@ def distrust(path: Path) -> str | None:
 def keep(stem: str, ending: str, content: bytes) -> Path:
     """Keep a file for `kept`; return its path, which ends with the hash of its content.
 
-    Parameters
-    ----------
-    stem : what it is found by: a name and a hash of all that it was made of.
-    ending : of its name, with the dot.
-    content : the whole of it.
-
     Raises
     ------
     OSError
@@ -103,11 +93,6 @@ def kept(stem: str, ending: str) -> Path | None:
     """Return a file that was kept, whole and by this user; None where there is none.
 
     What is damaged, or not to be trusted, is said and removed.
-
-    Parameters
-    ----------
-    stem : as `keep` was told.
-    ending : as `keep` was told.
     """
     for file in sorted(cache_folder().glob(f"{stem}.*{ending}")):
         try:
@@ -233,7 +218,6 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     Parameters
     ----------
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
-    name : beginning of the file's name and of the messages.
     flags : of the compiler; None takes `FLAGS`.
 
     Returns

@@ -11,10 +11,6 @@ from pathlib import Path
 def naming(path: str | PathLike[str]) -> Iterator[None]:
     """Name a file in the error of what writes it, where that names none.
 
-    Parameters
-    ----------
-    path : that is written.
-
     Raises
     ------
     OSError
@@ -33,7 +29,6 @@ def write_file(path: Path, content: str | bytes) -> None:
 
     Parameters
     ----------
-    path : of it.
     content : all of it, text in UTF-8 with line ends as they are.
 
     Raises

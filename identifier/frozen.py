@@ -42,10 +42,6 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
     """Return the car that `vehicle_numbers` describes.
 
-    Parameters
-    ----------
-    data : as from `vehicle_numbers`.
-
     Raises
     ------
     ValueError
@@ -77,7 +73,6 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
     Parameters
     ----------
     refusal : class of the error to raise.
-    tires : both axles.
 
     Raises
     ------

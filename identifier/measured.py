@@ -41,7 +41,6 @@ def printed_value(value: float, sd: float | None, unit: str) -> str:
 
     Parameters
     ----------
-    value, sd : as of `with_doubt`.
     unit : of both; "N/rad" is printed as kN/rad.
     """
     scale = printed_scale(unit)

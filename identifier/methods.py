@@ -126,7 +126,6 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
 
     Parameters
     ----------
-    model : what was learnt.
     dt : sampling interval [s].
 
     Raises

@@ -187,7 +187,6 @@ class OnnxModel(TireModel):
     Parameters
     ----------
     vehicle : the car, whose l_f and l_r make slip angles.
-    content : the ONNX file.
     min_speed : below this speed [m/s] the forces read zero.
     inputs : what the network's columns are, see `read_network`; None goes by names and number.
     slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -242,7 +241,6 @@ class OnnxModel(TireModel):
 
         Parameters
         ----------
-        path : the ONNX file.
         min_speed : below this speed [m/s] the forces read zero.
         inputs : what the network's columns are; None goes by names and number.
         slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -318,7 +316,6 @@ class OnnxModel(TireModel):
         x : [v_y, r] (2,).
         delta : angle of the front wheels [rad].
         v_x : longitudinal speed [m/s], positive.
-        least_lag : not looked at.
         """
         del slip, least_lag
         return self._static_force(x, delta, v_x), ca.MX(0, 1)
@@ -345,13 +342,7 @@ class OnnxModel(TireModel):
 
         Parameters
         ----------
-        data : as from `to_dict`.
         source : name of the file, for errors.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
         """
         try:
             table = Table(data, "", FrozenModelError)
@@ -407,7 +398,6 @@ class FrozenMethod(Method):
 
     Parameters
     ----------
-    model : the model, with its car.
     dt : sampling interval of recordings [s]; the model has none of its own.
 
     Raises
@@ -452,7 +442,6 @@ class FrozenMethod(Method):
         Parameters
         ----------
         vehicle : the car; the model keeps its own.
-        state : nothing is carried.
         """
         del vehicle, state
         return self.model

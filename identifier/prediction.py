@@ -86,7 +86,6 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
     Parameters
     ----------
     model : the frozen model; samples below its minimum speed do not count.
-    recording : what is replayed.
     since : samples before this time [s] do not count; None counts all.
 
     Raises

@@ -28,13 +28,7 @@ class NeverDrivesError(RecordingError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxleRmse:
-    """Root mean square of a force error [N].
-
-    Parameters
-    ----------
-    front : front axle.
-    rear : rear axle.
-    """
+    """Root mean square of a force error [N]."""
 
     front: float
     rear: float
@@ -77,7 +71,6 @@ class Reproduction:
     ----------
     past_against_online : error for t < T_freeze against what was identified online, the measure of
         the paper's section IV-A; the linear part of both forces is the same and cancels.
-    past_against_truth : the same samples against the true force.
     after_against_truth : error for t > T_freeze against the true force.
     """
 
@@ -105,7 +98,6 @@ class MotionError:
     Parameters
     ----------
     lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
-    lateral_rms, yaw_rms : of these accelerations themselves.
     """
 
     lateral: float
@@ -129,8 +121,6 @@ def motion_error(
     Parameters
     ----------
     force : lateral axle forces (n, 2) [N], frame of the body.
-    recording : the motion.
-    vehicle : mass, inertia and geometry.
     counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """
     n = round(WINDOW / recording.dt)
@@ -185,7 +175,6 @@ class Replay:
 
     Parameters
     ----------
-    recording : what was replayed.
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over all samples against the true force, None without truth.
     against_online : error over all samples, before and after a freeze, against the forces that were
@@ -218,7 +207,6 @@ def counted_samples(
 
     Parameters
     ----------
-    recording : the signals.
     min_speed : samples below this speed [m/s] do not count.
     since : nor do samples before this time [s]; None begins at the first.
 
@@ -244,7 +232,6 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
 
     Parameters
     ----------
-    model : that predicts.
     recording : the drive; samples below the model's minimum speed do not count.
     """
     known = model.known_slip
@@ -292,7 +279,6 @@ def reproduce(online: History, t_freeze: float, *, since: float | None = None) -
 
     Parameters
     ----------
-    online : the run.
     t_freeze : time of the freeze in the recording's own clock [s].
     since : samples before this time [s] do not count; None counts all.
 
@@ -356,7 +342,6 @@ def force_rms(history: History, *, since: float | None = None) -> AxleRmse | Non
 
     Parameters
     ----------
-    history : an online run.
     since : samples before this time [s] do not count; None counts all.
 
     Raises

@@ -31,13 +31,10 @@ def state_index(recording: Recording, t: float) -> int:
 
     Parameters
     ----------
-    recording : n samples.
     t : time in the recording's own clock [s].
 
     Raises
     ------
-    TypeError
-        Where the time is no number.
     ValueError
         Where the recording begins after that time.
     """
@@ -57,8 +54,6 @@ class History:
 
     Parameters
     ----------
-    vehicle : the car, as far as the method knew it.
-    design : the method that ran.
     recording : what it ran over, with the v_y that the method told where there was none.
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
@@ -109,12 +104,7 @@ class History:
         return joined
 
     def tracks_over(self, block: Block) -> tuple[Track, ...]:
-        """Return what the method says it had learnt of the axles over a block of the run.
-
-        Parameters
-        ----------
-        block : of k samples.
-        """
+        """Return what the method says it had learnt of the axles over a block of the run."""
         return self.design.tracks(self.vehicle, block.before)
 
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
@@ -189,7 +179,6 @@ class History:
 
         Parameters
         ----------
-        recording : another drive of the car.
         t : time of the freeze in this recording's own clock [s]; None is the end.
 
         Raises
@@ -204,12 +193,7 @@ class History:
         return replace(self, recording=recording, axle_force=force, models={len(recording): model})
 
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
-        """Return the run over each of the recordings that the drive was joined of.
-
-        Parameters
-        ----------
-        recordings : in the order in which they were joined.
-        """
+        """Return the run over each of the recordings that the drive was joined of."""
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
@@ -241,10 +225,6 @@ class History:
 
 def check_recording(recording: Recording, design: Method) -> None:
     """Refuse a recording that a method cannot run over.
-
-    Parameters
-    ----------
-    recording : what the design is to run over.
 
     Raises
     ------
@@ -278,7 +258,6 @@ def identify(
     Parameters
     ----------
     recording : signals, sampled at the design's interval; its forces are not looked at.
-    vehicle : the car, as far as the method knows it.
     design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
     progress : called now and then with the share that is done, 0 to 1.
@@ -352,7 +331,6 @@ def learn(
 
     Parameters
     ----------
-    recording, vehicle, design, start : as of `identify`.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -389,9 +367,7 @@ class Counts:
 
     Parameters
     ----------
-    samples : that the method took.
     refused : that held a number which is not finite or beyond what any car reaches.
-    missed : of these, the newest in a row.
     """
 
     samples: int = 0
@@ -404,7 +380,6 @@ class OnlineIdentifier:
 
     Parameters
     ----------
-    vehicle : the car, as far as the method knows it.
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.
     stale_time : time of refused samples after which forces read zero [s].

@@ -14,13 +14,6 @@ EXTRAS = {
 
 
 def needs(what: str, library: str, extra: str) -> str:
-    """Return the line that says which library is missing and how to install it.
-
-    Parameters
-    ----------
-    what : needs it.
-    library : as its users call it.
-    extra : that has it.
-    """
+    """Return the line that says which library is missing and how to install it."""
     install = f"pip install {' '.join(EXTRAS[extra])}"
     return f"{what} needs {library}: {install} (in a checkout of tireid: pip install '.[{extra}]')"

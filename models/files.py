@@ -55,10 +55,6 @@ def _require_file_or_nothing(target: Path) -> None:
 def resolved(path: str | PathLike[str]) -> Path:
     """Return where a path leads, by all its links.
 
-    Parameters
-    ----------
-    path : of anything, or nothing.
-
     Raises
     ------
     OSError
@@ -81,12 +77,7 @@ def digest(content: Any) -> str:
 
 
 def digest_of_bytes(parts: Iterable[bytes]) -> str:
-    """Return twelve characters that stand for bytes.
-
-    Parameters
-    ----------
-    parts : of them, one after the other.
-    """
+    """Return twelve characters that stand for bytes."""
     found = hashlib.sha256()
     for part in parts:
         found.update(part)

@@ -68,7 +68,6 @@ class Friction:
     Parameters
     ----------
     scale : friction over the tire's own before the first change [-].
-    changes : in the order in which they are met.
 
     Raises
     ------

@@ -293,7 +293,6 @@ class RandomSteer:
     ----------
     amplitude : largest angle [rad].
     frequency : of the fastest swing [Hz].
-    seed : of the random numbers.
     onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
     duration : length [s].

@@ -36,7 +36,6 @@ class Sensor:
     Parameters
     ----------
     noise : standard deviation of white Gaussian noise, in the unit of the signal.
-    bias : constant offset, in the unit of the signal.
     delay : the signal comes this much later [s], by interpolation; before, its first value holds.
     resolution : step of the quantization, in the unit of the signal; 0 for none.
 
@@ -96,7 +95,6 @@ class Sensors:
 
         Parameters
         ----------
-        recording : the exact signals.
         rng : source of the noise; the same generator state gives the same noise.
         """
         t = recording.t

@@ -152,9 +152,6 @@ def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str]
     Parameters
     ----------
     record : the dataclass to write; fields that are None are left out.
-    folder : paths are written relative to it.
-    table : name of the field that becomes a table of its own, last in the file.
-    leave_out : names of fields that are not written.
     """
     lines = [
         f"{one.name} = {_value(getattr(record, one.name), folder)}"

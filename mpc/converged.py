@@ -34,11 +34,8 @@ class Solution(NamedTuple):
 
 @cache
 def build_errors(structure: TireStructure) -> ca.Function:
-    """Return what costs and what is bounded, of x, kappa, v_x, car, w: y (7,) and slip (2,) [rad].
-
-    Parameters
-    ----------
-    structure : of the tire.
+    """Return what costs and what is bounded, of x, kappa, v_x, car, w: y (7,) and slip (2,)
+    [rad].
     """
     p = stage_ports(structure)
     at = motion(structure, p)
@@ -92,7 +89,6 @@ def numbers(problem: Problem, tire: PredictionTire, kappa: ArrayLike, v_x: Array
 
     Parameters
     ----------
-    tire : weights and car.
     kappa : curvature of each stage [1/m], (N,).
     v_x : speed of each stage [m/s], (N,).
     """
@@ -110,7 +106,6 @@ def bounds(problem: Problem, x0: ArrayLike) -> dict[str, Array]:
 
     Parameters
     ----------
-    problem : limits.
     x0 : state at the beginning (n_x,).
     """
     N, limits = problem.horizon, problem.limits
@@ -150,12 +145,10 @@ def solve_converged(
 
     Parameters
     ----------
-    tire : of the prediction, with its car.
     x0 : state at the beginning (n_x,).
     kappa : curvature of each stage [1/m], (N,) or a number.
     v_x : speed of each stage [m/s], (N,) or a number.
     guess : x (N + 1, n_x) and u (N,) to begin with; None begins at x0 held.
-    tolerance : of IPOPT.
 
     Raises
     ------

@@ -56,13 +56,7 @@ NAMES = {  # of findings by their code, where the code is not the word
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --repair.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : is done with the repair, for the help.
-    """
+    """Add --repair."""
     parser.add_argument(
         "--repair",
         nargs="?",
@@ -74,12 +68,7 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
-    """Return what was found as rows: what, size, confidence, repair.
-
-    Parameters
-    ----------
-    diagnosis : of a log.
-    """
+    """Return what was found as rows: what, size, confidence, repair."""
     return [
         [
             " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
@@ -92,12 +81,7 @@ def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
 
 
 def size_text(finding: Finding) -> str:
-    """Return the size of a finding to the digits that its deviation leaves, with its unit.
-
-    Parameters
-    ----------
-    finding : with or without a size.
-    """
+    """Return the size of a finding to the digits that its deviation leaves, with its unit."""
     if math.isnan(finding.size):
         return ""
     scale, unit = {"s": (1e3, "ms"), "rad": (math.degrees(1.0), "deg")}.get(
@@ -114,7 +98,6 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
 
     Parameters
     ----------
-    diagnosis : of a log.
     unseen : whether what the log cannot tell stands below.
     """
     count = len(diagnosis.findings)
@@ -133,26 +116,14 @@ def tone_of(diagnosis: Diagnosis) -> Tone:
 
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
-    """Return what was found as warnings of a report.
-
-    Parameters
-    ----------
-    diagnosis : of a log.
-    """
+    """Return what was found as warnings of a report."""
     return [printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
 def diagnosis_section(
     diagnosis: Diagnosis, more: Sequence[Block] = (), heading: str = "Is the log right?"
 ) -> Section:
-    """Return the section of a report that holds a diagnosis.
-
-    Parameters
-    ----------
-    diagnosis : of a log.
-    more : blocks that follow.
-    heading : of the section.
-    """
+    """Return the section of a report that holds a diagnosis."""
     rows = finding_rows(diagnosis)
     blocks: list[Block] = [
         Paragraph(text="What is wrong with the log, or with what is told of its car, asked of the "
@@ -172,8 +143,6 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
 
     Parameters
     ----------
-    diagnosis : of a log.
-    repair : that was applied.
     path : of --repair, None where it was not asked for.
     """
     lines = [diagnosis_text(diagnosis, unseen=False)]
@@ -202,13 +171,7 @@ def write_doctor_report(
 
     Parameters
     ----------
-    folder : where to.
-    recording : as it was read.
-    vehicle : as it was told.
-    diagnosis : of both.
     after : that of the repaired log, None where nothing was repaired.
-    figure : of force over slip, before and after.
-    command : as it was typed.
     """
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
     sections = [
@@ -240,14 +203,7 @@ def write_doctor_report(
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:
-    """Write how a log is read with what is sure taken out of it, and return it.
-
-    Parameters
-    ----------
-    path : of the log.toml.
-    told : how the log was read.
-    diagnosis : of what was read so.
-    """
+    """Write how a log is read with what is sure taken out of it, and return it."""
     repaired = replace(told, repair=told.repair.then(diagnosis.repair))
     repaired.to_toml(path)
     return repaired

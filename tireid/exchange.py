@@ -52,10 +52,6 @@ def _renameat2() -> Any:
 def exchange(one: Path, other: Path) -> bool:
     """Let two folders change places in one step; return whether the system could.
 
-    Parameters
-    ----------
-    one, other : both exist, on the same disk.
-
     Raises
     ------
     OSError

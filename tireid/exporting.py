@@ -41,15 +41,7 @@ PARTS = (  # of an export: about how long each takes, and the option that asks f
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Exported:
-    """What was written.
-
-    Parameters
-    ----------
-    folder : that was written.
-    package : of the identifier.
-    costs : on the processors that could be measured here.
-    told : what is to be said of the tracker, line by line.
-    """
+    """What was written."""
 
     folder: Path
     package: Package
@@ -174,16 +166,11 @@ def export_method(
     Parameters
     ----------
     start : model to begin with; None begins afresh.
-    folder : to write.
-    name : prefix of every symbol.
     single : float unless the build says double.
     with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
     band : half the width of the band around each force is an output too, calibrated as `start` is.
     fmu : also FMUs 2.0 and 3.0.
-    onnx : also the model, frozen, as ONNX.
-    mpc : also a tracker.
     caution : of that tracker, from 0 to 1.
-    overwrite : replace the folder if it exists.
 
     Raises
     ------
@@ -276,7 +263,6 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     Parameters
     ----------
     folder : where the identifier lies in a folder of that name.
-    package : of the identifier.
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1.
 
@@ -331,8 +317,6 @@ def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
 
     Parameters
     ----------
-    folder : with the package.
-    name : prefix of its symbols.
     single : whether to compute in float.
 
     Raises

@@ -19,12 +19,7 @@ class OwnPackages:
 
     @staticmethod
     def find_spec(name: str, *_: object) -> ModuleSpec | None:
-        """Return where a package lies.
-
-        Parameters
-        ----------
-        name : of a module.
-        """
+        """Return where a package lies."""
         return PathFinder.find_spec(name, [HOME]) if name in PACKAGES else None
 
 

@@ -116,7 +116,6 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
 
     Parameters
     ----------
-    recording : with or without.
     tire : where it can go on learning from it, it begins with it.
 
     Raises

@@ -49,7 +49,6 @@ def require_free(path: Path, *, force: bool) -> None:
 
     Parameters
     ----------
-    path : to be written.
     force : whether what is there may be replaced.
 
     Raises
@@ -329,12 +328,7 @@ ROWS = 4096  # that are put into words at once
 
 
 def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
-    """Write columns that come part by part, as `write_csv` does.
-
-    Parameters
-    ----------
-    parts : each with the same columns.
-    """
+    """Write columns that come part by part, as `write_csv` does."""
     with naming(path), path.open("w", encoding="utf-8", newline="\n") as file:
         for k, columns in enumerate(parts):
             if k == 0:
@@ -347,13 +341,7 @@ def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
-    """Write columns that come part by part: as `write_csv` does, or as Parquet with all digits.
-
-    Parameters
-    ----------
-    path : .csv or .parquet.
-    parts : each with the same columns.
-    """
+    """Write columns that come part by part: as `write_csv` does, or as Parquet with all digits."""
     if path.suffix != ".parquet":
         write_long_csv(path, parts)
         return
@@ -406,7 +394,6 @@ def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = 
     ----------
     rows : cells; a row may be shorter than others.
     align : of each column, `<` left or `>` right; columns without are left.
-    indent : before each line.
     """
     count = max((len(row) for row in rows), default=0)
     sides = align.ljust(count, "<")

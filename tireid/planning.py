@@ -103,10 +103,6 @@ def plan(
 def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
     """Return how the double-track car of the vehicle drives a plan; none where it has no tires.
 
-    Parameters
-    ----------
-    found : the plan.
-
     Raises
     ------
     PlanError

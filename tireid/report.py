@@ -161,12 +161,7 @@ class Headline(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paragraph:
-    """Running text.
-
-    Parameters
-    ----------
-    text : plain text, no markup.
-    """
+    """Running text."""
 
     text: str
 
@@ -177,8 +172,6 @@ class Table:
 
     Parameters
     ----------
-    caption : what the table shows, plain text.
-    header : title of each column.
     rows : cells by row; numbers are given four digits, None and what is not finite becomes a dash.
     verbatim : whether cells are to be read letter by letter, as commands are.
 
@@ -209,8 +202,6 @@ class Picture:
     Parameters
     ----------
     image : the SVG, PNG, GIF or WebP itself, or the path of its file.
-    caption : what the picture shows, plain text.
-    read : how to read it, in one line, plain text.
 
     Raises
     ------
@@ -233,12 +224,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Subheading:
-    """A heading inside a section.
-
-    Parameters
-    ----------
-    text : plain text, no markup.
-    """
+    """A heading inside a section."""
 
     text: str
 
@@ -252,7 +238,6 @@ class Section:
 
     Parameters
     ----------
-    heading : plain text.
     blocks : paragraphs, tables, pictures and smaller headings in order.
     folded : whether only the heading is seen until a reader opens it.
     """
@@ -268,8 +253,6 @@ class Report:
 
     Parameters
     ----------
-    title : plain text.
-    sections : its parts in order.
     summary : what a hurried reader should know, plain text.
     numbers : what stands at the top, with units; none where there is nothing to count.
     lead : what is looked at first, above the warnings.
@@ -289,12 +272,7 @@ FINE = "No warnings."
 
 
 def report_html(report: Report) -> str:
-    """Return a report as one HTML page; tables and figures are numbered through.
-
-    Parameters
-    ----------
-    report : what it says.
-    """
+    """Return a report as one HTML page; tables and figures are numbered through."""
     title, sections = report.title, report.sections
     tables, figures = count(1), count(1)
 
@@ -341,7 +319,6 @@ def write_report(path: Path, report: Report) -> None:
     Parameters
     ----------
     path : the HTML file.
-    report : what it says.
     """
     write_atomically(path, report_html(report))
 

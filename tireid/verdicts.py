@@ -16,12 +16,7 @@ HEADER = ("", "front", "is", "rear", "is")
 
 
 def numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
-    """Return the numbers of a verdict by title with the unit that is printed, and by axle.
-
-    Parameters
-    ----------
-    verdict : with numbers of both axles.
-    """
+    """Return the numbers of a verdict by title with the unit that is printed, and by axle."""
     rows: dict[str, dict[Axle, Number]] = {}
     for number in verdict.numbers:
         title = f"{number.title} [{printed_unit(number.unit)}]"
@@ -67,12 +62,7 @@ def _cells(number: Number | None) -> tuple[str, str]:
 
 
 def asked_text(asked: Mapping[str, Verdict]) -> str:
-    """Return the verdicts on a model over drives that it was not learnt on, as lines of text.
-
-    Parameters
-    ----------
-    asked : by the name of the recording.
-    """
+    """Return the verdicts on a model over drives that it was not learnt on, as lines of text."""
     return _each(asked, "replayed on")
 
 
@@ -96,12 +86,7 @@ def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
-    """Return the verdict as the first number of a report: green, amber with notes, red.
-
-    Parameters
-    ----------
-    others : further warnings of the report, which are notes on it.
-    """
+    """Return the verdict as the first number of a report: green, amber with notes, red."""
     if not verdict.valid:
         return Headline("NOT VALID", f"the verdict on this answer: {verdict.against}", "bad")
     notes = len(verdict.findings) + len(others)
@@ -169,12 +154,7 @@ def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
 
 
 def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
-    """Return the findings as warnings of a report; those that refuse the answer are marked.
-
-    Parameters
-    ----------
-    prefix : of each, plain text.
-    """
+    """Return the findings as warnings of a report; those that refuse the answer are marked."""
     return [
         Marked(prefix + printed(finding.line), "bad" if finding.refuses else "")
         for finding in verdict.findings
@@ -208,10 +188,6 @@ def verdict_section(verdict: Verdict) -> Section:
 def warn_of_stored(path: Path | str) -> None:
     """Say on standard error where a stored model was found not valid when it was learnt.
 
-    Parameters
-    ----------
-    path : of the file.
-
     Raises
     ------
     FrozenModelError
@@ -223,10 +199,6 @@ def warn_of_stored(path: Path | str) -> None:
 
 def stored_warning(path: Path | str) -> list[Marked]:
     """Return what speaks against a stored model that was found not valid when it was learnt.
-
-    Parameters
-    ----------
-    path : of the file.
 
     Raises
     ------
@@ -240,13 +212,7 @@ def stored_warning(path: Path | str) -> list[Marked]:
 
 
 def warn_of(verdict: Verdict, what: str) -> None:
-    """Say on standard error where what is about to be used is not valid.
-
-    Parameters
-    ----------
-    verdict : on it.
-    what : is used.
-    """
+    """Say on standard error where what is about to be used is not valid."""
     if not verdict.valid:
         first = next(finding for finding in verdict.findings if finding.refuses)
         complain(f"warning: {what} is not valid: {first.line.removeprefix('not valid: ')}")

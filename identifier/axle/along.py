@@ -89,12 +89,7 @@ class Adjoint(NamedTuple):
 
 
 def lessons(design: Learner, history: Run) -> Lessons:
-    """Return what the samples of a run taught; of a long one those at its end.
-
-    Parameters
-    ----------
-    history : a run of the design.
-    """
+    """Return what the samples of a run taught; of a long one those at its end."""
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
     step = build_lesson(doublings(design.ladder), pressed=pressed)
@@ -125,7 +120,6 @@ def _taught(
     Parameters
     ----------
     values : of its ports, (N, ...) but for the constants.
-    constants : ports that are alike for all samples.
     """
     N, names = len(values["v_x"]), step.name_in()
     alike = [i for i, name in enumerate(names) if name in constants]
@@ -151,7 +145,6 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
 
     Parameters
     ----------
-    taught : by the drive.
     slips : at which the force is looked at, of each axle (2, m) [rad].
     ladder : slip scales of the units [rad].
     """
@@ -176,13 +169,7 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
 
 
 def certified_along(design: Learner, history: Run) -> tuple[Property, ...]:
-    """Return what is proven of the curves that a drive taught.
-
-    Parameters
-    ----------
-    design : the identifier.
-    history : its run over the drive.
-    """
+    """Return what is proven of the curves that a drive taught."""
     model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
     taught = lessons(design, history)
     known = np.asarray(model.known_slip)
@@ -217,8 +204,6 @@ def _of_axle(
 
     Parameters
     ----------
-    model : that was learnt.
-    taught : by the drive.
     reach : of errors, at the slips of both axles (2, m).
     slips : [rad], up to the range that is known (m,).
     box : corners of the set of weights (k, n).
@@ -290,7 +275,6 @@ def begin_error(taught: Lessons, reach: Adjoint) -> Array:
 
     Parameters
     ----------
-    taught : by the drive.
     reach : of errors, at m slips.
     """
     variance = np.einsum("ami,aij,amj->am", reach.begin, taught.begin, reach.begin)

@@ -47,7 +47,6 @@ def band_numbers(calibration: BandCalibration, froude_speed: float) -> BandNumbe
 
     Parameters
     ----------
-    calibration : of the band.
     froude_speed : sqrt(g L) [m/s].
     """
     return BandNumbers(
@@ -80,7 +79,6 @@ def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
     ----------
     numbers : of an axle, k entries.
     at : the centers (k,).
-    x : where.
     """
     x, value = smaller(x, at[-1]), numbers[0]
     for change, begin in zip(numbers[1:], at[:-1], strict=True):
@@ -118,8 +116,6 @@ def half_band(
     ----------
     at : the axle at the sample.
     P, prior : factors of the covariance now and before the first sample.
-    numbers : of the axle.
-    slips, speeds : hinges of its factors.
     """
     h = [*at.units, ca.SX(0), ca.SX(0), at.slope * at.by_offset]
     left, before = excited(P, h, 0).a, excited(prior, h, LEAST_BEFORE).a

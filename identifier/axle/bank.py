@@ -47,11 +47,6 @@ class RoadSlope:
     share : of the fast motion that the channel may miss [-].
     doubt : what it may miss beside, noise and the changes of the road [-].
     memory : of that comparison [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     time: float = 1.0
@@ -125,8 +120,6 @@ def slope_step(
 
     Parameters
     ----------
-    regression : whose filter y went through.
-    state : before the sample.
     a_y : of the accelerometer [m/s²], or NaN.
     motion : m = L(dv_y/dt + v_x r)/g [-].
     first : 1 at a restart, else 0.
@@ -153,7 +146,6 @@ def road_push(numbers: SlopeNumbers, state: SlopeState, offsets_alone: Any) -> A
 
     Parameters
     ----------
-    state : before the sample, so that nothing waits for the accelerometer.
     offsets_alone : force that teaches the sensors' offsets alone, the most that is believed of a
         channel that has not explained any motion yet [weights].
     """

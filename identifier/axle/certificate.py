@@ -86,7 +86,6 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
 
     Parameters
     ----------
-    bounds : of the weights.
     ladder : slip scales of the units [rad].
     rising_until : as of `AxleIdentifier`; None bounds no slope.
     """
@@ -273,12 +272,6 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     """Return what is proven of a design, whatever is measured unless a title says more.
 
     Of a car with downforce without the time that a drop of friction takes.
-
-    Parameters
-    ----------
-    design : the identifier.
-    vehicle : the car, as far as the identifier knows it.
-    driving : its speed and friction are those of the drop.
     """
     b, dt = design.bounds, design.dt
     set_ = corners(b, design.ladder, design.rising_until)
@@ -372,10 +365,6 @@ def jump_by_learning(design: Design) -> float:
 
     The step that is let through, and its lean to the center: no partial sum of weights is further
     from there than n times the weight and the grip.
-
-    Parameters
-    ----------
-    design : the identifier.
     """
     b, n = design.bounds, len(design.ladder)
     return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)

@@ -39,11 +39,6 @@ class Plausibility:
     steering_jump : what noise may add to the steering [rad].
     hold : longest time to go on with the last good sample, or with values that do not change [s].
     settle : time to wait before learning [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     min_speed: float
@@ -165,7 +160,6 @@ def gate(limits: GateNumbers, dt: Any, last: GateState, x: Any, u: Any, v_x: Any
     Parameters
     ----------
     dt : sampling interval [s].
-    last : state before the sample.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     v_x : longitudinal speed [m/s].

@@ -107,11 +107,8 @@ class Doubt(NamedTuple):
 
     @classmethod
     def none(cls, n: int) -> Self:
-        """Return that of n steady forces within the slip that taught, along which nothing pushes.
-
-        Parameters
-        ----------
-        n : how many.
+        """Return that of n steady forces within the slip that taught, along which nothing
+        pushes.
         """
         return cls(*np.zeros((3, n, 2)))
 
@@ -130,12 +127,7 @@ class Strips(NamedTuple):
     t: Array
 
     def until(self, m: int) -> "Strips":
-        """Return the first m of them.
-
-        Parameters
-        ----------
-        m : how many.
-        """
+        """Return the first m of them."""
         return Strips(*(values[:m] for values in self))
 
 
@@ -163,7 +155,6 @@ def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
 
     Parameters
     ----------
-    bounds : limits of what is learnt.
     ladder : slip scales of the units [rad].
     """
     n, scales = len(ladder), np.array(ladder)
@@ -230,9 +221,7 @@ def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, floa
 
     Parameters
     ----------
-    strips : of the drive.
     axle : 0 front, 1 rear.
-    box : what any tire keeps.
     """
     y, h, rate = strips.y[:, axle], strips.h[:, axle], strips.rate[:, axle]
     n = h.shape[1]
@@ -281,10 +270,7 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
 
     Parameters
     ----------
-    strips : of the drive.
     axle : 0 front, 1 rear.
-    bound : of the errors.
-    box : what any tire keeps.
     """
     allowed = bound.allowed(strips.beyond, strips.rate)[:, axle]
     return vertices(box.both(strip_sides(strips.y[:, axle], strips.h[:, axle], allowed)))
@@ -296,7 +282,6 @@ class Guarantee:
 
     Parameters
     ----------
-    bound : of the errors.
     told : whether the bound was told; else it was estimated from the drive.
     corners : vertices of the possible weights of front and rear, (k, n) each.
     speed : mean of the drive that taught [m/s].
@@ -356,7 +341,6 @@ class Guarantee:
         Parameters
         ----------
         units : h of both axles (k, 2, n).
-        doubt : that opens the band.
         """
         low, high = self.reach(units)
         kept, beside = 1.0 - doubt.lost, self.bound.allowed(doubt.beyond, doubt.rate)
@@ -366,10 +350,6 @@ class Guarantee:
         """Return which means of another drive no possible curve explains, (m, 2).
 
         One is proof that the bound does not hold there: other tires, another road, a sensor.
-
-        Parameters
-        ----------
-        strips : of that drive.
         """
         low, high = self.limits(strips.h, Doubt(strips.beyond, strips.rate, strips.lost))
         outside: NDArray[np.bool_] = (strips.y < low - SLACK) | (strips.y > high + SLACK)
@@ -392,15 +372,7 @@ class Guarantee:
 
         Parameters
         ----------
-        data : as from `to_dict`.
         n : number of weights of an axle.
-
-        Raises
-        ------
-        ValueError
-            Where a value is impossible.
-        KeyError
-            Where a key is missing.
         """
         pairs = []
         for name in (*PAIRS, "corners"):

@@ -124,7 +124,6 @@ def total(parts: Iterable[Information], q: int) -> Information:
 
     Parameters
     ----------
-    parts : of drives.
     q : parameters of an axle.
     """
     sums = Total(q)
@@ -149,12 +148,7 @@ class Total:
         self._rows = [np.zeros(sum(map(math.prod, self._shapes)))]
 
     def add(self, one: Information) -> None:
-        """Add what a drive tells.
-
-        Parameters
-        ----------
-        one : of q parameters.
-        """
+        """Add what a drive tells."""
         values = (one.matrix, one.vector, one.square, one.samples, one.seconds)
         self._rows.append(np.concatenate([np.ravel(value) for value in values]))
         if len(self._rows) > TOGETHER:
@@ -187,13 +181,7 @@ def _exact(rows: Array) -> Array:
 
 
 def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:
-    """Return the model that nothing was learnt of: the brush tire of what is told of the car.
-
-    Parameters
-    ----------
-    design : whose prior it is.
-    vehicle : the car.
-    """
+    """Return the model that nothing was learnt of: the brush tire of what is told of the car."""
     W, own = design.prior.means(vehicle, design.ladder)
     P = design.prior.covariance(vehicle, design.ladder)
     return _model(design, vehicle, np.hstack([W, own]), P, P, np.zeros((2, 1 + len(EDGES))))
@@ -229,7 +217,6 @@ class Evidence:
 
     Parameters
     ----------
-    design : the identifier, whose regression it is.
     reference : the model θ₀ that lag, slip and variances are taken at.
 
     Raises
@@ -279,10 +266,6 @@ class Evidence:
     def of(self, recording: Recording) -> Information:
         """Return what a drive tells; each of its stretches begins anew.
 
-        Parameters
-        ----------
-        recording : with v_y, measured or estimated, at the design's interval.
-
         Raises
         ------
         RecordingError
@@ -296,7 +279,6 @@ class Evidence:
 
         Parameters
         ----------
-        recording : with v_y, measured or estimated, at the design's interval.
         longest : time that a part may last [s]; stretches make parts of their own.
         """
         recording.needed("v_y")
@@ -347,9 +329,7 @@ def merged(
 
     Parameters
     ----------
-    design : whose prior and bounds hold.
     reference : that the information was taken at; its car is the model's.
-    told : by all drives together.
     excitation : largest slip and times of learning of all drives together, (2, 9).
     """
     vehicle = reference.vehicle
@@ -366,7 +346,6 @@ def posterior(told: Information, mean: Array, covariance: Array) -> tuple[Array,
 
     Parameters
     ----------
-    told : information of drives.
     mean : of the prior (2, q).
     covariance : of the prior (2, q, q).
     """
@@ -409,10 +388,7 @@ def change_from(
 
     Parameters
     ----------
-    told : by the drives.
     theta : [W, own] of the curves, (2, q).
-    design : whose units and offsets they are.
-    vehicle : the car.
     """
     n = len(design.ladder)
     M = friction_direction(design.ladder)

@@ -50,11 +50,6 @@ class Regression:
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
     rate : by which learning may change the force of a curve [static axle loads/s]; three times
         what a change of friction asks for.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     bandwidth: float = 4.0
@@ -126,8 +121,6 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
 
     Parameters
     ----------
-    numbers : of the filter.
-    v : its state.
     u : its input now, which is also its output at a restart.
     first : 1 at a restart, else 0.
     """
@@ -232,11 +225,6 @@ class ChangeDetector:
     step_time : ... may happen in this time [s] during an alarm.
     offset_time : in which an alarm at an axle that is not known yet makes its offset as unsure as
         it may get [s]: a bias that was there on the straight is gone, or a new one came.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     threshold: float = 4.0
@@ -293,8 +281,6 @@ def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) 
 
     Parameters
     ----------
-    numbers : of the detector.
-    state : before the sample.
     q : squared error over its variance, (2,).
     learns : 1 where learning runs, else 0.
     """
@@ -309,7 +295,6 @@ def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
 
     Parameters
     ----------
-    numbers : of the detector.
     fast : mean of q (2,).
     slow : mean of q (2,).
     """
@@ -423,7 +408,6 @@ class Bounds:
         Parameters
         ----------
         ladder : slip scales of the units [rad].
-        rising_until : as of `at`.
 
         Raises
         ------
@@ -504,7 +488,6 @@ def bounded(
     ----------
     theta : parameters, n + 3 entries.
     P : covariance of the weights, the metric: upper triangle by place.
-    offset : bound of the last one.
     slope : derivatives of the units at a slip over their sum, n entries; the curve's is bounded
         there.
     """

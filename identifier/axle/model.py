@@ -71,8 +71,6 @@ class AxleModel(TireModel):
     Parameters
     ----------
     ladder : slip scales α_j of the units [rad].
-    sway : roll of the body.
-    plausibility : which samples are believed.
     W : weights [static axle loads], (2, n).
     own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
     covariance : of [W, own], (2, n + 3, n + 3).
@@ -271,13 +269,7 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        recording : its signals are the input.
         level : share of samples that the band shall hold, above 0 and below 1.
-
-        Raises
-        ------
-        ValueError
-            Where the level is impossible.
         """
         slip, noise = self.lagged_slip(recording), sensor_noise(recording, self.vehicle)
         half = np.zeros_like(slip)
@@ -308,7 +300,6 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        recording : its signals are the input.
         level : share of cases that the band shall hold, above 0 and below 1.
         """
         speed = np.maximum(recording.v_x, self.min_speed)
@@ -340,12 +331,7 @@ class AxleModel(TireModel):
         return slope
 
     def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2).
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""
         return self.slope_at(self.lagged_slip(recording)) * self.vehicle.load_ratio(recording.v_x)
 
     @property
@@ -386,7 +372,6 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        recording : its signals are the input.
         mean : over the windows: signals (n, ...) -> (m, ...).
         """
         size, count = np.abs(self.lagged_slip(recording)), len(CENTERS)
@@ -410,11 +395,6 @@ class AxleModel(TireModel):
         Parameters
         ----------
         sd_friction : standard deviation of ln μ between the roads [-], as of `Prior`.
-
-        Raises
-        ------
-        ValueError
-            Where it is negative or not finite.
         """
         if not 0.0 <= sd_friction < np.inf:
             raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
@@ -446,10 +426,6 @@ class AxleModel(TireModel):
         """Return least and largest axle force over a drive, (n, 2) [N], as `axle_force`.
 
         NaN below the lowest speed; None where no guarantee is stated.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
         """
         if self.guarantee is None:
             return None
@@ -459,12 +435,7 @@ class AxleModel(TireModel):
         return low * self._loads, high * self._loads
 
     def with_guarantee(self, guarantee: Guarantee) -> "AxleModel":
-        """Return the model with its guaranteed band.
-
-        Parameters
-        ----------
-        guarantee : weights that are possible.
-        """
+        """Return the model with its guaranteed band."""
         return replace(self, guarantee=guarantee)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
@@ -473,10 +444,6 @@ class AxleModel(TireModel):
         ρ is of the model's force; where a guarantee is stated, of that possible one which changes
         most, and the slower the car is against the drive that taught, the larger: the lag of a tire
         is a length.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
         """
         slip, dt, stretches = self.lagged_slip(recording), recording.dt, recording.stretches
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
@@ -518,11 +485,6 @@ class AxleModel(TireModel):
 
     def samples(self, n: int, rng: np.random.Generator) -> tuple["AxleModel", ...]:
         """Return models drawn from what learning left open, and from the errors of a model.
-
-        Parameters
-        ----------
-        n : how many.
-        rng : source of randomness.
 
         Raises
         ------
@@ -637,11 +599,6 @@ class AxleModel(TireModel):
         Parameters
         ----------
         ratio : friction over that of the drive that taught, positive [-].
-
-        Raises
-        ------
-        ValueError
-            Where the ratio is not positive.
         """
         require_positive(ValueError, ratio=ratio)
         n = len(self.ladder)
@@ -707,24 +664,14 @@ class AxleModel(TireModel):
         return above - np.column_stack([above[:, 1:], np.zeros(2)])
 
     def outside(self, recording: Recording) -> NDArray[np.bool_]:
-        """Return where the slip leaves the known range, (n, 2).
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return where the slip leaves the known range, (n, 2)."""
         outside: NDArray[np.bool_] = (
             self.setup(recording.dt).output(recording, "slip_size") > self.known_slip
         )
         return outside
 
     def lagged_slip(self, recording: Recording) -> Array:
-        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad].
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self.setup(recording.dt).output(recording, "lagged_slip")
 
     def setup(self, dt: float) -> Setup:
@@ -787,13 +734,7 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        data : as from `to_dict`.
         source : name of the file, for errors.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
         """
         _require_plausible(data, source)
         try:

@@ -58,7 +58,6 @@ def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
 
     Parameters
     ----------
-    gated : what the gate lets through.
     offset : δ₀ [rad] and b [m/s], (2,).
     """
     sideways = gated.v_y - offset[1] + car.arm * gated.r
@@ -88,7 +87,6 @@ def lagged_slip(h: Hold, last: SlipState, alpha: Any, first: Any) -> Any:
     Parameters
     ----------
     h : numbers of the step.
-    last : state before the step.
     alpha : slip angle now [rad], (2,).
     first : 1 at a restart, which begins without lag, else 0.
     """
@@ -114,8 +112,6 @@ def sensitivity(
     Parameters
     ----------
     h : numbers of the step.
-    last : slip before the step.
-    lasting : sensitivities before the step.
     compliance : s [m], (2,).
     alpha : slip angle now [rad], (2,).
     first : 1 at a restart, else 0.
@@ -185,10 +181,6 @@ class Sway:
     def for_vehicle(cls, vehicle: Vehicle) -> "Sway":
         """Return the roll that a car of this size has: 5 sqrt(g/L), 1.5 Hz for a sedan; of a toy
         below 7 cm 10 Hz.
-
-        Parameters
-        ----------
-        vehicle : its wheelbase sets the scale of time.
         """
         return cls(frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * FASTEST))
 
@@ -241,7 +233,6 @@ def sway(
     ----------
     numbers : of the second-order system.
     dt : sampling interval [s].
-    state : before the step.
     first : 1 at a restart, which begins in steady cornering, else 0.
     v_x : longitudinal speed [m/s].
     r : yaw rate [rad/s].

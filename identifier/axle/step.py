@@ -179,7 +179,6 @@ def build_frozen(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
     Parameters
     ----------
     steps : doublings between the units.
-    pressed : as of `forward`.
     """
     f = forward(steps, pressed=pressed)
     return ca.Function(
@@ -305,7 +304,6 @@ def build_step(
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is told, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
-    pressed : as of `forward`.
     """
     n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)
@@ -382,7 +380,6 @@ def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
     Parameters
     ----------
     steps : doublings between the units, the structure.
-    pressed : as of `forward`.
     """
     n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)
@@ -524,7 +521,6 @@ def build_evidence(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Funct
     Parameters
     ----------
     steps : doublings between the units.
-    pressed : as of `forward`.
     """
     f = forward(steps, pressed=pressed)
     n, ports = len(steps) + 1, dict(f.ports)

@@ -42,11 +42,6 @@ class Watch:
     again : time for which the old weights must explain forces that are there [s].
     known : time for which weights must have explained forces before there is an alarm on them [s].
     give_up : time of alarm after which it is taken for another road [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     moment: float = 0.2
@@ -136,7 +131,6 @@ def watched(
 
     Parameters
     ----------
-    state : before the sample.
     q : of the learnt weights, front and rear (2,).
     q_kept : of the kept ones (2,).
     dt : sampling interval [s].

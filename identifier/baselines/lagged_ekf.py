@@ -77,12 +77,7 @@ def curve_parameters(theta: Any, loads: Any) -> Any:
 
 
 def build_step(name: str) -> ca.Function:
-    """Return the filter's step; carried are the ports of a `kalman` filter whose tire lags.
-
-    Parameters
-    ----------
-    name : of the function.
-    """
+    """Return the filter's step; carried are the ports of a `kalman` filter whose tire lags."""
     heard, last = heard_ports(), lag_symbols()
     s, p = heard.sample, heard.sample.parameters
     estimate, P = ca.SX.sym("estimate", STATES), ca.SX.sym("P", STATES, STATES)
@@ -164,11 +159,6 @@ class LaggedEkf(Method):
     dt : sampling interval [s].
     learning_speed : below this speed [m/s] learning rests.
     min_speed : below this speed [m/s] forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     v_y_noise: float

@@ -45,8 +45,6 @@ class Course:
 
     Parameters
     ----------
-    vehicle : the car as every method is told of it.
-    recordings : each with a name of its own, and with v_y.
     min_speed : samples below this speed [m/s] do not count, for any method.
 
     Raises
@@ -91,12 +89,7 @@ class Course:
         return Windows.of(recording, max(self.min_speed, BRISK * self.vehicle.froude_speed))
 
     def size(self, recording: Recording) -> AxleRmse:
-        """Return the rms over the samples that count of the forces that methods are judged by.
-
-        Parameters
-        ----------
-        recording : one of them.
-        """
+        """Return the rms over the samples that count of the forces that methods are judged by."""
         return self.error(recording, np.zeros((len(recording), 2)))
 
     def error(self, recording: Recording, force: Array) -> AxleRmse:
@@ -104,7 +97,6 @@ class Course:
 
         Parameters
         ----------
-        recording : one of them.
         force : (n, 2) [N].
         """
         if self.by_motion:
@@ -131,7 +123,6 @@ class Course:
 
         Parameters
         ----------
-        name : of a recording.
         error : over it [N].
         """
         (recording,) = (rec for rec in self.recordings if rec.name == name)
@@ -170,12 +161,7 @@ class Shares(NamedTuple):
 
 
 def shown_to(method: Method, recording: Recording) -> Recording:
-    """Return what a comparison shows a method: no lateral velocity, where it tells one.
-
-    Parameters
-    ----------
-    recording : that is learnt on.
-    """
+    """Return what a comparison shows a method: no lateral velocity, where it tells one."""
     return recording if method.needs_v_y else replace(recording, v_y=None)
 
 
@@ -237,7 +223,6 @@ def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSl
 
     Parameters
     ----------
-    history : of a method.
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """
@@ -262,12 +247,7 @@ def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSl
 
 
 def shares(trial: Trial, course: Course) -> Shares:
-    """Return the means of a trial over its recordings [%].
-
-    Parameters
-    ----------
-    trial : one method on the course.
-    """
+    """Return the means of a trial over its recordings [%]."""
     names = [recording.name for recording in course.recordings]
     if trial.diverged_at:
         frozen = None if trial.frozen is None else np.inf
@@ -395,11 +375,9 @@ def run_scored(
     Parameters
     ----------
     scan : its step reads x, u and v_x sample by sample and tells axle_force (2,) [N].
-    values : for each run, what it starts from and its constants, by port.
     recording : its forces are the truth; without them every error is that of no force.
     impossible : for each run, a force that no tire makes [N].
     counts : samples that count in the error (n,).
-    keep : samples whose values are recorded.
     rest : samples that each run rests between stretches of the recording.
     workers : threads; None takes one for each processor.
     """
@@ -457,8 +435,6 @@ def step_times(
 
     Parameters
     ----------
-    methods : by name.
-    recording : what is run over.
     repeats : turns; the shortest counts.
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}

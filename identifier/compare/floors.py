@@ -39,8 +39,6 @@ def fit(course: Course, starts: int, seed: int, task: tuple[str, int]) -> dict[s
 
     Parameters
     ----------
-    starts : of the fit.
-    seed : of the starts.
     task : name of the structure, number of the recording.
     """
     name, number = task
@@ -63,9 +61,6 @@ def fit_floors(
 
     Parameters
     ----------
-    methods : whose structures are fitted.
-    starts : of each fit.
-    seed : of the starts.
     workers : processes; 1 stays in this one.
     """
     needed = {FLOOR_OF[name] for name in methods if name in FLOOR_OF}

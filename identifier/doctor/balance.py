@@ -113,13 +113,7 @@ class Car(NamedTuple):
 
     @classmethod
     def of(cls, vehicle: Vehicle, sizes: Sizes) -> "Car":
-        """Return it.
-
-        Parameters
-        ----------
-        vehicle : as it was told.
-        sizes : of the faults.
-        """
+        """Return it."""
         back = sizes.get("center_of_gravity", 0.0)
         per_mass = vehicle.yaw_inertia / vehicle.mass
         return cls(
@@ -130,13 +124,7 @@ class Car(NamedTuple):
 
 
 class Balance:
-    """The equations of a drive, or of some stretches of it.
-
-    Parameters
-    ----------
-    stretches : of one drive, as it was logged, all of one sampling interval.
-    vehicle : as it was told.
-    """
+    """The equations of a drive, or of some stretches of it."""
 
     def __init__(self, stretches: tuple[Recording, ...], vehicle: Vehicle) -> None:
         self.vehicle = vehicle
@@ -233,12 +221,7 @@ class Balance:
     # The equations.
 
     def channels(self, sizes: Sizes) -> dict[str, Array]:
-        """Return the channels without the faults, (n,) each.
-
-        Parameters
-        ----------
-        sizes : of the faults, by key.
-        """
+        """Return the channels without the faults, (n,) each."""
         get, out = sizes.get, {}
         for name in self.names:
             factor = math.exp(-get(f"factor.{name}", 0.0))
@@ -318,12 +301,7 @@ class Balance:
         return followed
 
     def residual(self, sizes: Sizes) -> Residual:
-        """Return what the equations miss.
-
-        Parameters
-        ----------
-        sizes : of the faults, by key.
-        """
+        """Return what the equations miss."""
         parts = (FRONT, REAR, KINEMATICS) if self.has_accelerometer else (FRONT, REAR)
         found = [self.part(i, told(sizes, NOT_OF_PART[i])) for i in parts]
         return Residual(tuple(part for part, _ in found), tuple(noise for _, noise in found))
@@ -427,13 +405,7 @@ def tilted(sizes: Sizes) -> float:
 
 
 def told(sizes: Sizes, without: frozenset[str]) -> Told:
-    """Return the sizes that matter.
-
-    Parameters
-    ----------
-    sizes : by key.
-    without : keys of those that do not.
-    """
+    """Return the sizes that matter."""
     return tuple(one for one in sizes.items() if one[0] not in without)
 
 
@@ -463,9 +435,7 @@ def thinned(signal: Array, half: int, dt: float, every: int) -> Smooth:
     Parameters
     ----------
     signal : samples (n,).
-    half : of the window.
     dt : sampling interval [s].
-    every : which samples are kept.
     """
     value = smoothed(signal, half)
     slope = np.gradient(value, dt)
@@ -480,8 +450,6 @@ def cubic(a: Array, b: Array, slope_a: Array, slope_b: Array, share: float, step
     ----------
     a, b : values at both ends (n,).
     slope_a, slope_b : slopes there (n,).
-    share : of the step that is gone.
-    step : from a to b.
     """
     f, e = share, 1.0 - share
     inside: Array = (
@@ -498,12 +466,6 @@ def window_length(
     """Return how long ψ is [s]: short against the swings of the drive, but not full of noise.
 
     White noise s of every sample leaves s² dt ∫ψ̇² = s² dt 2π²/T³ of a derivative.
-
-    Parameters
-    ----------
-    stretches : of the drive.
-    vehicle : the car, by whose size a period is believed.
-    white : noise of the channels.
     """
     time, dt = vehicle.froude_time, stretches[0].dt
     half = max(1, round(0.3 * time / dt))

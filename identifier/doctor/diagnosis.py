@@ -137,11 +137,6 @@ def _asked_finely(
 
     What distorts the motion distorts the ratio: where sizes are found beside it, the ratio is asked
     again together with them, and they with it.
-
-    Parameters
-    ----------
-    gross : findings of the screen.
-    recording, vehicle : as they were told.
     """
     found = list(gross.findings)
     wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
@@ -185,8 +180,6 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle, beside: Sizes)
 
     Parameters
     ----------
-    coarse : the finding, by which the drive is repaired.
-    drive, car : with it.
     beside : sizes of other faults that are estimated with it, where to begin.
     """
     assert coarse.repair is not None

@@ -62,12 +62,7 @@ class Found(NamedTuple):
 
 
 class Search:
-    """The search for what is wrong with one drive.
-
-    Parameters
-    ----------
-    balance : of the drive.
-    """
+    """The search for what is wrong with one drive."""
 
     def __init__(self, balance: Balance) -> None:
         self.balance, self.vehicle = balance, balance.vehicle
@@ -80,12 +75,7 @@ class Search:
         self.fit = self.fitter.fit((), {})
 
     def keys(self, suspect: Suspect) -> list[str]:
-        """Return the keys of its sizes.
-
-        Parameters
-        ----------
-        suspect : of which a bank has several, and downforce one for each axle.
-        """
+        """Return the keys of its sizes."""
         match suspect.code:
             case "bank":
                 return [f"bank.{k}" for k in range(BANKS if self.balance.has_accelerometer else 1)]
@@ -99,12 +89,8 @@ class Search:
         return [key for one in self.found for key in self.keys(one.suspect)]
 
     def size(self, suspect: Suspect, sizes: Sizes) -> float:
-        """Return the size of a suspect: of a bank, its rms over the drive, of downforce, the mean.
-
-        Parameters
-        ----------
-        suspect : whose keys are among the sizes.
-        sizes : by key.
+        """Return the size of a suspect: of a bank, its rms over the drive, of downforce, the
+        mean.
         """
         if suspect.code == "downforce":
             shares = np.array(self.vehicle.axle_loads) / self.vehicle.weight
@@ -116,22 +102,11 @@ class Search:
         return math.copysign(math.sqrt(float(np.mean(angle**2))), float(np.mean(angle)))
 
     def deviation(self, suspect: Suspect, fit: Fit) -> float:
-        """Return the standard deviation of a suspect's size, with what no model tells.
-
-        Parameters
-        ----------
-        suspect : whose keys are among those of the fit.
-        fit : with it.
-        """
+        """Return the standard deviation of a suspect's size, with what no model tells."""
         return math.hypot(fit.deviation(self.keys(suspect)[0]), self.least(suspect))
 
     def least(self, suspect: Suspect) -> float:
-        """Return the size of a suspect that nobody need mend, on this car [SI].
-
-        Parameters
-        ----------
-        suspect : of any size.
-        """
+        """Return the size of a suspect that nobody need mend, on this car [SI]."""
         return suspect.least * suspect.scale(self.vehicle)
 
     def real_deviation(self, suspect: Suspect, fit: Fit) -> float:
@@ -139,10 +114,6 @@ class Search:
 
         A real log has each other fault too, as large as its `least`: small delays, scales and
         offsets that nobody looks for shift what is estimated without them, each in its own way.
-
-        Parameters
-        ----------
-        suspect, fit : as in `deviation`.
         """
         left = [one for one in self.suspects if self.keys(one)[0] not in fit.sizes]
         least = {
@@ -367,12 +338,7 @@ class Search:
 
 
 def _beyond(size: float, deviation: float) -> float:
-    """Return how probably a size is more than its deviation: 0 of one that is nothing beside it.
-
-    Parameters
-    ----------
-    size, deviation : of the same unit.
-    """
+    """Return how probably a size is more than its deviation: 0 of one that is nothing beside it."""
     return math.erf(abs(size) / (math.sqrt(2.0) * deviation))
 
 

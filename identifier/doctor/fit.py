@@ -32,7 +32,6 @@ class Fit:
 
     Parameters
     ----------
-    sizes : by key, those of the nuisances with them.
     J : at them; smaller is better, by one for odds of e.
     covariance : of the sizes in the order of their keys (k, k), of white residuals.
     misses : mean square of each part.
@@ -44,12 +43,7 @@ class Fit:
     misses: tuple[float, ...]
 
     def deviation(self, key: str) -> float:
-        """Return the standard deviation of a size.
-
-        Parameters
-        ----------
-        key : of the size.
-        """
+        """Return the standard deviation of a size."""
         place = list(self.sizes).index(key)
         return math.sqrt(max(float(self.covariance[place, place]), 0.0))
 
@@ -65,12 +59,7 @@ class Outlook(NamedTuple):
 
 
 class Fitter:
-    """What is believed of a car's faults, and the balance that judges them.
-
-    Parameters
-    ----------
-    balance : of the drive.
-    """
+    """What is believed of a car's faults, and the balance that judges them."""
 
     def __init__(self, balance: Balance) -> None:
         self.balance = balance
@@ -85,12 +74,7 @@ class Fitter:
         self.usual = balance.residual(self.mean).noise
 
     def misses(self, found: Residual) -> list[float]:
-        """Return S of each part.
-
-        Parameters
-        ----------
-        found : the residual.
-        """
+        """Return S of each part."""
         return [
             max(float(part @ part) / part.size - noise + usual, 0.1 * usual) + floor
             for part, noise, usual, floor in zip(
@@ -99,13 +83,7 @@ class Fitter:
         ]
 
     def cost(self, found: Residual, sizes: Sizes) -> float:
-        """Return J.
-
-        Parameters
-        ----------
-        found : the residual at the sizes.
-        sizes : by key.
-        """
+        """Return J."""
         return self.cost_of(self.misses(found), sizes)
 
     def cost_of(self, misses: Iterable[float], sizes: Sizes) -> float:
@@ -114,7 +92,6 @@ class Fitter:
         Parameters
         ----------
         misses : S of each part.
-        sizes : by key.
         """
         believed = sum(self._away(key, size) ** 2 for key, size in sizes.items())
         logs = sum(n * math.log(S) for n, S in zip(self.counts, misses, strict=True))
@@ -180,13 +157,7 @@ class Fitter:
         return Fit(sizes=sizes, J=J, covariance=covariance, misses=tuple(self.misses(found)))
 
     def best_start(self, sizes: Sizes, key: str) -> tuple[float, Sizes]:
-        """Return J and the sizes with one more, of those in `TRIED` that fits best.
-
-        Parameters
-        ----------
-        sizes : by key.
-        key : of the one.
-        """
+        """Return J and the sizes with one more, of those in `TRIED` that fits best."""
         tried = [{**sizes, key: times * self._sd(key)} for times in TRIED]
         costs = [self.cost(self.balance.residual(one), one) for one in tried]
         best = int(np.argmin(costs))
@@ -196,11 +167,6 @@ class Fitter:
         """Return how far sizes move that are estimated without others that are there, by key.
 
         Each of the others has the size that is told of it, of either sign: squares add.
-
-        Parameters
-        ----------
-        fit : of the sizes that may move.
-        others : sizes that are not among them, by key.
         """
         here, names = list(fit.sizes), [*fit.sizes, *others]
         sizes = {**dict.fromkeys(names, 0.0), **fit.sizes}
@@ -212,13 +178,7 @@ class Fitter:
         return dict(zip(here, np.sqrt(np.sum(shifts**2, axis=1)).tolist(), strict=True))
 
     def outlook(self, fit: Fit, suspects: Mapping[str, list[str]]) -> dict[str, Outlook]:
-        """Return what each suspect promises beside a fit, if all were straight lines.
-
-        Parameters
-        ----------
-        fit : without them.
-        suspects : keys of the sizes of each, by any name.
-        """
+        """Return what each suspect promises beside a fit, if all were straight lines."""
         sizes = dict(fit.sizes)
         here = list(sizes)
         for keys in suspects.values():

@@ -36,28 +36,17 @@ def grown(grows: str, vehicle: Vehicle) -> float:
     Parameters
     ----------
     grows : with what: one of `POWERS`, by powers of the wheelbase.
-    vehicle : the car.
     """
     return float((vehicle.wheelbase / SEDAN) ** POWERS[grows])
 
 
 def usual_inertia(vehicle: Vehicle) -> tuple[float, float]:
-    """Return from what to what I_z/(m l_f l_r) of cars of a size goes.
-
-    Parameters
-    ----------
-    vehicle : the car.
-    """
+    """Return from what to what I_z/(m l_f l_r) of cars of a size goes."""
     return (SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]), INERTIA[1]
 
 
 def similar_inertia(vehicle: Vehicle) -> float:
-    """Return m l_f l_r, the yaw inertia of two points on the axles [kg m^2].
-
-    Parameters
-    ----------
-    vehicle : the car.
-    """
+    """Return m l_f l_r, the yaw inertia of two points on the axles [kg m^2]."""
     return vehicle.mass * vehicle.l_f * vehicle.l_r
 
 
@@ -88,12 +77,7 @@ class Suspect(NamedTuple):
     price: float = 0.0
 
     def scale(self, vehicle: Vehicle) -> float:
-        """Return what `plausible` and `least` are multiplied by for a car.
-
-        Parameters
-        ----------
-        vehicle : the car.
-        """
+        """Return what `plausible` and `least` are multiplied by for a car."""
         return grown(self.grows, vehicle)
 
     @property
@@ -102,22 +86,11 @@ class Suspect(NamedTuple):
         return self.code in ("factor", "yaw_inertia")
 
     def is_late_as(self, other: "Suspect") -> bool:
-        """Return whether both say that the same channel is late, by a delay and by a low pass.
-
-        Parameters
-        ----------
-        other : another suspect.
-        """
+        """Return whether both say that the same channel is late, by a delay and by a low pass."""
         return self.channel == other.channel and {self.code, other.code} == {"delay", "lag"}
 
     def repair(self, size: float, vehicle: Vehicle) -> Repair | None:
-        """Return what takes it out, None for what no repair does.
-
-        Parameters
-        ----------
-        size : as in `Sizes`.
-        vehicle : as it was told.
-        """
+        """Return what takes it out, None for what no repair does."""
         numbers: dict[str, Any] = {self.code: size}
         match self.code:
             case "bank" | "downforce" | "velocity_sensor_z":
@@ -137,11 +110,6 @@ class Suspect(NamedTuple):
         """Return whether the car without the fault is one, be the told one or not.
 
         What no car has was not told wrongly: something else is wrong, or beyond the model.
-
-        Parameters
-        ----------
-        size : as in `Sizes`.
-        vehicle : as it was told.
         """
         match self.code:
             case "center_of_gravity":
@@ -153,13 +121,7 @@ class Suspect(NamedTuple):
         return True
 
     def words(self, size: float, deviation: float, vehicle: Vehicle) -> str:
-        """Return it in words.
-
-        Parameters
-        ----------
-        size, deviation : as in `Sizes`.
-        vehicle : as it was told.
-        """
+        """Return it in words."""
         text = self.text
         if self.is_factor:
             size, deviation = math.exp(size), math.exp(size) * deviation

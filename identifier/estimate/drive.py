@@ -38,7 +38,6 @@ class Drive:
     signals : columns as `motion.model.SIGNALS`, (n, 9).
     rates : d/dt of v_y, r and δ_f, (n, 3).
     counts : samples that count, (n,).
-    every : samples of the recording that make one of these.
     """
 
     t: Array
@@ -62,7 +61,6 @@ class Drive:
 
         Parameters
         ----------
-        part : samples that are read.
         replay : whether each sample is asked about, down to the lowest speed; else those that
             come faster are averaged, and slow ones do not count.
         fastest : sampling interval to which they are averaged [s].

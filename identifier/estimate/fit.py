@@ -46,7 +46,6 @@ def fit(
     Parameters
     ----------
     recordings : logs of the car; a log longer than ten minutes is taken in blocks.
-    vehicle : the car.
     priors : beliefs; None takes those of the car.
     progress : called now and then with the share that is done, 0 to 1.
 

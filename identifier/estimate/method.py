@@ -36,11 +36,6 @@ class FitMethod(Method):
     ----------
     min_speed : below this speed [m/s] forces read zero.
     dt : sampling interval of the log [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     judged_by = "tireid predict on another drive"

@@ -68,14 +68,12 @@ class FittedModel(TireModel):
 
     Parameters
     ----------
-    vehicle : the car.
     p : parameters, as `motion.parameters` lists them (p,).
     covariance : of them (p, p); zero of what was not estimated.
     driven : largest slip of each axle that the drives reached [rad], (2,).
     speeds : least and largest speed of them [m/s], (2,).
     a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
     missed : share of the force by which drives of a car differ from one model, (2,).
-    segments : of the drives, on a road of another friction than that of the curves.
     force_missed : share of the measured force that it misses of the drives that taught, (2,); None
         where nobody looked.
     """
@@ -172,7 +170,6 @@ class FittedModel(TireModel):
 
         Parameters
         ----------
-        alpha, axle, v_x : as of `TireModel.force`.
         a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
             shift load between the axles. None is of tires that push nothing lengthwise, as those
             of a car that coasts.
@@ -605,13 +602,7 @@ class FittedModel(TireModel):
         return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
-
-        Raises
-        ------
-        ValueError
-            Where the ratio is not positive.
-        """
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
@@ -626,11 +617,6 @@ class FittedModel(TireModel):
         Parameters
         ----------
         sd_friction : standard deviation of ln μ between the roads [-].
-
-        Raises
-        ------
-        ValueError
-            Where it is negative or not finite.
         """
         if not 0.0 <= sd_friction < math.inf:
             raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
@@ -756,13 +742,7 @@ class FittedModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "FittedModel":
-        """Return the model that `to_dict` describes.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
-        """
+        """Return the model that `to_dict` describes."""
         table = Table(data, f"{source}: ", FrozenModelError)
         parameters = table.table("parameters")
         p = np.array([parameters.table(name).number("value") for name in NAMES])

@@ -16,7 +16,6 @@ class Posterior:
 
     Parameters
     ----------
-    vehicle : the car.
     p : all parameters, as `motion.parameters` lists them (p,).
     covariance : of them, zero of those that did not move (p, p).
     index : which of them moved, (n,).
@@ -26,7 +25,6 @@ class Posterior:
     scale : S of the residuals of both axles [-], (2,).
     memory : T, their integrated autocorrelation time [s], (2,).
     cost : J at the optimum [nats].
-    iterations : of Gauss-Newton.
     """
 
     vehicle: Vehicle

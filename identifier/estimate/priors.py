@@ -93,7 +93,6 @@ class Priors:
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
-    typed : parameters whose belief is a Student one, of the same curvature at its mean.
     """
 
     mean: Array
@@ -118,7 +117,6 @@ class Priors:
         ----------
         wide : standard deviations in SI in place of those of the table, by parameter.
         apart : whether bias and angle of v_y are believed apart, without `SHARED_ERROR`.
-        fixed : parameters that do not move.
         """
         L = vehicle.wheelbase
         unit = {"": 1.0, "L": L, "v": float(np.sqrt(L / SEDAN))}

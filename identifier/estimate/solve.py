@@ -47,9 +47,6 @@ class Problem:
 
     Parameters
     ----------
-    drives : of one car, with the same sensors.
-    vehicle : the car.
-    priors : which parameters move.
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     """
 
@@ -88,13 +85,7 @@ class Problem:
         return found
 
     def missed(self, p: Array, road: float) -> Array:
-        """Return what the balance misses over its size where the friction is another, (m, 2).
-
-        Parameters
-        ----------
-        p : parameters.
-        road : ln of the friction over that of the curves.
-        """
+        """Return what the balance misses over its size where the friction is another, (m, 2)."""
         scan = motion_scan()
         e = []
         for k, one in enumerate(self.drives):
@@ -225,7 +216,6 @@ def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
 
     Parameters
     ----------
-    p : as `motion.parameters` lists them (p,).
     car : of `car_numbers`, (6,).
     """
     more = {}
@@ -244,12 +234,7 @@ def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
 
 
 def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
-    """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port.
-
-    Parameters
-    ----------
-    p : as `motion.parameters` lists them (p,).
-    """
+    """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port."""
     scan = motion_scan()
     return scan(
         len(one.signals),
@@ -271,7 +256,6 @@ def estimate(
 
     Parameters
     ----------
-    drives : of one car with the same sensors, in which it drives.
     vehicle : the car; its stiffnesses are not looked at.
     priors : beliefs; None takes those of the car.
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights

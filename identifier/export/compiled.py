@@ -58,7 +58,6 @@ class CompiledPackage:
     Parameters
     ----------
     manifest : content of <name>.json.
-    files : headers and sources by path.
     single : whether to compute in float; None takes the package's default.
 
     Raises
@@ -196,10 +195,6 @@ class CompiledPackage:
 
         Between stretches of it samples are missing, as they are on a car.
 
-        Parameters
-        ----------
-        recording : sampled at the package's interval.
-
         Raises
         ------
         ValueError
@@ -298,13 +293,7 @@ EVERY_STEP = tuple(port.name for port in INPUTS)  # has these inputs
 
 
 def samples_of(recording: Recording, inputs: Iterable[str] = EVERY_STEP) -> Array:
-    """Return a recording as samples (n, k) in the order of the inputs; NaN where it lacks one.
-
-    Parameters
-    ----------
-    recording : n samples.
-    inputs : names of the inputs.
-    """
+    """Return a recording as samples (n, k) in the order of the inputs; NaN where it lacks one."""
     absent, logged = np.full(len(recording), np.nan), recording.as_logged()
     signals = (getattr(logged, name) for name in inputs)
     return np.column_stack([absent if signal is None else signal for signal in signals])

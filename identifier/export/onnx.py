@@ -78,7 +78,6 @@ class Graph:
 
         Parameters
         ----------
-        name : name of the constant.
         value : its numbers (of any shape).
         """
         number = np.float32 if self.single else np.float64
@@ -92,9 +91,6 @@ class Graph:
         Parameters
         ----------
         operator : of ONNX, such as "MatMul".
-        inputs : names of its inputs.
-        result : name of its result.
-        attributes : of the operator.
         """
         node = onnx_package().helper.make_node(
             operator, list(inputs), [result], name=result, **attributes
@@ -114,11 +110,7 @@ class Graph:
 
         Parameters
         ----------
-        name : name of the graph.
-        inputs : what it reads.
         outputs : what it gives; results of nodes have their names.
-        doc : what it computes, for people.
-        metadata : facts for programs.
         """
         onnx = onnx_package()
         helper = onnx.helper
@@ -270,13 +262,7 @@ def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | No
 
 
 class _Nodes:
-    """Nodes of half the width of the band of an axle.
-
-    Parameters
-    ----------
-    graph : that they are added to.
-    port : of the result.
-    """
+    """Nodes of half the width of the band of an axle."""
 
     def __init__(self, graph: Graph, port: str) -> None:
         self._graph, self._port = graph, port
@@ -425,9 +411,7 @@ def export_onnx(
 
     Parameters
     ----------
-    model : see `onnx_bytes`.
     single : whether numbers are float32; else they are float64.
-    with_band : see `onnx_bytes`.
 
     Raises
     ------

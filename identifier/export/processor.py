@@ -109,8 +109,6 @@ def replay_on(
     Parameters
     ----------
     processor : one of `PROCESSORS`.
-    name : of the package.
-    files : its texts by path.
     samples : (n, k) in the order of the inputs, SI.
     single : whether to compute in float.
     corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
@@ -158,11 +156,8 @@ def replay_here(
 
     Parameters
     ----------
-    name : of the package.
-    files : its texts by path.
     samples : (n, k) in the order of the inputs, SI.
     single : whether to compute in float.
-    flags : of the compiler.
 
     Raises
     ------
@@ -192,10 +187,7 @@ def size_on(
     Parameters
     ----------
     processor : one of `PROCESSORS`.
-    name : of the package.
-    files : its texts by path.
     single : whether to compute in float.
-    level : of optimization.
 
     Raises
     ------
@@ -220,12 +212,7 @@ def size_on(
 
 @cache
 def compiler_version(command: str) -> str:
-    """Return the first line of what a compiler says about itself.
-
-    Parameters
-    ----------
-    command : of the compiler.
-    """
+    """Return the first line of what a compiler says about itself."""
     answer = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
     return answer.stdout.splitlines()[0]
 
@@ -264,11 +251,6 @@ def _build(
 def compile_in(folder: Path, command: Sequence[str]) -> None:
     """Compile files of a package.
 
-    Parameters
-    ----------
-    folder : where they lie.
-    command : of the compiler.
-
     Raises
     ------
     CompilationError
@@ -286,12 +268,6 @@ def _result(command: Sequence[str], folder: Path) -> Replay:
 
 def printed(command: Sequence[str], folder: Path, wanted: Sequence[str]) -> dict[str, Any]:
     """Run a replay; return its hash and the numbers that it prints by name.
-
-    Parameters
-    ----------
-    command : of the program.
-    folder : where it lies.
-    wanted : names of what it prints, the hash among them.
 
     Raises
     ------

@@ -32,12 +32,7 @@ class Body(NamedTuple):
 
     @classmethod
     def of_chassis(cls, vehicle: Vehicle) -> Self | None:
-        """Return the body of a car as its chassis tells it; None where it tells none.
-
-        Parameters
-        ----------
-        vehicle : with or without chassis.
-        """
+        """Return the body of a car as its chassis tells it; None where it tells none."""
         if vehicle.chassis is None:
             return None
         leans = vehicle.weight * vehicle.roll_arm  # N m per g, and per rad of roll
@@ -51,7 +46,6 @@ class Body(NamedTuple):
 
         Parameters
         ----------
-        rolls : before.
         level : acceleration in the plane of the road [m/s²].
         dt : sampling interval [s].
         """
@@ -75,11 +69,6 @@ class Beliefs:
     steering : of the zero of the front steering [rad].
     gyro : bias of the yaw rate, in a car with a wheelbase of 2.7 m [rad/s].
     inertia : of 1/I_z [-].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     bias: float = 0.015
@@ -141,11 +130,6 @@ class Trust:
     step, step_time : change of ln μ that may happen in that time then [-], [s].
     surge : largest acceleration [m/s²].
     observable : largest standard deviation of side slip that is told for observed [rad].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     v_y: float = 0.017

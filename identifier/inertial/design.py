@@ -76,11 +76,6 @@ class InertialIdentifier(Method):
 
     Parameters
     ----------
-    prior : of curves and compliance, as of the axle identifier.
-    plausibility : which samples are believed, and the lowest speeds.
-    bounds : limits of curves and compliance.
-    beliefs : of sensors and inertia before the first sample.
-    trust : how far motion, road and sensors are trusted.
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
     reads_v_y : whether a measured v_y is looked at, where there is one.
@@ -164,12 +159,7 @@ class InertialIdentifier(Method):
         return "" if self.reads_v_y else "without v_y, which it tells"
 
     def resumes(self, model: TireModel) -> bool:
-        """Return whether a run can begin with a stored model.
-
-        Parameters
-        ----------
-        model : its weights.
-        """
+        """Return whether a run can begin with a stored model."""
         return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
 
     def possible_tires(self) -> HalfSpaces:
@@ -187,13 +177,7 @@ class InertialIdentifier(Method):
         return PORTS
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: the boxes of what is learnt hold after every sample.
-
-        Parameters
-        ----------
-        vehicle : not looked at: the boxes are in static axle loads.
-        driving : not looked at: the boxes hold whatever is measured.
-        """
+        """Return what is proven of it: the boxes of what is learnt hold after every sample."""
         del vehicle, driving
         b = self.bounds
         return Certificate(
@@ -216,7 +200,6 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -282,12 +265,7 @@ class InertialIdentifier(Method):
         )
 
     def believed_body(self, vehicle: Vehicle) -> Body:
-        """Return how the body rolls: as a chassis tells it, or else as is believed of any.
-
-        Parameters
-        ----------
-        vehicle : with or without chassis.
-        """
+        """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
         frequency = self.roll_frequency / vehicle.froude_time
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
@@ -350,7 +328,6 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : not looked at: the bounds are in static axle loads.
         state : W (2, n), own (2,) and sensors (5,).
         """
         del vehicle

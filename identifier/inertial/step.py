@@ -162,7 +162,6 @@ class Noise(NamedTuple):
 
         Parameters
         ----------
-        h, innovation, R : as of `Reading`, of r and a_y.
         lateral : of v_y, None where there is none.
         """
         of_r, of_a_y = zip(innovation, R, [self.counts] * 2, strict=True)
@@ -441,12 +440,7 @@ def _corrected(
 
 
 def heard_size(delay: int | None) -> int:
-    """Return how many numbers are carried of a measured v_y.
-
-    Parameters
-    ----------
-    delay : as of `build_step`.
-    """
+    """Return how many numbers are carried of a measured v_y."""
     return FIRST_CHANGE + max((delay or 0) - 1, 0)
 
 

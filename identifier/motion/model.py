@@ -75,7 +75,6 @@ class Stage:
 
     Parameters
     ----------
-    inputs : symbols, of names that no other symbol of the outputs has.
     outputs : expressions of them, and of symbols without slopes.
     """
 

@@ -339,7 +339,6 @@ def design_for(
     input_source : "measured" or "estimated".
     integrator : "euler" or "rk4".
     dt : sampling interval [s].
-    seed : seed of the initial weights.
 
     Raises
     ------

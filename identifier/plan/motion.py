@@ -65,7 +65,6 @@ def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
 
     Parameters
     ----------
-    tires : k pairs of axles.
     v_x : speed [m/s].
     """
     car, omega = tires.vehicle, HOLD / tires.vehicle.froude_time
@@ -124,11 +123,8 @@ def simulate(
 
     Parameters
     ----------
-    tires : k pairs of axles.
     planned : angles asked of the front wheels at steps of `time_step` [rad], (n, m).
     v_x : speed [m/s].
-    entry : of each steering.
-    hold : how the course of the first car is held.
     guide : what is planned follows it; None plans the angles as they are.
     """
     car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)

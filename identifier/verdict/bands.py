@@ -48,12 +48,6 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
 
     White noise of the sensors is added to the band. None where the model has none, or too little
     is driven.
-
-    Parameters
-    ----------
-    model : that is asked.
-    recording : the drive.
-    level : of the band.
     """
     recording = portion(recording).recording
     half = model.half_band_of_curves(recording, level)
@@ -92,7 +86,6 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
 
     Parameters
     ----------
-    history : the run.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -151,9 +144,7 @@ def calibration(
 
     Parameters
     ----------
-    missed : the errors.
     noise : variance of the sensors' white noise in them (2,).
-    windows : where they are.
     told : what else is kept of the drive, and factors of an axle that has too few windows.
     """
     factors, speeds = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
@@ -214,7 +205,6 @@ def color_of(error: Array, windows: Windows) -> float:
     Parameters
     ----------
     error : of the windows, nan where nothing was asked (m,).
-    windows : where they are.
     """
     step = max(1, windows.n // 2)
     place = np.round(windows.starts / step).astype(np.intp)

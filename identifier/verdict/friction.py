@@ -119,8 +119,6 @@ def road_friction(
 
     Parameters
     ----------
-    model : frozen, of another drive.
-    recording : the drive.
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """

@@ -88,7 +88,6 @@ def judge(history: History, t: float | None = None) -> Verdict:
 
     Parameters
     ----------
-    history : the run.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -116,8 +115,6 @@ def judge_prediction(
 
     Parameters
     ----------
-    model : that learns nothing from it.
-    recording : the drive.
     another_road : whether the road may be another one than that which taught, and its friction is
         reported; of a drive that taught the model it is not.
     """

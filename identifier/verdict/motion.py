@@ -64,9 +64,7 @@ class Windows:
         Parameters
         ----------
         counts : which samples do (n,).
-        recording : whose windows they are.
         length : of a window [s].
-        overlapping : windows that begin within a length.
         """
         n = max(2, round(length / recording.dt))
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
@@ -110,8 +108,6 @@ def measured_force(
     Parameters
     ----------
     recording : v_x, v_y and r; where no v_y was logged, a_y and r.
-    vehicle : mass, inertia and geometry.
-    windows : of the recording.
     road : what a banked road pushes to the left at each sample, taken off [weights], (n,); without
         v_y what the accelerometer shows beside forces; None where nobody knows of it.
     """
@@ -123,12 +119,7 @@ def measured_force(
 def impulse_signals(
     recording: Recording, vehicle: Vehicle, road: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return ξ (n, 2) [s] and v_x r/g without the road (n,): φ cos δ = dξ/dt + v_x r/g.
-
-    Parameters
-    ----------
-    recording, vehicle, road : as of `measured_force`.
-    """
+    """Return ξ (n, 2) [s] and v_x r/g without the road (n,): φ cos δ = dξ/dt + v_x r/g."""
     car = Car(*car_numbers(vehicle).T)
     v_y = recording.logged_v_y
     still = np.zeros(len(recording)) if v_y is None else v_y
@@ -138,27 +129,13 @@ def impulse_signals(
 
 
 def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:
-    """Return mean axle forces of a model over the same windows [static axle loads], (m, 2).
-
-    Parameters
-    ----------
-    model : frozen.
-    recording : its signals are the input.
-    windows : of the recording.
-    """
+    """Return mean axle forces of a model over the same windows [static axle loads], (m, 2)."""
     loads = np.array(model.vehicle.axle_loads)
     return windows.mean(model.axle_force(recording) / loads)
 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
-    """Return the variance that white noise of v_y and r leaves in `measured_force`, (2,).
-
-    Parameters
-    ----------
-    recording : with the noise.
-    vehicle : mass, inertia and geometry.
-    windows : of the recording.
-    """
+    """Return the variance that white noise of v_y and r leaves in `measured_force`, (2,)."""
     inertia = car_numbers(vehicle)[:, 2]
     v_y, turning = recording.logged_v_y, (inertia * white_noise(recording.r)) ** 2
     if v_y is None:
@@ -171,13 +148,7 @@ def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> 
 
 
 def lateral_noise(recording: Recording, windows: Windows) -> tuple[float, float]:
-    """Return the variance that white noise leaves in means of v̇_y + v_x r, and of a_y [m²/s⁴].
-
-    Parameters
-    ----------
-    recording : with v_y and a_y.
-    windows : of the recording.
-    """
+    """Return the variance that white noise leaves in means of v̇_y + v_x r, and of a_y [m²/s⁴]."""
     v_y, a_y = (white_noise(recording.needed(name)) for name in ("v_y", "a_y"))
     turning = float(np.mean(recording.v_x**2)) * white_noise(recording.r) ** 2 / windows.n
     return 2.0 * (v_y / windows.duration) ** 2 + turning, a_y**2 / windows.n
@@ -189,7 +160,6 @@ class Evidence:
 
     Parameters
     ----------
-    windows : where.
     measured, modelled : [static axle loads], (m, 2).
     noise : variance of white sensor noise in `measured` (2,).
     """
@@ -242,11 +212,8 @@ class Evidence:
         return self, None
 
     def worst_stretch(self, share: float) -> tuple[int, int]:
-        """Return the stretch of a share of the windows in which most is missed: first, past last.
-
-        Parameters
-        ----------
-        share : of the windows.
+        """Return the stretch of a share of the windows in which most is missed: first, past
+        last.
         """
         n = max(1, int(share * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
@@ -282,14 +249,7 @@ def clean_share(missed: Array, force: Array, noise: Array) -> Array:
 
 
 def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
-    """Return what a model explains of a drive; None where too little of it is driven.
-
-    Parameters
-    ----------
-    model : frozen.
-    recording : the drive.
-    road : as in `measured_force`.
-    """
+    """Return what a model explains of a drive; None where too little of it is driven."""
     vehicle = model.vehicle
     windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
     if len(windows) < FEWEST:

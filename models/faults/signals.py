@@ -35,12 +35,7 @@ class Fault(Protocol):
     """What is asked of a fault of a recording."""
 
     def apply(self, recording: Recording) -> Recording:
-        """Return what the log of the same drive holds with the fault.
-
-        Parameters
-        ----------
-        recording : the drive without it.
-        """
+        """Return what the log of the same drive holds with the fault."""
 
 
 def require_finite(fault: Any) -> None:
@@ -81,7 +76,6 @@ class SensorFault:
 
     Parameters
     ----------
-    channel : name of the signal.
     kind : one of `KINDS`: holds its value; shows 0; shows no number (NaN); has the other sign; is
         multiplied by the size; is off by the size; runs away by the size each second; has white
         noise of the size; shows the size beside the truth for one sample in `SPIKE_EVERY`.
@@ -137,8 +131,6 @@ class SensorFault:
         ----------
         t : time [s], a number or (n,).
         value : what a good sensor would show, like t.
-        stuck_at : what it showed when the fault began.
-        noise : standard normal numbers, like t.
         """
         since = t - self.start
         match self.kind:
@@ -188,7 +180,6 @@ class WrongUnit:
 
     Parameters
     ----------
-    channel : name of the signal.
     unit : one of `UNITS`.
 
     Raises
@@ -346,7 +337,6 @@ class Jitter:
     ----------
     size : longest time that a sample is old [s]; uniform from zero.
     channels : concerned; empty for all, which then are late together.
-    seed : of the times.
 
     Raises
     ------
@@ -399,10 +389,6 @@ class ClockJump:
 
     def apply(self, recording: Recording) -> Recording:
         """Return the recording with the jump; it ends where the drive does, forces jump with it.
-
-        Parameters
-        ----------
-        recording : the drive without it.
 
         Raises
         ------

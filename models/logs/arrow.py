@@ -35,12 +35,7 @@ def is_installed() -> bool:
 
 
 def is_used(path: Path) -> bool:
-    """Whether pyarrow is imported already, or a text is long enough to import it.
-
-    Parameters
-    ----------
-    path : of the file.
-    """
+    """Whether pyarrow is imported already, or a text is long enough to import it."""
     return "pyarrow" in sys.modules or path.stat().st_size > WORTH
 
 
@@ -62,7 +57,6 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
     Parameters
     ----------
     block : whole lines in UTF-8.
-    layout : of the table.
     wanted : column from 0 -> how its cells are read.
     """
     import pyarrow
@@ -151,7 +145,6 @@ def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
     Parameters
     ----------
     cells : array of pyarrow, (n,).
-    missing : stands where one is missing.
 
     Raises
     ------

@@ -107,10 +107,6 @@ _Place = tuple[_Topic, Field]  # where a channel is
 def open_(path: Path) -> GroupedLog[_Place]:
     """List the channels of a bag.
 
-    Parameters
-    ----------
-    path : of the file or folder.
-
     Raises
     ------
     RecordingError
@@ -300,15 +296,7 @@ def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, by
 
 
 class _Reading:
-    """Numbers of a topic as its messages come, some of them at a time.
-
-    Parameters
-    ----------
-    path : of the bag.
-    definitions : by name of a type.
-    topic : that is read.
-    fields : of its messages that are kept, by the names of their channels.
-    """
+    """Numbers of a topic as its messages come, some of them at a time."""
 
     def __init__(
         self, path: Path, definitions: Definitions, topic: _Topic, fields: Mapping[str, Field]

@@ -25,10 +25,6 @@ DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 def bounded(path: Path) -> Iterator[None]:
     """Let rosbags read with limits.
 
-    Parameters
-    ----------
-    path : of the bag.
-
     Raises
     ------
     RecordingError

@@ -32,13 +32,6 @@ LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 def need(path: Path, module: str, format: str, extra: str) -> Any:
     """Import what reads a format.
 
-    Parameters
-    ----------
-    path : of the file, for the message.
-    module : to import.
-    format : as users call it.
-    extra : of tireid that installs it.
-
     Raises
     ------
     RecordingError
@@ -59,16 +52,6 @@ def one_line(path: Path, format: str) -> Iterator[None]:
 
     What is no fault of the file is not told of it: a full disk is said to be full, and MemoryError
     stays what it is.
-
-    Parameters
-    ----------
-    path : of the file.
-    format : that it is read as, with its article.
-
-    Raises
-    ------
-    RecordingError
-        One line: file, format and what the library says.
     """
     with _quiet():
         try:

@@ -24,10 +24,6 @@ LONGEST_TEXT, MOST_TEXTS = 1_000_000, 10_000  # bytes of all texts of a dataset,
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for.
 
-    Parameters
-    ----------
-    path : of the file.
-
     Raises
     ------
     RecordingError

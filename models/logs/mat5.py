@@ -70,10 +70,6 @@ class _Beginning(NamedTuple):
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for.
 
-    Parameters
-    ----------
-    path : of the file.
-
     Raises
     ------
     RecordingError

@@ -35,10 +35,6 @@ class _Time(NamedTuple):
 def open_(path: Path) -> GroupedLog[Signal]:
     """List the channels of a file.
 
-    Parameters
-    ----------
-    path : of the file.
-
     Raises
     ------
     RecordingError

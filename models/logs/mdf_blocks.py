@@ -21,12 +21,7 @@ BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 
 
 def is_bus(group: Any) -> bool:
-    """Whether a group of channels of an MDF4 file holds frames of a bus.
-
-    Parameters
-    ----------
-    group : as asammdf gives it.
-    """
+    """Whether a group of channels of an MDF4 file holds frames of a bus."""
     return bool(int(group.channel_group.flags) & BUS_EVENT)
 
 
@@ -48,7 +43,6 @@ def opened(path: Path, format: str) -> Iterator[Any]:
 
     Parameters
     ----------
-    path : of the file.
     format : that it is read as, for the message where the library is missing.
 
     Raises

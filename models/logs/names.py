@@ -272,11 +272,9 @@ class Guess:
 
     Parameters
     ----------
-    channel : names in the file.
     confidence : from 0 to 1.
     hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
-    why : in a few words.
     """
 
     channel: tuple[str, ...]
@@ -292,7 +290,6 @@ class Proposal:
 
     Parameters
     ----------
-    guesses : by signal, the best one.
     rivals : by signal, all that are as good as the best, it included, where there are several.
     """
 
@@ -300,12 +297,7 @@ class Proposal:
     rivals: Mapping[str, tuple[Guess, ...]] = field(default_factory=dict)
 
     def is_sure(self, name: str) -> bool:
-        """Whether a signal is found beyond doubt; an angle of the hand wheel wants its ratio.
-
-        Parameters
-        ----------
-        name : of the signal.
-        """
+        """Whether a signal is found beyond doubt; an angle of the hand wheel wants its ratio."""
         guess = self.guesses.get(name)
         return (
             guess is not None
@@ -339,12 +331,7 @@ class Proposal:
 
 
 def words_of(name: str) -> tuple[str, ...]:
-    """Return a name as small words: "Car.YawRate" is car, yaw, rate.
-
-    Parameters
-    ----------
-    name : as in the file.
-    """
+    """Return a name as small words: "Car.YawRate" is car, yaw, rate."""
     plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
@@ -379,7 +366,6 @@ def name_confidence(signal: str, name: str) -> float:
     Parameters
     ----------
     signal : one of `RULES`, or a wheel.
-    name : of the channel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
@@ -420,7 +406,6 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     Parameters
     ----------
     log : as a format reads it; numbers are read of the channels that are in question.
-    headings : of its channels.
     run : which of its runs is looked at; None the only one, or the first.
     """
     candidates = {name: _candidates(name, headings) for name in QUANTITIES}

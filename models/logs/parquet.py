@@ -25,10 +25,6 @@ BATCH = 1 << 16  # rows that are read at once
 def open_parquet(path: Path) -> TableLog:
     """Return the log in a Parquet file.
 
-    Parameters
-    ----------
-    path : of a file.
-
     Raises
     ------
     RecordingError
@@ -57,9 +53,7 @@ class ParquetTable:
 
     Parameters
     ----------
-    path : the file.
     schema : of its columns, as pyarrow gives it.
-    rows : how many it says to have.
     """
 
     path: Path

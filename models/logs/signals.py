@@ -66,24 +66,13 @@ LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
 def told_by(signals: Iterable[str]) -> set[str]:
-    """Return what signals tell, by name; beta tells v_y, wheels tell v_x.
-
-    Parameters
-    ----------
-    signals : our names.
-    """
+    """Return what signals tell, by name; beta tells v_y, wheels tell v_x."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
     return {stands_for.get(name, name) for name in signals}
 
 
 def quantity_of(name: str, unit: str) -> str:
-    """Return what a signal is; of wheels a speed or a rate, as the unit has it.
-
-    Parameters
-    ----------
-    name : of the signal, ours.
-    unit : as written.
-    """
+    """Return what a signal is; of wheels a speed or a rate, as the unit has it."""
     turns = [one for one in quantities(unit) if one in (RATE, TURNS)]
     return turns[0] if name in WHEELS and turns else QUANTITIES[name]
 
@@ -159,7 +148,6 @@ class Signal:
         Parameters
         ----------
         parts : each channel in SI, on one clock (n,).
-        quantity : what the signal is.
         """
         plain = Signal(channel=self.channel[:1], unit=self.unit)
         if len(parts) == 1 and self == plain:
@@ -193,11 +181,6 @@ class Signal:
 
 def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
     """Refuse signals that are no signals of ours, or that contradict one another.
-
-    Parameters
-    ----------
-    signals : by our name.
-    where : begins the message.
 
     Raises
     ------

@@ -37,22 +37,12 @@ _LENKRAD = re.compile("(?i:lenk_?rad)$")  # German for a wheel: no angle in rad
 
 
 def is_unit(word: str) -> bool:
-    """Return whether a word is a unit, or stands where one would.
-
-    Parameters
-    ----------
-    word : a cell, in brackets or not.
-    """
+    """Return whether a word is a unit, or stands where one would."""
     return is_known(word) or word.strip("[](){} ").lower() in _OTHERS
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Return whether cells are a row of units: all in brackets, or all known, and not all "1".
-
-    Parameters
-    ----------
-    cells : of a line.
-    """
+    """Return whether cells are a row of units: all in brackets, or all known, and not all "1"."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     if not filled:
         return False
@@ -66,12 +56,7 @@ def is_units_row(cells: Sequence[str]) -> bool:
 
 
 def unit_in_name(name: str) -> str:
-    """Return the unit that a name holds, as in "Speed [km/h]", "Speed:km/h" or "Speed_kmh".
-
-    Parameters
-    ----------
-    name : of a column, as in the file.
-    """
+    """Return the unit that a name holds, as in "Speed [km/h]", "Speed:km/h" or "Speed_kmh"."""
     return _split(name)[1]
 
 
@@ -102,12 +87,7 @@ _UNIT_BEHIND = re.compile(r"\s*[\[(][^\[\]()]*[\])]$")
 
 
 def without_unit(name: str) -> str:
-    """Return a name without the unit in brackets that it ends in: "Speed" of "Speed [km/h]".
-
-    Parameters
-    ----------
-    name : of a column, as in the file.
-    """
+    """Return a name without the unit in brackets that it ends in: "Speed" of "Speed [km/h]"."""
     return _UNIT_BEHIND.sub("", name)
 
 

@@ -49,7 +49,6 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
     Parameters
     ----------
     signal : one of `WHEELS`.
-    words : of the name, in small letters.
     """
     listed = frozenset(words)
     if listed & OTHERS:

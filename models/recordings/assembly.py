@@ -73,16 +73,9 @@ def recording_of(
 
     Parameters
     ----------
-    log : as a format reads it.
     name : of the recording, without its run.
-    log_map : how it is read.
     run : name of the run; None where the map names it, or there is only one.
     dt : sample time T_s of the result [s].
-
-    Raises
-    ------
-    RecordingError
-        One line: file and run, column, rule, value, remedy.
     """
     if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):
         raise RecordingError(f"{log.path}: the sample time dt must be positive, it is {dt!r}")
@@ -199,7 +192,6 @@ def scaled(values: Array, factor: float) -> Array:
     Parameters
     ----------
     values : (n,).
-    factor : of all of them.
     """
     if factor == 1.0:
         return values
@@ -392,10 +384,7 @@ def wheel_scales(
 
     Parameters
     ----------
-    log : as a format reads it.
     signals : v_x, wheels, and r where it is there; others are not looked at.
-    log_map : how the log is read.
-    run : of the log.
 
     Raises
     ------
@@ -420,13 +409,7 @@ def _scale_note(
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
-    """Return the units of wheels, told or else of the file, by signal.
-
-    Parameters
-    ----------
-    headings : of the log's channels.
-    signals : how each is read.
-    """
+    """Return the units of wheels, told or else of the file, by signal."""
     units = {one.name: one.unit for one in headings}
     return {
         name: one.unit if is_told(one.unit) else units[one.channel[0]]

@@ -288,10 +288,6 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
     star, an offset in SI behind a minus, a ratio of the steering behind a slash. Of several
     channels, with blanks about each plus, the mean is taken, of forces the sum.
 
-    Parameters
-    ----------
-    pairs : one word for each signal.
-
     Raises
     ------
     RecordingError

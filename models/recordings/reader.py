@@ -118,12 +118,7 @@ def read_repaired(
 
 
 def repair_text(repair: Repair) -> str:
-    """Return a repair as words: each number with its name.
-
-    Parameters
-    ----------
-    repair : of a log.
-    """
+    """Return a repair as words: each number with its name."""
     words = []
     for name, value in repair.tables().items():
         inner = value if isinstance(value, dict) else {"": value}
@@ -144,13 +139,7 @@ def map_of(told: Told) -> LogMap:
 
 
 def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
-    """Return a map with columns that are told beside it; "t" is the time.
-
-    Parameters
-    ----------
-    told : the map.
-    columns : as of `read_recording`.
-    """
+    """Return a map with columns that are told beside it; "t" is the time."""
     if not isinstance(columns, Mapping):
         raise RecordingError(
             f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
@@ -179,12 +168,7 @@ def _without_faults(recording: Recording, repair: Repair) -> Recording:
 
 
 def runs(path: str | Path) -> list[str]:
-    """List the runs of a log in their order; empty when it has none apart.
-
-    Parameters
-    ----------
-    path : a log of any format.
-    """
+    """List the runs of a log in their order; empty when it has none apart."""
     return list(open_log(path).runs())
 
 

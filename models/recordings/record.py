@@ -524,11 +524,6 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     shorter gap a reader draws a line, unless its map tells a shorter `longest_gap`, and shorter
     stretches it leaves out. The file appears whole or not at all; an existing one is replaced.
 
-    Parameters
-    ----------
-    recording : what to write.
-    path : a name that ends in .csv or .csv.gz.
-
     Returns
     -------
     Path

@@ -78,7 +78,6 @@ def scale_friction(parameters: Any, tire: dict[str, float], scale: float) -> Non
 
     Parameters
     ----------
-    parameters : theirs, changed in place.
     tire : the coefficients at scale 1.
     scale : friction over the tire's own [-].
     """

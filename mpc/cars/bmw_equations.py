@@ -30,7 +30,6 @@ class Equations(Protocol):
         Parameters
         ----------
         core : X, Y, steering, speed, heading, yaw rate, side slip.
-        parameters : theirs.
         """
 
     def derivative(self, x: Array, rate: float, demand: float, parameters: Any) -> Array:
@@ -41,7 +40,6 @@ class Equations(Protocol):
         x : their state (n,).
         rate : of the steering [rad/s].
         demand : acceleration asked for [m/s^2].
-        parameters : theirs.
         """
 
     def car_state(self, t: float, x: Array, x_dot: Array, inner: Any, parameters: Any) -> CarState:
@@ -51,8 +49,6 @@ class Equations(Protocol):
         ----------
         t : time [s].
         x, x_dot : their state and its derivative, (n,).
-        inner : what the car reads when it goes on.
-        parameters : theirs.
         """
 
 
@@ -84,9 +80,7 @@ class SlipAtTheAxles:
 
     Parameters
     ----------
-    tires : their tire functions.
     x : their state (29,).
-    parameters : theirs, with the axle distances a and b.
     """
 
     def __init__(self, tires: Any, x: Array, parameters: Any) -> None:
@@ -118,18 +112,12 @@ def with_tires(dynamics: Callable[..., Any], tires: object) -> Callable[..., Any
     Parameters
     ----------
     dynamics : their function, which calls its tires `tireModel`; it stays as it is.
-    tires : what has their tire functions.
     """
     return FunctionType(dynamics.__code__, {**dynamics.__globals__, "tireModel": tires})
 
 
 class MultiBody:
     """Their equations, and what their state says.
-
-    Parameters
-    ----------
-    vehicle : the same car for us.
-    repaired : let the tires slip at the axles.
 
     Raises
     ------
@@ -170,7 +158,6 @@ class MultiBody:
         Parameters
         ----------
         values : their state, or its derivative, (29,).
-        parameters : theirs.
         """
         p = parameters
         parts = p.m_s * values[V_Y] + p.m_uf * values[V_Y_FRONT] + p.m_ur * values[V_Y_REAR]
@@ -208,10 +195,6 @@ class MultiBody:
 
 class Drift:
     """Their equations, and what their state says.
-
-    Parameters
-    ----------
-    vehicle : the same car for us.
 
     Raises
     ------

@@ -37,10 +37,6 @@ class NoHandoverError(TireidError, ValueError):
 def frozen_start(package: Package) -> TireModel:
     """Return the model that an exported identifier begins with.
 
-    Parameters
-    ----------
-    package : of the identifier.
-
     Raises
     ------
     NoHandoverError
@@ -159,7 +155,6 @@ def build_pair(
     Parameters
     ----------
     identifier : package of the identifier; its weights are the tire that is begun with.
-    problem : of the tracker.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.
     caution : of the tracker, from 0 to 1; a number of the parameters.

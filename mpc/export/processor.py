@@ -56,9 +56,7 @@ def replay_on_processor(package: MpcPackage, *, single: bool, steps: int = STEPS
 
     Parameters
     ----------
-    package : of the tracker.
     single : whether to compute in float.
-    steps : how many vectors.
 
     Raises
     ------
@@ -85,10 +83,7 @@ def replay_here(
 
     Parameters
     ----------
-    package : of the tracker.
     single : whether to compute in float.
-    steps : how many vectors.
-    flags : of the compiler.
 
     Raises
     ------
@@ -152,12 +147,7 @@ class Times(NamedTuple):
 
 
 def measure_mpc(package: MpcPackage) -> list[MpcCost]:
-    """Return what a package costs on a Cortex-M7, float and double; empty without the tools.
-
-    Parameters
-    ----------
-    package : of the tracker.
-    """
+    """Return what a package costs on a Cortex-M7, float and double; empty without the tools."""
     if missing_tools():
         return []
     compiler, costs = compiler_version(CROSS_COMPILER), []
@@ -170,12 +160,7 @@ def measure_mpc(package: MpcPackage) -> list[MpcCost]:
 
 
 def time_here(package: MpcPackage) -> Times:
-    """Return what a step takes on this machine, in double, by Python's tracker: the same C.
-
-    Parameters
-    ----------
-    package : of the tracker.
-    """
+    """Return what a step takes on this machine, in double, by Python's tracker: the same C."""
     period, delay = float(package.params["period"]), float(package.params["delay"])
     tracker = Tracker(package.tire, package.problem, period=period, delay=delay)
     times, n = [], package.problem.horizon

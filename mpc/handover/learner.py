@@ -45,8 +45,6 @@ def blended(
 
     Parameters
     ----------
-    now : tire in use.
-    target : tire to arrive at, of the same structure.
     share : of the way that is left, to go at most [-], in (0, 1].
     planned : first steering rate of the plan that a tire leads to, in one situation [rad/s].
     most : change of it that is allowed [rad/s].
@@ -90,14 +88,8 @@ class Learner:
 
     Parameters
     ----------
-    supervisor : decides.
     largest_jump : of the planned steering rate [rad/s].
     quick_jump : the same where the friction has changed [rad/s].
-
-    Raises
-    ------
-    ValueError
-        Where a bound is not positive.
     """
 
     def __init__(
@@ -118,7 +110,6 @@ class Learner:
 
         Parameters
         ----------
-        measured : by the sensors.
         tracker : which steers; its tire is moved.
         """
         agree = self._sensors.observe(measured, self._asked(tracker))

@@ -98,7 +98,6 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
 
     Parameters
     ----------
-    n_weights : numbers of the tire.
     single : whether numbers are float.
     """
     real = _real(single)
@@ -174,7 +173,6 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
     Parameters
     ----------
     params : of `params_type`, written in place.
-    guards : bounds and fall-back.
     """
     cost, limits = problem.cost, problem.limits
     params["cost"], params["cost_end"] = cost.numbers(), cost.terminal_numbers()
@@ -203,7 +201,6 @@ def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> s
 
     Parameters
     ----------
-    structure : of the prediction tire.
     horizon : number of stages.
     single : whether to compute in float.
     """
@@ -261,7 +258,6 @@ class Instance:
 
     Parameters
     ----------
-    structure : of the prediction tire.
     horizon : number of stages.
     single : whether numbers are float.
 
@@ -357,10 +353,5 @@ class Instance:
 
 
 def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return where an array lies; it must outlive the pointer.
-
-    Parameters
-    ----------
-    array : contiguous.
-    """
+    """Return where an array lies; it must outlive the pointer."""
     return ctypes.c_void_p(array.ctypes.data)

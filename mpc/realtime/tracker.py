@@ -25,7 +25,6 @@ class Tracker:
 
     Parameters
     ----------
-    tire : of the prediction, with its car.
     problem : what to minimize; None takes the default.
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
@@ -33,7 +32,6 @@ class Tracker:
     budget : time of a step [s] beyond which it is late: then the plan before it steers.
     tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
-    max_iterations : of the solver.
     linearizations : a step; 1 in real time, some 10 to convergence.
     max_active_sets : sets of active limits that are tried in a row, each at half an iteration
         of the interior point, before it and once it comes close; 0 takes that alone.
@@ -44,8 +42,6 @@ class Tracker:
 
     Raises
     ------
-    ValueError
-        Where a number is out of its range.
     NoCompilerError
         Where there is no C compiler.
     CompilationError
@@ -144,10 +140,6 @@ class Tracker:
     def set_tire(self, tire: PredictionTire) -> None:
         """Go on with other weights, the car that they are of and the slip that is of use to it.
 
-        Parameters
-        ----------
-        tire : of the same structure.
-
         Raises
         ------
         ValueError
@@ -161,10 +153,6 @@ class Tracker:
 
         An instance of its own is asked, on the plan and the road of the last step; the one that
         steers is read and not written.
-
-        Parameters
-        ----------
-        tire : of the same structure.
 
         Raises
         ------
@@ -289,7 +277,6 @@ class Tracker:
         x0 : state at the beginning of the first stage (n_x,).
         kappa : curvature of the stages [1/m], (N,) or a number.
         v_x : speed of the stages [m/s], (N,) or a number.
-        most : iterations, after which the status is ITERATION_LIMIT.
         """
         instance = self.instance
         instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x

@@ -52,7 +52,6 @@ class LadderAxles:
 
     Parameters
     ----------
-    units : n of an axle.
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
     pressed : whether the loads of the axles change with speed.
     mounted : whether v_y is off by more with speed, and the steering by more with its angle.
@@ -298,7 +297,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
 
@@ -327,7 +325,6 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     Parameters
     ----------
     vehicle : the car; it needs no chassis.
-    tire : of all four wheels.
 
     Raises
     ------
@@ -348,8 +345,6 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
-    tire : of both wheels.
     axle : 0 in front, 1 at the rear.
     alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].

@@ -83,9 +83,7 @@ def write_film(
     ----------
     file : ends in .webp, .gif or .mp4.
     drives : by the name in the legend, along one path; the camera follows the first.
-    curves : tire curves behind the forces of the first.
     drops : arc length [m] and friction from there on.
-    title : what the film is about.
     known : of the tires while the first drove; None where nothing was learnt.
 
     Raises

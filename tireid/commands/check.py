@@ -90,7 +90,6 @@ def draw_check(
     ----------
     folder : where to, made if missing.
     recording : a drive, for the error to compare the bounds with.
-    operation : what its certificate knows.
     """
     folder.mkdir(parents=True, exist_ok=True)
     chosen = LAWS[design.law]
@@ -110,11 +109,8 @@ def draw_check(
 
 
 def error_bounds(certificate: Certificate) -> dict[str, float]:
-    """Return the bounds of the error norm that a certificate holds, by the name in a legend [U s].
-
-    Parameters
-    ----------
-    certificate : the properties.
+    """Return the bounds of the error norm that a certificate holds, by the name in a legend [U
+    s].
     """
     known = {entry.name: entry.value for entry in certificate.properties}
     return {title: known[name] for name, title in BOUNDS.items() if name in known}
@@ -139,12 +135,7 @@ TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],

@@ -52,12 +52,7 @@ FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
         help=COMMANDS["compare"],
@@ -186,13 +181,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
-    """Return the verdict on what the default learns on each recording, by its name.
-
-    Parameters
-    ----------
-    recordings : that are compared on.
-    vehicle : that drove them.
-    """
+    """Return the verdict on what the default learns on each recording, by its name."""
     return {one.name: identify(one, vehicle, check=False).verdict for one in recordings}
 
 

@@ -81,12 +81,7 @@ def _slip_cells(trial: Trial) -> list[str]:
 
 
 def summary_table(comparison: Comparison) -> str:
-    """Return the same as text.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the same as text."""
     n, lines = len(comparison.names), summary_rows(comparison)
     measure = comparison.course.measure
     title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
@@ -94,12 +89,7 @@ def summary_table(comparison: Comparison) -> str:
 
 
 def remarks(comparison: Comparison) -> list[str]:
-    """Return what the methods say of themselves below the table, those alike in one line.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return what the methods say of themselves below the table, those alike in one line."""
     told: dict[str, list[str]] = {}
     for name in comparison.trials:
         if name in METHODS:
@@ -113,12 +103,7 @@ def remarks(comparison: Comparison) -> list[str]:
 
 
 def pair_tables(comparison: Comparison) -> str:
-    """Return one table for each recording learnt on and recording replayed.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return one table for each recording learnt on and recording replayed."""
     blocks = []
     for learnt in comparison.names:
         for replayed in comparison.names:
@@ -137,12 +122,7 @@ def pair_tables(comparison: Comparison) -> str:
 
 
 def sweep_table(comparison: Comparison) -> str:
-    """Return the best design of every method's sweep [% of rms, both axles].
-
-    Parameters
-    ----------
-    comparison : with a sweep.
-    """
+    """Return the best design of every method's sweep [% of rms, both axles]."""
     lines = [["method", "designs", "diverged", "default", "best", "online then", "on the front"]]
     for name, candidates in comparison.sweeps.items():
         best, own = best_candidate(candidates), frozen_share(comparison.shares(name))
@@ -177,8 +157,6 @@ def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
 
     Parameters
     ----------
-    comparison : knows the true forces.
-    name : of the recording.
     error : over it [N].
     """
     return _mean(comparison, [(name, error)])
@@ -233,7 +211,6 @@ def write_comparison(
     Parameters
     ----------
     folder : an empty folder.
-    comparison : the methods.
     verdicts : on what the default learns, by recording.
     """
     numbers = comparison_numbers(comparison)
@@ -258,23 +235,13 @@ def write_comparison(
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Return the summary, and that of the sweep, as lines of text.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the summary, and that of the sweep, as lines of text."""
     text = summary_table(comparison)
     return text + (sweep_table(comparison) if comparison.sweeps else "")
 
 
 def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
-    """Return what compare.json holds.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return what compare.json holds."""
     course = comparison.course
     return {
         "recordings": {

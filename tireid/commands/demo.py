@@ -97,14 +97,7 @@ def demo_report(
 
     Parameters
     ----------
-    story : the noisy drives, learnt by both methods.
-    verdict : on what the axle identifier learnt.
     shipped : what was learnt, as a C package.
-    study : the paper's study.
-    driven : on what was learnt, by folder.
-    figures : by folder and name.
-    folder : with films and the figures of the certificate.
-    command : as it was typed.
     """
     learnt = story.axle.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
@@ -332,12 +325,7 @@ PARTS = {LEARNING: 15.0, EXPORTING: 20.0, TESTING: 20.0, DRIVING: 40.0, REPORTIN
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "demo",
         help=COMMANDS["demo"],

@@ -50,12 +50,8 @@ class Driven(NamedTuple):
 
 
 def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
-    """Drive the cases of the demo and write what `tireid drive` writes; nothing without a compiler.
-
-    Parameters
-    ----------
-    story : what was learnt.
-    folder : of the report.
+    """Drive the cases of the demo and write what `tireid drive` writes; nothing without a
+    compiler.
     """
     if find_compiler() is None:
         return {}
@@ -68,24 +64,13 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
 
 
 def drive_text(driven: dict[str, Driven]) -> str:
-    """Return what came of the drives, as lines of text.
-
-    Parameters
-    ----------
-    driven : by folder.
-    """
+    """Return what came of the drives, as lines of text."""
     blocks = [f"{headline(one.conditions)}\n{drive_lines(one.runs)}" for one in driven.values()]
     return "\n\n".join(["Driving on what was learnt:", *blocks]) if blocks else NOT_DRIVEN
 
 
 def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
-    """Return the section of the report.
-
-    Parameters
-    ----------
-    driven : by folder.
-    folder : of the report, with the film.
-    """
+    """Return the section of the report."""
     heading = "The car drives on what it learnt"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
@@ -121,12 +106,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
 
 
 def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
-    """Return the headline numbers of the drives.
-
-    Parameters
-    ----------
-    driven : by folder.
-    """
+    """Return the headline numbers of the drives."""
     said = {
         LANE_CHANGE: "in the lane change at 90 % of the grip",
         SLIPPERY: "where friction drops to half",
@@ -202,7 +182,6 @@ def ship(story: Story, folder: Path) -> Shipped:
 
     Parameters
     ----------
-    story : the drives and what was learnt.
     folder : an empty folder for the package.
 
     Raises
@@ -229,12 +208,7 @@ def ship(story: Story, folder: Path) -> Shipped:
 
 
 def shipped_text(shipped: Shipped) -> str:
-    """Return what came of the package, as lines of text.
-
-    Parameters
-    ----------
-    shipped : the package.
-    """
+    """Return what came of the package, as lines of text."""
     about = shipped.package.about
     lines = [f"As a C package ({FOLDER}/, hash {about['hash']}):"]
     lines += [
@@ -252,12 +226,7 @@ def shipped_text(shipped: Shipped) -> str:
 
 
 def package_section(shipped: Shipped) -> Section:
-    """Return the section of the report.
-
-    Parameters
-    ----------
-    shipped : the package.
-    """
+    """Return the section of the report."""
     name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(

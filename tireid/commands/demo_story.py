@@ -52,8 +52,6 @@ class Learning:
 
     Parameters
     ----------
-    law : name of the method.
-    learnt : the online run that the weights come from.
     others : online runs over the drives that the frozen model predicts.
     frozen : freeze time [s] to recording name to replay.
     """
@@ -78,15 +76,7 @@ class Learning:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Story:
-    """The demo's drives, learnt by the axle identifier and by the paper's beside it.
-
-    Parameters
-    ----------
-    car : what drives, and what the identifier is told of.
-    design : the design of the paper's identifier.
-    axle : what the axle identifier learnt.
-    paper : what the paper's network and law learnt.
-    """
+    """The demo's drives, learnt by the axle identifier and by the paper's beside it."""
 
     car: Vehicle
     design: PaperIdentifier
@@ -111,12 +101,7 @@ class Story:
         return rows
 
     def side_by_side(self, drive: str) -> dict[str, Replay]:
-        """Return the replays of both methods over a drive, by the name in a legend.
-
-        Parameters
-        ----------
-        drive : name of the recording.
-        """
+        """Return the replays of both methods over a drive, by the name in a legend."""
         return {
             "axle identifier (curves of slip)": self.axle.frozen[FREEZE][drive],
             "paper (network, integral law)": self.paper.frozen[FREEZE][drive],
@@ -136,12 +121,7 @@ class Story:
 
 
 def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
-    """Drive the sedan; sensors are noisy with a fixed seed.
-
-    Parameters
-    ----------
-    maneuvers : by the name of the recording.
-    """
+    """Drive the sedan; sensors are noisy with a fixed seed."""
     plant, rng = Plant(sedan()), np.random.default_rng(1)
     return {
         name: plant.simulate(maneuver, speed=SPEED, name=name).recording(SENSORS, rng)
@@ -235,7 +215,6 @@ def plant_recordings(
 
     Parameters
     ----------
-    vehicle : the car, with a chassis.
     rng : of the noise of `SENSORS`; None measures exactly.
 
     Raises

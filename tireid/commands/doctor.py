@@ -25,12 +25,7 @@ from tireid.progress import say, tell
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "doctor",
         help=COMMANDS["doctor"],
@@ -100,8 +95,6 @@ def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> di
 
     Parameters
     ----------
-    diagnosis : of the log as it was read.
-    repair : that was applied.
     after : diagnosis of the repaired log, None where nothing was repaired.
     """
     return {

@@ -136,12 +136,7 @@ LONGEST_DELAY = 100.0  # ms
 
 
 def labels_of(words: Sequence[str]) -> list[str]:
-    """Return the tires in order, each once; all begins with the frozen ones.
-
-    Parameters
-    ----------
-    words : names of tires, or all.
-    """
+    """Return the tires in order, each once; all begins with the frozen ones."""
     wanted = [FROZEN, LINEAR, ORACLE, LEARNING] if ALL in words else list(words)
     return list(dict.fromkeys(wanted))
 
@@ -208,10 +203,6 @@ def _require_one_source(options: argparse.Namespace) -> None:
 def named_path(name: str) -> Path:
     """Return a built-in path, or one from way-points in a file.
 
-    Parameters
-    ----------
-    name : one of the built-in paths, or the name of a CSV file.
-
     Raises
     ------
     ValueError
@@ -237,12 +228,10 @@ def make_setup(
 
     Parameters
     ----------
-    path : to follow.
     vehicle : the car; None takes the built-in sedan, or the car of the plant.
     plant : of `PLANTS`.
     mu : friction before the first drop [-].
     drops : arc length [m] and friction from there on.
-    wish : how fast.
 
     Raises
     ------
@@ -273,11 +262,6 @@ def frozen_tires(
     options: argparse.Namespace, labels: Sequence[str], conditions: Conditions
 ) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed.
-
-    Parameters
-    ----------
-    labels : what the trackers are told.
-    conditions : of the drives.
 
     Raises
     ------

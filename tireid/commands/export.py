@@ -25,12 +25,7 @@ from tireid.verdicts import warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "export",
         help=COMMANDS["export"],

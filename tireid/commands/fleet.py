@@ -33,12 +33,7 @@ SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "fleet",
         help=COMMANDS["fleet"],

@@ -79,12 +79,7 @@ OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
         help=COMMANDS["identify"],
@@ -366,7 +361,6 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
 
     Parameters
     ----------
-    histories : the online runs over all recordings.
     frozen : freeze time [s] to recording name to replay.
     """
     sizes = {history.recording.name: force_rms(history) for history in histories}

@@ -93,12 +93,7 @@ def summarize(
 
     Parameters
     ----------
-    law : the law as the user named it.
-    learnt : the online run that the weights come from.
-    others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
-    verdict : on the model of the last freeze.
-    asked : on it over each of the other recordings.
     parts : of the online run, over each of several logs that were learnt on.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
@@ -112,16 +107,7 @@ def summarize_replays(
     verdict: Verdict | None,
     asked: Mapping[str, Verdict],
 ) -> dict[str, Any]:
-    """Return the same of any replays.
-
-    Parameters
-    ----------
-    law : the law as the user named it.
-    runs : online runs of one design, the first the one that was learnt.
-    frozen : key in the summary to recording name to replay.
-    verdict : on the model that was replayed last.
-    asked : on it over recordings that it was not learnt on, by recording.
-    """
+    """Return the same of any replays."""
     learnt = runs[0]
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
@@ -180,12 +166,7 @@ class AskedBound(NamedTuple):
 
 
 def guaranteed_text(model: TireModel) -> str:
-    """Return what is guaranteed of a model, in words.
-
-    Parameters
-    ----------
-    model : frozen, asked for a guaranteed band.
-    """
+    """Return what is guaranteed of a model, in words."""
     sentence = guaranteed_sentence(model)
     return sentence or (
         "no guaranteed band: it takes --method axle, a lateral velocity that "
@@ -223,12 +204,8 @@ def write_results(
     Parameters
     ----------
     folder : an empty folder.
-    law : the law as the user named it.
-    learnt : the online run that the weights come from.
     others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
-    verdict : on the model of the last freeze.
-    asked : on it over each of the other recordings.
     parts : of the online run, over each of several logs that were learnt on.
     curves : "csv" or "parquet", as what curves over time are written.
     bound : of the guaranteed band of the last freeze; None asks for none.
@@ -269,12 +246,7 @@ def write_results(
 
 
 def file_name(recording: Recording) -> str:
-    """Return the name of a recording as part of a file name.
-
-    Parameters
-    ----------
-    recording : named FILE or FILE:RUN.
-    """
+    """Return the name of a recording as part of a file name."""
     return re.sub(r"[^\w.-]+", "_", recording.name)
 
 
@@ -376,7 +348,6 @@ def write_forces(
 
     Parameters
     ----------
-    history : an online run.
     replays : replays of the same recording by the name of their columns.
     progress : called now and then with the share that is done, 0 to 1.
     """
@@ -426,12 +397,7 @@ FARTHER = 1.25  # than the slip that was driven, or is known
 
 
 def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
-    """Return curve.csv: the steady force of each axle over slip, and whether it is known there.
-
-    Parameters
-    ----------
-    recordings : that were driven, which say how far the curve goes.
-    """
+    """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
     for recording in recordings:
@@ -516,12 +482,6 @@ def write_network_results(
     Parameters
     ----------
     folder : an empty folder.
-    file : where the network came from.
-    law : what learns beside it, as the user named it.
-    model : the network.
-    histories : what was identified online over each recording.
-    verdict : on the network.
-    asked : on it over each recording but the first.
     curves : "csv" or "parquet", as what curves over time are written.
     """
     replays = {history.recording.name: replay(model, history) for history in histories}
@@ -551,14 +511,7 @@ def write_network_results(
 
 
 def network_table(law: str, histories: Sequence[History], replays: Mapping[str, Replay]) -> str:
-    """Return the errors of the network, and of what was learnt online beside it, as text.
-
-    Parameters
-    ----------
-    law : what learns beside it.
-    histories : what was identified online over each recording.
-    replays : of the network, by recording.
-    """
+    """Return the errors of the network, and of what was learnt online beside it, as text."""
     table = [["", "replayed on", "front", "rear"]]
     for history in histories:
         name, size, online = history.recording.name, force_rms(history), online_error(history)

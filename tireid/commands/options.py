@@ -49,7 +49,6 @@ def add_vehicle(
 
     Parameters
     ----------
-    parser : of a command.
     required : whether it cannot be left out.
     default : what it is where it is left out.
     """
@@ -71,23 +70,13 @@ def read_vehicle(options: argparse.Namespace) -> Vehicle:
 
 
 def say_estimates(vehicle: Vehicle, source: Path | None) -> None:
-    """Say which numbers of a car are estimated, where any are: once in a command.
-
-    Parameters
-    ----------
-    source : file that tells of the car.
-    """
+    """Say which numbers of a car are estimated, where any are: once in a command."""
     if vehicle.estimates:
         say(f"{source}: {vehicle.estimates}")
 
 
 def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
-    """Return a car with the numbers that the repair of --log tells of it, and say which.
-
-    Parameters
-    ----------
-    vehicle : as it was told.
-    """
+    """Return a car with the numbers that the repair of --log tells of it, and say which."""
     path = _map_path(options)
     numbers: dict[str, Any] = {} if path is None else dict(LogMap.from_toml(path).repair.vehicle)
     if not numbers:
@@ -102,7 +91,6 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
 
     Parameters
     ----------
-    parser : of the command.
     command : its name, which the folder bears by default; None writes a folder only where asked.
     """
     folder = None if command is None else Path(f"tireid-{command}")
@@ -112,22 +100,12 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add --force.
-
-    Parameters
-    ----------
-    parser : of a command.
-    """
+    """Add --force."""
     parser.add_argument("--force", action="store_true", help="replace what is there")
 
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
-    """Add the option that takes an answer as it is.
-
-    Parameters
-    ----------
-    parser : of a command that ends with a verdict.
-    """
+    """Add the option that takes an answer as it is."""
     parser.add_argument(
         "--accept",
         action="store_true",
@@ -146,35 +124,17 @@ def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --weights.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : what the command does with the model.
-    """
+    """Add --weights."""
     parser.add_argument("--weights", type=Path, metavar="FILE", help=f"stored model: {what}")
 
 
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --seed; None where it is not given.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : is drawn with it.
-    """
+    """Add --seed; None where it is not given."""
     parser.add_argument("--seed", type=int, metavar="N", help=f"of {what} (0)")
 
 
 def seed_of(options: argparse.Namespace) -> int:
-    """Return --seed, 0 where it is not given.
-
-    Raises
-    ------
-    ValueError
-        Where it is negative.
-    """
+    """Return --seed, 0 where it is not given."""
     seed = int(options.seed or 0)
     if seed < 0:
         raise ValueError(f"--seed must not be negative, it is {seed}")
@@ -182,12 +142,7 @@ def seed_of(options: argparse.Namespace) -> int:
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Add --jobs.
-
-    Parameters
-    ----------
-    parser : of a command.
-    """
+    """Add --jobs."""
     count = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=int, default=count, metavar="N", help="processes (%(default)s)"
@@ -217,7 +172,6 @@ def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
 
     Parameters
     ----------
-    parser : of a command.
     usual : the default.
     """
     parser.add_argument(
@@ -293,12 +247,7 @@ def chosen_method(
 
 
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns and --no-check.
-
-    Parameters
-    ----------
-    parser : of a command that reads logs.
-    """
+    """Add --log, --columns and --no-check."""
     add_log_map(parser)
     parser.add_argument(
         "--no-check", action="store_true", help="accept a log that contradicts physics"
@@ -306,12 +255,7 @@ def add_log_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns, --dbc, --cut-holes and --mend-clock: how a log is read.
-
-    Parameters
-    ----------
-    parser : of a command that reads logs.
-    """
+    """Add --log, --columns, --dbc, --cut-holes and --mend-clock: how a log is read."""
     parser.add_argument(
         "--log",
         dest="log_map",
@@ -386,9 +330,6 @@ def read_log(
 
     Parameters
     ----------
-    log : path, or path:run.
-    vehicle : the car that is said to have driven, as the map repairs it.
-    told : how it is read.
     run_name : run of the file, if `log` does not name it.
     check : whether a log that contradicts physics or the vehicle is refused.
     dt : sampling interval that it is brought to [s].
@@ -446,13 +387,7 @@ CONVENTIONS = (
 
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option and what belongs to it.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : what the command does with the network, for the help.
-    """
+    """Add the option and what belongs to it."""
     group = parser.add_argument_group("a tire network of your own", CONVENTIONS)
     group.add_argument("--network", type=Path, metavar="FILE.onnx", help=what)
     group.add_argument(
@@ -475,7 +410,6 @@ def network_model(
 
     Parameters
     ----------
-    vehicle : the car, which makes slip angles.
     min_speed : below this speed [m/s] the forces read zero.
 
     Raises

@@ -175,7 +175,6 @@ def settings(gains: Gains, network: Network) -> str:
     Parameters
     ----------
     gains : of both laws; the third column divides the learning rates by the forgetting factor.
-    network : its size.
     """
     a = -gains.A_d[0][0]
     scaled = gains.scaled_by_forgetting()
@@ -224,7 +223,6 @@ def write_study(folder: Path, study: Study) -> dict[str, Figure]:
 
     Parameters
     ----------
-    folder : where to.
     study : its errors over all seeds.
     """
     write_json(folder / "tables.json", study.tables())
@@ -281,12 +279,7 @@ STUDY, DRAWING = "the study", "figures"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "paper",
         help=COMMANDS["paper"],

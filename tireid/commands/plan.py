@@ -49,12 +49,7 @@ METERS, KILOMETERS = "m/s", "km/h"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "plan",
         help=COMMANDS["plan"],
@@ -263,7 +258,6 @@ def inputs_of(
 
     Parameters
     ----------
-    vehicle : the car.
     area : length and width [m].
     speed : [m/s].
     """
@@ -289,7 +283,6 @@ def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
 
     Parameters
     ----------
-    found : the plan.
     ratio : hand wheel over front wheels; None tells no hand wheel.
     """
     rows = []
@@ -311,7 +304,6 @@ def path_columns(found: Plan, k: int) -> dict[str, Array]:
 
     Parameters
     ----------
-    found : the plan.
     k : which pass, from 0.
     """
     one, car = found.passes[k], found.tires.vehicle
@@ -329,9 +321,7 @@ def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float |
     Parameters
     ----------
     folder : an empty folder.
-    found : the plan.
     inputs : all that went in, ready for JSON.
-    ratio : hand wheel over front wheels.
     """
     write_csv(folder / "steering.csv", steering_columns(found, ratio))
     for k in range(len(found.passes)):
@@ -345,7 +335,6 @@ def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    found : the plan.
     inputs : all that went in, ready for JSON.
     """
     slips, before, after = found.deviations()

@@ -47,12 +47,7 @@ from tireid.verdicts import verdict_text, warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "predict",
         help=COMMANDS["predict"],
@@ -142,7 +137,6 @@ def truth_within_band(prediction: Prediction, half: Array | None) -> Array | Non
 
     Parameters
     ----------
-    prediction : of a recording.
     half : width of its band (n, 2) [N]; samples without one do not count.
     """
     truth = prediction.recording.axle_force
@@ -160,10 +154,7 @@ def force_columns(
 
     Parameters
     ----------
-    model : that predicted.
-    prediction : of a recording.
     half : width of its band (n, 2) [N]; None where the model has none.
-    part : samples that are asked for.
     """
     recording, car = prediction.recording, model.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
@@ -186,9 +177,6 @@ def summary(
 
     Parameters
     ----------
-    model : that predicted.
-    prediction : of a recording.
-    verdict : on the model over that recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
@@ -231,14 +219,7 @@ def summary(
 
 
 def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Figure]:
-    """Write the figures of a prediction; return them by the name of their file.
-
-    Parameters
-    ----------
-    folder : where to.
-    prediction : of a drive.
-    verdict : on the model over it.
-    """
+    """Write the figures of a prediction; return them by the name of their file."""
     figures = {
         "slip": slip_figure(prediction.model, prediction.recording),
         "forces": prediction_figure(prediction),
@@ -253,12 +234,7 @@ def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Fi
 
 
 def error_table(prediction: Prediction) -> str:
-    """Return the errors against the true forces as a table; empty where there are none.
-
-    Parameters
-    ----------
-    prediction : of a drive.
-    """
+    """Return the errors against the true forces as a table; empty where there are none."""
     error, size = prediction.against_truth, prediction.true_force
     if error is None:
         return ""
@@ -276,8 +252,6 @@ def prediction_text(
 
     Parameters
     ----------
-    model : that predicted.
-    prediction : of a recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     friction : of the drive's road; None where nobody can tell.
     """

@@ -66,7 +66,6 @@ def force_figure(
 
     Parameters
     ----------
-    history : the online run.
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
     window : first and last time to show [s]; None shows all.
     since : time from which the error of the online run counts [s], as in the replays; None counts
@@ -260,10 +259,6 @@ COLORS = (ORANGE, BLUE, GREEN, PURPLE)
 def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
     """Draw the forces of several frozen models over one drive, and what each misses.
 
-    Parameters
-    ----------
-    replays : by the name in the legend, replays of one recording that has true forces.
-
     Raises
     ------
     ValueError
@@ -365,7 +360,6 @@ def draw_diagnosis(
 
     Parameters
     ----------
-    recording, vehicle : as they were told.
     repaired, car : with the repair; the same where there is none.
     """
     figure = new_figure(PAGE, 2.9)

@@ -34,13 +34,7 @@ POINTS: Mapping[str, Any] = {
 
 @styled
 def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
-    """Draw the force that the motion shows and that of the model, and what is missed below.
-
-    Parameters
-    ----------
-    shown : of a verdict.
-    vehicle : whose static axle loads they are over.
-    """
+    """Draw the force that the motion shows and that of the model, and what is missed below."""
     loads = np.array(vehicle.axle_loads)
     measured, modelled = shown.measured * loads, shown.modelled * loads
     unit = force_unit_of(measured)
@@ -63,12 +57,7 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
 
 @styled
 def friction_figure(friction: RoadFriction) -> Figure:
-    """Draw the friction of a drive's road over that of the drive that taught, and its doubt.
-
-    Parameters
-    ----------
-    friction : of a verdict.
-    """
+    """Draw the friction of a drive's road over that of the drive that taught, and its doubt."""
     some = slice(None, None, thinning(len(friction.t)))
     t, ratio, sd = friction.t[some], friction.ratio[some], friction.sd[some]
     figure = new_figure(PAGE, 2.8)

@@ -84,12 +84,7 @@ LOOK: dict[str, Any] = {
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Return a drawing function that works in the look of the project, whatever the user's own.
-
-    Parameters
-    ----------
-    draw : function that makes a figure.
-    """
+    """Return a drawing function that works in the look of the project, whatever the user's own."""
 
     @wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
@@ -106,13 +101,7 @@ class PlainNumbers(ScalarFormatter):
     """
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return a number of the axis.
-
-        Parameters
-        ----------
-        x : where it stands.
-        pos : which of them it is.
-        """
+        """Return a number of the axis."""
         return MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
 
 
@@ -167,26 +156,14 @@ def _lay_out(figure: Figure) -> None:
 
 @contextmanager
 def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
-    """Lay a figure out, and let it be drawn in the look of the project meanwhile.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    look : what differs from Matplotlib's own.
-    """
+    """Lay a figure out, and let it be drawn in the look of the project meanwhile."""
     with style.context(["default", dict(look)]):
         _lay_out(figure)
         yield
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
-    """Return a figure as PNG, the same bytes for the same figure.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    resolution : dots per inch.
-    """
+    """Return a figure as PNG, the same bytes for the same figure."""
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
@@ -203,12 +180,7 @@ VECTOR: dict[str, Any] = {
 
 
 def figure_svg(figure: Figure) -> bytes:
-    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    """
+    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
     with laid_out(figure, {**LOOK, **VECTOR}):
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
@@ -220,12 +192,7 @@ DIGITS = re.compile(rb"(?<=\.\d\d)\d+")  # more are not seen
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    """
+    """Write a figure as PNG."""
     write_file(path, figure_png(figure))
 
 
@@ -269,7 +236,6 @@ def label_time(axes: Axes, t: Array) -> None:
 
     Parameters
     ----------
-    axes : panel over the time of a recording.
     t : times of the samples (n,) [s].
     """
     zero = clock_zero(t)
@@ -308,7 +274,6 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
 
     Parameters
     ----------
-    axes : panel over time.
     t_freeze : time of the freeze [s].
     prediction : whether the panel shows a replay.
     """
@@ -327,12 +292,7 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
 
 
 def note(axes: Axes, text: str) -> None:
-    """Write a short text above the right end of a panel, opposite to its title.
-
-    Parameters
-    ----------
-    text : what to write.
-    """
+    """Write a short text above the right end of a panel, opposite to its title."""
     axes.set_title(text, loc="right", color="#444444")
 
 
@@ -343,7 +303,6 @@ def legend_above(
 
     Parameters
     ----------
-    figure : figure with a constrained layout.
     columns : entries in a row; None puts all in one.
     order : labels that come after all others, in this order.
     """
@@ -365,12 +324,7 @@ def legend_above(
 
 
 def legend_beside(axes: Axes) -> None:
-    """Put the legend of one panel to its right, where it covers no data.
-
-    Parameters
-    ----------
-    axes : a panel that is as wide as its figure.
-    """
+    """Put the legend of one panel to its right, where it covers no data."""
     handles, labels = axes.get_legend_handles_labels()
     entries = dict(zip(labels, handles, strict=True))
     legend = axes.legend(
@@ -442,10 +396,6 @@ def impulse_unit(force_unit: float) -> str:
 def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units.
 
-    Parameters
-    ----------
-    history : an online run.
-
     Raises
     ------
     TypeError
@@ -482,7 +432,6 @@ def drawable(curve: Array, limits: tuple[float, float]) -> Array:
     Parameters
     ----------
     curve : in the unit of the axis (of any shape).
-    limits : ends of the axis.
     """
     low, high = limits
     reach = 10.0 * (high - low)

@@ -63,7 +63,6 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     Parameters
     ----------
     model : the frozen model; its vehicle gives the axle positions and the linear tire.
-    recording : where the model is evaluated.
     online : an online run over the recording, drawn where there is no truth.
 
     Raises
@@ -194,7 +193,6 @@ class TireCurve:
 
     Parameters
     ----------
-    label : what legends call it.
     alpha : slip in the paper's sign [rad], (k,).
     force : of front and rear axle [N], (k, 2).
     """
@@ -205,12 +203,7 @@ class TireCurve:
 
 
 def axle_slip(drive: "Drive") -> Array:
-    """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2).
-
-    Parameters
-    ----------
-    drive : its true motion is taken.
-    """
+    """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2)."""
     car = drive.vehicle
     motion = {"v_x": drive.v_x, "v_y": drive.v_y, "r": drive.r}
     return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
@@ -226,10 +219,6 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     """Draw the forces of a drive as a cloud, and the curves that trackers believed.
 
     Below stands what each curve misses of the true one, where the true one is known.
-
-    Parameters
-    ----------
-    curves : steady forces of the tires to compare.
     """
     unit = force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
@@ -294,12 +283,7 @@ def _missed_of_truth(
 
 
 def drawn_tracks(history: History) -> DrawnRun | None:
-    """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to.
-
-    Parameters
-    ----------
-    history : a run.
-    """
+    """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to."""
     if not history.tracks_over(next(history.blocks())):
         return None
     t = history.recording.t

@@ -63,9 +63,7 @@ class Task:
     address : absolute path or address, by which any process reads it.
     size : [bytes].
     stamp : hash of what its file system says of it and what changes with it; empty where nothing.
-    tags : what its path says.
     date : when it was driven, ISO 8601; of its path, else when the file was written.
-    vehicle : path of the car's TOML.
     """
 
     log: str
@@ -83,7 +81,6 @@ class Telling:
 
     Parameters
     ----------
-    log_map : how they are read and repaired.
     start : model that learning begins with; None begins afresh.
     judging : "motion" asks whether the frozen model gives the drive's motion back, "full" for the
         verdict of `tireid identify`, which takes ten times as long, "none" for nothing.
@@ -108,10 +105,6 @@ class Telling:
         """Return the hash of all that a row follows from beside its log: car, method, options.
 
         Files count by what they hold, not by their names.
-
-        Parameters
-        ----------
-        vehicle : the car.
         """
         dbc = self.log_map.dbc
         parts = (
@@ -135,13 +128,7 @@ class Car(NamedTuple):
 
     @classmethod
     def read(cls, path: Path, telling: Telling) -> "Car":
-        """Read a car once, for processes that may not reach its file.
-
-        Parameters
-        ----------
-        path : its TOML.
-        telling : what is told of all logs.
-        """
+        """Read a car once, for processes that may not reach its file."""
         vehicle = Vehicle.from_toml(path)
         if vehicle.chassis is not None:  # the tires are what is learnt
             vehicle = replace(vehicle, chassis=replace(vehicle.chassis, tire=None))
@@ -158,7 +145,6 @@ def find_logs(
 
     Parameters
     ----------
-    patterns : paths or addresses with * and **.
     vehicle : path of the car's TOML; {name} in it is replaced by the tag of that name.
     tags : pattern of a path's end with {name} for its parts, as in
         "{vehicle}/{tires}/{date}-{drive}.csv"; empty says nothing.
@@ -275,9 +261,6 @@ def learn_log(task: Task, telling: Telling, car: Car, known: Set[str] = frozense
 
     Parameters
     ----------
-    task : the log.
-    telling : what is told of all logs.
-    car : that drove it.
     known : `LogRow.known` of logs that are not learnt again.
     """
     row = row_of(task, car)
@@ -299,13 +282,7 @@ def learn_log(task: Task, telling: Telling, car: Car, known: Set[str] = frozense
 
 
 def row_of(task: Task, car: Car) -> LogRow:
-    """Return the row of a log of which nothing was read yet.
-
-    Parameters
-    ----------
-    task : the log.
-    car : that drove it.
-    """
+    """Return the row of a log of which nothing was read yet."""
     tags = dict(task.tags)
     return LogRow(
         log=task.log,
@@ -320,12 +297,7 @@ def row_of(task: Task, car: Car) -> LogRow:
 
 
 def content_of(path: Path) -> str:
-    """Return the hash of what a file holds.
-
-    Parameters
-    ----------
-    path : of the file.
-    """
+    """Return the hash of what a file holds."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, partial(hashlib.blake2b, digest_size=16)).hexdigest()
 
@@ -355,10 +327,7 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
 
     Parameters
     ----------
-    row : the log's name and what its path says.
     recording : the log, at `DT`.
-    vehicle : the car that drove.
-    telling : what is told of all logs.
 
     Raises
     ------
@@ -408,12 +377,7 @@ def _near(log: str) -> Iterator[Path]:
 
 
 def conditions(recording: Recording) -> dict[str, Any]:
-    """Return how a log was driven, by columns of a row.
-
-    Parameters
-    ----------
-    recording : the log.
-    """
+    """Return how a log was driven, by columns of a row."""
     a_y = recording.v_x * recording.r
     return {
         "seconds": recording.duration,
@@ -471,8 +435,6 @@ class LearnSome:
 
     Parameters
     ----------
-    telling : what is told of all logs.
-    cars : by the path of the car's TOML.
     known : `LogRow.known` of logs that are not learnt again.
     """
 
@@ -481,24 +443,14 @@ class LearnSome:
     known: Set[str] = frozenset()
 
     def __call__(self, tasks: Sequence[Task]) -> Learnt:
-        """Return the rows of some logs.
-
-        Parameters
-        ----------
-        tasks : the logs.
-        """
+        """Return the rows of some logs."""
         each = [learn_log(one, self.telling, self.cars[one.vehicle], self.known) for one in tasks]
         return Learnt(
             [row for one in each for row in one.rows], [two for one in each for two in one.copies]
         )
 
     def died(self, task: Task) -> Learnt:
-        """Return the row of a log that processes die of.
-
-        Parameters
-        ----------
-        task : the log.
-        """
+        """Return the row of a log that processes die of."""
         why = "the process that learnt it died, twice: it may want more memory than there is"
         return Learnt([replace(row_of(task, self.cars[task.vehicle]), error=why)], [])
 
@@ -531,13 +483,10 @@ def learn_fleet(
 
     Parameters
     ----------
-    tasks : the logs.
-    telling : what is told of all of them.
     store : where rows are kept, some at a time, and sorted at the end.
     spread_map : does the work; results may come in any order.
     again : also learn logs whose row holds an error.
     replacing : take `Done.others` out of the store.
-    done : told how many logs are ready, and of how many.
     """
     cars = {one: Car.read(one, telling) for one in {task.vehicle for task in tasks}}
     before = [row for row in store.stream(INDEX) if not (again and row.error)]
@@ -593,8 +542,6 @@ def _others(index: Sequence[LogRow], names: Set[str], current: Set[str]) -> list
 
     Parameters
     ----------
-    index : rows of the store.
-    names : of the logs that are told.
     current : `LogRow.known` of what these logs hold.
     """
     contents = {row.content for row in index if row.content and row.known in current}

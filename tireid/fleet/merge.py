@@ -42,9 +42,6 @@ class Merged:
     Parameters
     ----------
     key : what they have in common, by `BY` or tag.
-    logs : how many there are.
-    told : what they tell.
-    model : of it.
     """
 
     key: tuple[tuple[str, str], ...]
@@ -68,7 +65,6 @@ def key_of(row: LogRow, by: Sequence[str]) -> tuple[tuple[str, str], ...]:
 
     Parameters
     ----------
-    row : of the log.
     by : names of `BY` or of tags.
 
     Raises
@@ -96,10 +92,6 @@ def _value(row: LogRow, name: str) -> str:
 def day_of(row: LogRow) -> date:
     """Return the day of a log.
 
-    Parameters
-    ----------
-    row : of the log.
-
     Raises
     ------
     MergeError
@@ -118,7 +110,6 @@ def usable(row: LogRow, *, refused: bool = False) -> bool:
 
     Parameters
     ----------
-    row : of a log.
     refused : also where the verdict refuses its answer.
     """
     return bool(not row.error and row.part_begin and (refused or row.valid is not False))
@@ -131,7 +122,6 @@ def grouped(
 
     Parameters
     ----------
-    rows : usable ones.
     by : names of `BY` or of tags.
 
     Raises
@@ -165,7 +155,6 @@ def merge(rows: Iterable[LogRow], by: Sequence[str]) -> list[Merged]:
 
     Parameters
     ----------
-    rows : usable ones.
     by : what the logs of a group have in common; empty merges all.
 
     Raises
@@ -206,7 +195,6 @@ def excitation_of(before: Array, row: LogRow) -> Array:
     Parameters
     ----------
     before : of the logs, (2, 9).
-    row : of one more.
     """
     one = row.numbers("excitation", *before.shape)
     together: Array = before + one
@@ -265,10 +253,6 @@ def sizes(vehicle: Vehicle, q: int) -> Array:
 
 def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
     """Return what many cars have in common.
-
-    Parameters
-    ----------
-    cars : a merged model for each.
 
     Raises
     ------

@@ -48,11 +48,6 @@ class StoreError(TireidError, ValueError):
 def needed(name: str, what: str = "a fleet's store") -> Any:
     """Return a library of the extra [fleet].
 
-    Parameters
-    ----------
-    name : of its module.
-    what : what needs it.
-
     Raises
     ------
     ImportError
@@ -79,7 +74,6 @@ class LogRow:
     vehicle, tires, date : as its path or its folder says; the date as ISO 8601.
     tags : everything that the path says, as JSON.
     error : why nothing was learnt, one line; empty where it was. All that follows is empty then.
-    seconds : that it lasts.
     v_x_mean, v_x_most : speed [m/s].
     a_y_rms, a_y_most : lateral acceleration v_x r [m/s²].
     steering_most : of the front wheels [rad].
@@ -206,11 +200,6 @@ class LogRow:
     def numbers(self, name: str, *shape: int) -> Array:
         """Return a column that is a list, in its shape.
 
-        Parameters
-        ----------
-        name : of the column.
-        shape : that it must have.
-
         Raises
         ------
         StoreError
@@ -264,12 +253,7 @@ def unpacked_triangles(packed: Array, q: int) -> Array:
 
 
 def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
-    """Return the columns that hold what parts of a log tell.
-
-    Parameters
-    ----------
-    parts : in the order of time.
-    """
+    """Return the columns that hold what parts of a log tell."""
     return {
         "part_seconds": [one.seconds for one in parts],
         "part_samples": [one.samples for one in parts],
@@ -281,12 +265,7 @@ def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Store:
-    """A fleet's rows at an address.
-
-    Parameters
-    ----------
-    address : a folder, or what fsspec opens.
-    """
+    """A fleet's rows at an address."""
 
     address: str
 
@@ -348,12 +327,7 @@ class Store:
             raise StoreError(f"{self.address} is no store: tireid fleet learn LOGS --out makes one")
 
     def rows(self, columns: Sequence[str] | None = None, *, where: str = "") -> list[LogRow]:
-        """Return the rows, by the name of their log.
-
-        Parameters
-        ----------
-        columns, where : as of `stream`.
-        """
+        """Return the rows, by the name of their log."""
         return sorted(self.stream(columns, where=where), key=_order)
 
     def stream(self, columns: Sequence[str] | None = None, *, where: str = "") -> Iterator[LogRow]:
@@ -453,12 +427,7 @@ class Store:
         return remote.open_parquet_file(path, fs=fs, columns=list(columns), engine="pyarrow")
 
     def keep(self, rows: Sequence[LogRow]) -> None:
-        """Write rows, whole or not at all; they pend until `settle`.
-
-        Parameters
-        ----------
-        rows : of some logs.
-        """
+        """Write rows, whole or not at all; they pend until `settle`."""
         names = "\0".join("\0".join((*row.key, row.log)) for row in rows)
         digest = hashlib.blake2b(names.encode(), digest_size=12).hexdigest()
         data = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
@@ -507,12 +476,7 @@ class Store:
         self._place[0].rm(list(paths))
 
     def drop(self, rows: Sequence[LogRow]) -> None:
-        """Take rows out; none may pend.
-
-        Parameters
-        ----------
-        rows : of the store, by their keys.
-        """
+        """Take rows out; none may pend."""
         sizes = self._sizes("logs") if rows else {}
         for bucket in sorted({row.bucket for row in rows}):
             self._sort(bucket, sizes, [], frozenset(row.key for row in rows))
@@ -537,12 +501,7 @@ class Store:
 
 
 def protocols(fs: Any) -> set[str]:
-    """Return the names of a file system's protocol.
-
-    Parameters
-    ----------
-    fs : of fsspec.
-    """
+    """Return the names of a file system's protocol."""
     return {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
 
 

@@ -54,11 +54,6 @@ class Watching:
     baseline : learning of a car that its baseline takes [s].
     false_alarms : in a thousand hours of learning, of all statistics of a car together.
     stiffness, friction : change of ln C and of ln μ that is looked for, δ [-].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     baseline: float = 1200.0
@@ -115,10 +110,7 @@ class Alarm:
 
     Parameters
     ----------
-    car : whose.
     statistic : index of `TITLES`.
-    began : log in which the change is taken to have begun.
-    log, date : in which it was noticed.
     after : learning from the baseline to the alarm [s].
     change : of all statistics since it began, ln, (3,) [-].
     sd : of these (3,) [-].
@@ -193,8 +185,6 @@ class Watch:
     Parameters
     ----------
     alarms : in the order of cars and time.
-    seen : by car, of those that were driven beyond their baseline.
-    short : cars that were not.
     """
 
     alarms: tuple[Alarm, ...]
@@ -212,9 +202,7 @@ def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watc
 
     Parameters
     ----------
-    rows : usable ones.
     by : what tells cars, or their sets of tires, apart.
-    watching : what is looked for.
 
     Raises
     ------
@@ -260,10 +248,6 @@ class _Compared(NamedTuple):
 
 def parts_of(row: LogRow) -> list[Part]:
     """Return the parts of a log that tell of the tires.
-
-    Parameters
-    ----------
-    row : of the log.
 
     Raises
     ------

@@ -66,14 +66,7 @@ READ = {
 
 
 def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
-    """Return a figure as a picture of a report.
-
-    Parameters
-    ----------
-    figure : as the functions of `tireid.figures` return it.
-    caption : what it shows, plain text.
-    read : how to read it, plain text.
-    """
+    """Return a figure as a picture of a report."""
     return Picture(image=style.figure_svg(figure), caption=caption, read=read)
 
 
@@ -96,14 +89,7 @@ def recording_digest(recording: Recording) -> str:
 def origin(
     command: str, vehicle: Vehicle, recordings: Iterable[Recording], **others: str
 ) -> Section:
-    """Return what is needed to compute a report again.
-
-    Parameters
-    ----------
-    command : as it was typed.
-    recordings : that were read or driven.
-    others : more lines, by their name with underscores for blanks.
-    """
+    """Return what is needed to compute a report again."""
     told = list(recordings)
     rows = [
         ["command", command],

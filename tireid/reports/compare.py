@@ -33,13 +33,7 @@ def write_compare_report(
 
     Parameters
     ----------
-    folder : where to.
-    comparison : the methods.
-    rows : its table, the header first.
-    figures : by the name of their files.
     verdicts : on what the default learns, by recording.
-    remarks : what the methods say of themselves, a line each.
-    command : as it was typed.
     """
     course = comparison.course
     captions = {
@@ -83,12 +77,7 @@ def write_compare_report(
 
 
 def compare_headlines(comparison: Comparison) -> list[Headline]:
-    """Return the frozen error of the best methods on recordings that they did not learn on.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the frozen error of the best methods on recordings that they did not learn on."""
     numbers = []
     elsewhere = len(comparison.names) > 1
     for name in ranking(comparison):
@@ -103,12 +92,7 @@ def compare_headlines(comparison: Comparison) -> list[Headline]:
 
 
 def compare_warnings(comparison: Comparison) -> list[str]:
-    """Return what speaks against a comparison.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return what speaks against a comparison."""
     vehicle = comparison.course.vehicle
     said = [f"{vehicle.estimates}."] if vehicle.estimates else []
     if comparison.course.by_motion:

@@ -40,17 +40,7 @@ def write_fleet_report(
     *,
     command: str,
 ) -> None:
-    """Write what a store holds.
-
-    Parameters
-    ----------
-    folder : where to.
-    store : its address.
-    rows : of all logs.
-    groups : merged models.
-    watched : what was seen of the cars over time.
-    command : as it was typed.
-    """
+    """Write what a store holds."""
     learnt = [row for row in rows if not row.error]
     refused = [row for row in learnt if row.valid is False]
     hours = sum(row.seconds or 0.0 for row in learnt) / 3600.0
@@ -99,15 +89,7 @@ def write_fleet_report(
 
 
 def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str) -> None:
-    """Write whose tires changed.
-
-    Parameters
-    ----------
-    folder : where to.
-    store : its address.
-    watched : what was seen.
-    command : as it was typed.
-    """
+    """Write whose tires changed."""
     lasting = [alarm for alarm in watched.alarms if not alarm.ended]
     report = Report(
         title=f"Changes in the fleet of {store}",
@@ -127,12 +109,7 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
 
 
 def watch_blocks(watched: Watch) -> list[Block]:
-    """Return what was seen over time, as table and figures.
-
-    Parameters
-    ----------
-    watched : what was seen.
-    """
+    """Return what was seen over time, as table and figures."""
     told = f"{len(watched.seen)} cars were driven beyond their baseline"
     short = f"; {len(watched.short)} were not, and are not watched yet" if watched.short else ""
     blocks: list[Block] = [Paragraph(text=f"{told}{short}.")]

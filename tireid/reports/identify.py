@@ -68,15 +68,8 @@ def write_identify_report(
 
     Parameters
     ----------
-    folder : where to.
-    law : what learnt, as the user named it.
-    runs : online, the one that was learnt on first.
     frozen : by when it was frozen, replays by recording; the last is of the model.
-    figures : by the name of their files.
-    verdict : on the model.
     parts : of the first run, over each of several logs that were learnt on.
-    diagnosis : of what was learnt on, as it was read.
-    command : as it was typed.
     asked : verdicts on the model over the drives that it was not learnt on, by recording.
     """
     learnt, last = runs[0], list(frozen.values())[-1]
@@ -149,12 +142,7 @@ def _how_learnt(learnt: History) -> str:
 
 
 def side_slip_text(learnt: History) -> str:
-    """Return how well a run knew side slip, where it tells it; else nothing.
-
-    Parameters
-    ----------
-    learnt : the run.
-    """
+    """Return how well a run knew side slip, where it tells it; else nothing."""
     if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
         return ""
     moves = learnt.recording.v_x >= learnt.design.min_speed
@@ -167,13 +155,7 @@ def side_slip_text(learnt: History) -> str:
 def identify_headlines(
     model: TireModel, runs: Sequence[History], replays: Mapping[str, Replay]
 ) -> list[Headline]:
-    """Return the errors of a frozen model, other drives first, and up to which slip it knows.
-
-    Parameters
-    ----------
-    runs : online, the one that was learnt on first.
-    replays : of the model, by recording.
-    """
+    """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers = []
     for kind, some in (("not learnt on", runs[1:]), ("learnt on", runs[:1])):
         shares = [share for run in some if (share := _share(run, replays)) is not None]
@@ -187,12 +169,7 @@ def identify_headlines(
 
 
 def asked_headlines(asked: Mapping[str, Verdict]) -> list[Headline]:
-    """Return on how many drives that it was not learnt on a model is valid, and what it misses.
-
-    Parameters
-    ----------
-    asked : verdicts on the model, by recording.
-    """
+    """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
     if not asked:
         return []
     valid = sum(verdict.valid for verdict in asked.values())
@@ -212,7 +189,6 @@ def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> Picture:
 
     Parameters
     ----------
-    figures : by the name of their files.
     verdict : on the model; of a refused one the caption says so.
     """
     refused = "" if verdict.valid else "NOT VALID. "
@@ -229,12 +205,7 @@ def _share(run: History, replays: Mapping[str, Replay]) -> float | None:
 
 
 def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
-    """Return what speaks against a frozen model: divergence, extrapolation, no truth.
-
-    Parameters
-    ----------
-    runs : online, the one that was learnt on first.
-    """
+    """Return what speaks against a frozen model: divergence, extrapolation, no truth."""
     said = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
     for run in runs:
         name, recording = run.recording.name, run.recording
@@ -252,12 +223,7 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
 
 
 def asked_warnings(model: TireModel, recording: Recording) -> list[str]:
-    """Return what speaks against a stored model over a drive beside the verdict.
-
-    Parameters
-    ----------
-    recording : that it is asked about.
-    """
+    """Return what speaks against a stored model over a drive beside the verdict."""
     estimated = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
     return [*estimated, *_extrapolated(model, recording)]
 
@@ -276,13 +242,7 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
 
 
 def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[Block]:
-    """Return the numbers and the figures of a frozen model.
-
-    Parameters
-    ----------
-    law : what learnt, as the user named it.
-    figures : by the name of their files.
-    """
+    """Return the numbers and the figures of a frozen model."""
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[Block] = [
         Paragraph(
@@ -309,12 +269,7 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
 
 
 def band_sentence(model: TireModel) -> str:
-    """Return how wide the band is where slip is known, in words; empty where there is none.
-
-    Parameters
-    ----------
-    model : frozen, its band calibrated or not.
-    """
+    """Return how wide the band is where slip is known, in words; empty where there is none."""
     known = model.known_slip
     half = None if known is None else model.half_band(known)
     if known is None or half is None or not (known > 0.0).all():

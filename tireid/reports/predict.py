@@ -54,13 +54,7 @@ def write_predict_report(
 
     Parameters
     ----------
-    folder : where to.
-    prediction : of a drive by a stored model.
-    verdict : on the model over that drive.
-    figures : by the name of their files.
     told : what the command prints, lines of text without a table.
-    source : file of the model.
-    command : as it was typed.
     """
     model, recording = prediction.model, prediction.recording
     notes: list[str | Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
@@ -105,12 +99,7 @@ def write_predict_report(
 
 
 def predict_headlines(prediction: Prediction) -> list[Headline]:
-    """Return what is missed of the true force, explained of the motion, and the known slip.
-
-    Parameters
-    ----------
-    prediction : of a drive.
-    """
+    """Return what is missed of the true force, explained of the motion, and the known slip."""
     numbers = []
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     if error is not None and size is not None and min(size.front, size.rear) > 0.0:
