@@ -64,9 +64,7 @@ def run(case: Case) -> Run:
 
 
 @cache
-def learnt_before(
-    mu: float, seed: int, *, paper: bool = False, caution: float = 0.0
-) -> TireModel:
+def learnt_before(mu: float, seed: int, *, paper: bool = False, caution: float = 0.0) -> TireModel:
     """Return what the command learns before it drives: the same on every path.
 
     Parameters

@@ -5,8 +5,9 @@
 drives, as `tireid drive --fault` does with its defaults, 0.4 laps of the handling course and ISO
 3888-1 at 90 % of the limit of grip with each of 34 faults, which begin at three times, on frozen
 tires, on those that go on learning, and on frozen tires with `--caution 1`. Each time has a seed of
-its own, of noise and of the drive to learn on. The tolerances of the sensors' agreement were chosen on ISO 3888-2 and the slalom.
-Drives without a fault, at 90 % and 97 % and on half the friction too, count alarms that are false.
+its own, of noise and of the drive to learn on. The tolerances of the sensors' agreement were chosen
+on ISO 3888-2 and the slalom, those of caution on three of these drives. Drives without a fault, at
+90 % and 97 % and on half the friction too, count alarms that are false.
 
 A fault is noticed where learning says that there is a sensor fault. One that shows nothing wrong
 meanwhile (a steering that is scaled on a straight) cannot be: it is noticed where it shows.
@@ -240,7 +241,9 @@ def judge(rows: list[Row], quiet: list[Outcome], targets: Targets) -> None:
     """
     label = "drives that learning leaves the path in and frozen tires do not"
     targets.at_most(label, sum(row.worse(LEARNING) for row in rows), 0, "", key="worse")
-    label = f"drives that caution leaves the path in, or passes {WITHIN:g} m, and frozen tires do not"
+    label = (
+        f"drives that caution leaves the path in, or passes {WITHIN:g} m, and frozen tires do not"
+    )
     worse = sum(row.worse(CAUTIOUS, WITHIN) for row in rows)
     targets.at_most(label, worse, 0, "", key="worse_cautious")
     for channel in dict.fromkeys(row.channel for row in rows):

@@ -101,8 +101,8 @@ typedef struct {
     tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
     tireid_mpc_real commands[TIREID_MPC_COMMANDS]; /* steering [rad], the last one first */
     tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
-    tireid_mpc_real zero;     /* of the wheels over what is commanded [rad], without caution none */
-    tireid_mpc_real drift;    /* across the path beyond heading and v_y, that is planned with [m/s] */
+    tireid_mpc_real zero;  /* of the wheels over what is commanded [rad], without caution none */
+    tireid_mpc_real drift; /* across the path beyond heading and v_y, that is planned with [m/s] */
     tireid_mpc_real turning;  /* beyond the yaw rate, that is planned with [rad/s] */
     tireid_mpc_real apart[2]; /* both as position and heading show them now [m/s, rad/s] */
     tireid_mpc_real stays[2]; /* what of that stays */

@@ -19,7 +19,6 @@ from mpc.loop import Measured
 from tireid.commands.drive_case import conditions_of, parse_fault
 from tireid.driving.runs import FROZEN, LEARNING
 
-
 KEPT, LEFT = Outcome(True, 0.1, (), 20.0), Outcome(False, 2.0, (), 12.0)
 
 

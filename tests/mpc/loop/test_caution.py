@@ -1,4 +1,4 @@
-"""A road that turns slippery, and sensors that fail, where the tracker has the tires of the dry road."""
+"""A road that turns slippery, and sensors that fail, on tires of the dry road."""
 
 import math
 

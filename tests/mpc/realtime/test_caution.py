@@ -171,7 +171,9 @@ def watch(s, p, m, axles):
         rate = force - masses * v_x * r
         missed[j] = (shown - impulse[j] - PERIOD * rate) / FOLLOWED
         at = np.abs(s["slips"][j]) / grip / DOUBT_STEP
-        doubt = [np.interp(a, np.arange(N_DOUBTS), row) for a, row in zip(at, p["doubt"], strict=True)]
+        doubt = [
+            np.interp(a, np.arange(N_DOUBTS), row) for a, row in zip(at, p["doubt"], strict=True)
+        ]
         expected = p["force_error"] + np.array(doubt) * grip / 1.645
         squares[j] = np.minimum((missed[j] / expected) ** 2, CLIP).sum()
         impulse[j] += PERIOD * (rate + missed[j])
