@@ -130,8 +130,8 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     single : whether numbers are float.
     """
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    counts = (*solution, "age", "planned", "guessed", "started")
-    counts = (*counts, "gentle", "placed", "watched", "doubted")
+    watch = ("gentle", "placed", "watched", "doubted")
+    counts = (*solution, "age", "planned", "guessed", "started", *watch)
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),
