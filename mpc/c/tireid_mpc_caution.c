@@ -39,7 +39,7 @@
 
 #define SHOWN TIREID_MPC_C(0.2)        /* time in which it shows what v_y is off [s] */
 #define TURNED TIREID_MPC_C(0.07)      /* and what the yaw rate is: headings are less noisy [s] */
-#define ASTRAY TIREID_MPC_C(0.5)       /* m, rad: a place that is another one, of another path */
+#define ASTRAY TIREID_MPC_C(0.25)      /* m, rad: a place that is another one, of another path */
 #define ACROSS TIREID_MPC_C(0.15)      /* that v_y and position of good sensors are apart [m/s] */
 #define AROUND TIREID_MPC_C(0.04)      /* that yaw rate and heading are [rad/s] */
 #define SWAYS TIREID_MPC_C(0.2)        /* noise from one v_y to the next of good sensors [m/s] */

@@ -141,7 +141,7 @@ def watch(s, p, m, axles):
     )
     way, seen = 0.5 * PERIOD * (moves + s["apart"]), np.array([m.e_y, m.e_psi])
     error = seen - s["place"] - way
-    begins = (np.abs(error) > 0.5) | (s["watched"] == 0)
+    begins = (np.abs(error) > 0.25) | (s["watched"] == 0)
     place = s["place"] + 2.0 * way + 2.0 * PERIOD / SHOWN * error
     s["place"] = np.where(begins, seen + way, place)
     apart = np.clip(s["apart"] + PERIOD / SHOWN**2 * error, -MOST, MOST)
@@ -219,7 +219,7 @@ def test_the_watch_follows_its_equations(lagging, caution):
         kappa, v_x, wild = 0.006 * np.sin(0.05 * k), 20.0 + 2.0 * np.sin(0.02 * k), 100 < k < 140
         r, v_y = kappa * v_x - 1.5 * e_psi - 0.1 * e_y, 0.3 * np.sin(0.07 * k)
         noise = rng.normal(0.0, [0.003, 0.0003, 0.01, 0.002]) + wild * np.array([0, 0, 0.6, 0.2])
-        jump = 0.7 * (k == 200)
+        jump = 0.4 * (k == 200)
         told = np.array([e_y + jump, e_psi, v_y, r]) + noise
         m = Measurement(*map(float, told), np.full(21, kappa), np.full(21, v_x))
         expected = watch(kept(tracker), params, m, axles)
