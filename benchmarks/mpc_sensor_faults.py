@@ -6,7 +6,7 @@ drives, as `tireid drive --fault` does with its defaults, 0.4 laps of the handli
 3888-1 at 90 % of the limit of grip with each of 34 faults, which begin at three times, on frozen
 tires, on those that go on learning, and on frozen tires with `--caution 1`. Each time has a seed of
 its own, of noise and of the drive to learn on. The tolerances of the sensors' agreement were chosen
-on ISO 3888-2 and the slalom, those of caution on three of these drives. Drives without a fault, at
+on ISO 3888-2 and the slalom, those of caution on some of these drives. Drives without a fault, at
 90 % and 97 % and on half the friction too, count alarms that are false.
 
 A fault is noticed where learning says that there is a sensor fault. One that shows nothing wrong

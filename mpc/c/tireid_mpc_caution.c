@@ -37,10 +37,10 @@
 #define LASTING TIREID_MPC_C(3.0)   /* and in the end; between them as long as it was looked for */
 #define MOST_ZERO TIREID_MPC_C(0.1) /* of it [rad] */
 
-#define SHOWN TIREID_MPC_C(0.2)        /* time in which it shows what v_y is off [s] */
+#define SHOWN TIREID_MPC_C(0.14)       /* time in which it shows what v_y is off [s] */
 #define TURNED TIREID_MPC_C(0.07)      /* and what the yaw rate is: headings are less noisy [s] */
 #define ASTRAY TIREID_MPC_C(0.25)      /* m, rad: a place that is another one, of another path */
-#define ACROSS TIREID_MPC_C(0.15)      /* that v_y and position of good sensors are apart [m/s] */
+#define ACROSS TIREID_MPC_C(0.2)       /* that v_y and position of good sensors are apart [m/s] */
 #define AROUND TIREID_MPC_C(0.04)      /* that yaw rate and heading are [rad/s] */
 #define SWAYS TIREID_MPC_C(0.2)        /* noise from one v_y to the next of good sensors [m/s] */
 #define TURNS TIREID_MPC_C(0.02)       /* and from one yaw rate [rad/s] */
