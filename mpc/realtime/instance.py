@@ -130,7 +130,8 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     single : whether numbers are float.
     """
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    counts = (*solution, "age", "planned", "guessed", "started", "gentle", "watched", "doubted")
+    watch = ("gentle", "placed", "watched", "doubted")
+    counts = (*solution, "age", "planned", "guessed", "started", *watch)
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),
@@ -141,6 +142,9 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
             ("zero", real),
             ("drift", real),
             ("turning", real),
+            ("apart", real, (2,)),
+            ("stays", real, (2,)),
+            ("last", real, (2,)),
             ("place", real, (2,)),
             ("grip", real),
             ("cost", real, (N_GRIPS,)),
