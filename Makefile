@@ -13,8 +13,8 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test heavy lint format types tests docs bench mutants fuzz fuzz-c numbers reference newest lowest lock wheel \
-	clean
+.PHONY: demo test bare heavy lint format types tests docs bench mutants fuzz fuzz-c numbers reference newest lowest lock \
+	wheel clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -27,9 +27,15 @@ tests: $(VENV)/.test
 	$(PY) -m pytest -n auto --dist worksteal -m "not heavy"
 
 # Each core has a process of its own: a second thread of each for algebra would only wait.
-tests heavy: export OPENBLAS_NUM_THREADS := 1
+tests bare heavy: export OPENBLAS_NUM_THREADS := 1
 # The same bits, and the compiler is done sooner with what is long; sweeps run what users run.
-tests: export TIREID_OPTIMIZE := 1,0
+tests bare: export TIREID_OPTIMIZE := 1,0
+
+# As on a fresh machine, which has Python and gcc: tests that ask for other tools (cmake, clang, compilers for Arm
+# and Windows, QEMU, ...), with these hidden. Each passes, or is skipped and says what it needs.
+bare: $(VENV)/.test
+	$(PY) -m tests.optional_tools $(PY) -m pytest -n auto --dist worksteal -m "not heavy" \
+		$$(cat tests/optional_tools.txt)
 
 # The sweeps that tests/heavy.toml lists.
 heavy: $(VENV)/.test

@@ -79,7 +79,7 @@ def force_error(tire: ti.TireModel, recording: Recording) -> Pair:
     tire : that is asked.
     recording : with true forces.
     """
-    told = ti.replay(tire, recording)
+    told = ti.replay(recording, tire)
     assert told.against_truth is not None and told.true_force is not None
     missed, size = told.against_truth, told.true_force
     return 100.0 * missed.front / size.front, 100.0 * missed.rear / size.rear
@@ -110,7 +110,7 @@ def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
         with _warnings() as said:
             run, let_in = _run(blind(log), told)
         tire = run.freeze()
-        verdict = run.verdict() if let_in else None
+        verdict = run.verdict if let_in else None
         stiffness = tire.stiffness
         assert stiffness is not None
         missed = force_error(tire, judged)
@@ -150,7 +150,7 @@ def _run(log: Recording, told: Vehicle) -> tuple[ti.History, bool]:
     signals = {name: getattr(log, of) for name, of in COLUMNS.items()}
     table = {name: signal for name, signal in signals.items() if signal is not None}
     try:
-        read = ti.Recording.from_dataframe(table, name=log.name, dt=log.dt)
+        read = ti.read_recording(table, name=log.name, dt=log.dt)
         return ti.identify(read, told), True
     except RecordingError:
         return ti.identify(log, told, check=False), False

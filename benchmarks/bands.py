@@ -39,7 +39,7 @@ from identifier.export.package import build_package, synthetic_samples
 from identifier.export.processor import PROCESSORS, missing_tools, replay_on
 from identifier.run import identify
 from identifier.tire_model import AXLES
-from identifier.verdict import within_band
+from identifier.verdict import calibrated, within_band
 from identifier.verdict.motion import evidence
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
@@ -95,7 +95,7 @@ def learnt(log: Recording, car: Vehicle) -> Taught:
     car : as it is told.
     """
     run = identify(blind(log), car, AxleIdentifier.for_vehicle(car, dt=log.dt))
-    model = run.calibrated()
+    model = calibrated(run)
     assert isinstance(model, AxleModel)
     found = evidence(model, run.recording)
     assert found is not None

@@ -8,7 +8,8 @@ number above it, in their order:
     script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
                      tireid_paper has those of the tables that a test computes again, house
                      what docs/house.py counts of the code, fault_table_before what
-                     fault_table.py measured at the commit that the file names
+                     fault_table.py measured at the commit that the file names, mpc_speed_before
+                     instructions of a step there, and at the end
     key              measured: the number is the recorded value, rounded as it is printed
     key*1e3          times a factor, where the document has another unit
     key~3            rounded to three significant digits, as in 60 800
@@ -20,19 +21,24 @@ number above it, in their order:
 Code, names (C99, x86-64, ISO 3888-2), targets of links and other comments hold no numbers.
 `python -m benchmarks.documents` writes the recorded values into README.md and docs, so that nobody
 types them; it returns 1 where a number has no source. `--check` writes nothing.
+After the comment `<!-- older -->` it writes which records measured other code than that of today
+(`benchmarks/fingerprint.py`), up to the next empty line.
 """
 
 import argparse
+import difflib
 import itertools
 import json
 import re
 import sys
+import textwrap
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from benchmarks.fingerprint import OWN, changed
 from benchmarks.targets import RESULTS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -40,6 +46,7 @@ COMMITTED = {
     "tireid_paper": ROOT / "tests" / "tireid" / "expected_tables.json",
     "house": ROOT / "docs" / "house.json",
     "fault_table_before": ROOT / "benchmarks" / "fault_table_before.json",
+    "mpc_speed_before": ROOT / "benchmarks" / "mpc_speed_before.json",
 }
 REASONS = ("input", "target", "definition", "formula", "paper", "standard", "version", "name")
 Values = Mapping[str, Mapping[str, float | int | str]]  # by script, by key
@@ -52,6 +59,7 @@ NUMBER = re.compile(
     r"(?:(?<![\w.)\]])[-−])?(?<![\w.])"  # a sign is one where nothing stands before it
     r"(?:\d+:\d+|\d+(?:\.\d+){2,}|\d{1,3}(?: \d{3})+(?!\d)|\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 )
+OLDER = re.compile(r"(?<=^<!-- older -->\n)(?:[^\n]+\n)*", re.M)
 GIVEN = re.compile(r"(\w+)=(\S+)")
 MEASURED = re.compile(r"([^\s*~=:]+?)(?:\*([\d.e+-]+))?(?:~(\d+))?")
 
@@ -340,6 +348,56 @@ def flat(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, float 
             yield f"{above}{key}", value
 
 
+def older(folder: Path = RESULTS, root: Path = ROOT) -> dict[str, tuple[str, ...]]:
+    """Return the records that are older than the code that they measured: which packages changed.
+
+    Parameters
+    ----------
+    folder : of the JSON files.
+    root : of the checkout.
+
+    Returns
+    -------
+    By script; those whose code is that of today are left out.
+    """
+    found = {}
+    for path in sorted(folder.glob("*.json")):
+        code = json.loads(path.read_text(encoding="utf-8")).get("code", {})
+        if since := changed(code, path.stem, root):
+            found[path.stem] = since
+    return found
+
+
+def quoted(text: str) -> set[str]:
+    """Return the scripts whose records a document quotes.
+
+    Parameters
+    ----------
+    text : Markdown.
+    """
+    return {item.script for mark in marks(text) for item in read_items(mark.items) if item.script}
+
+
+def listed(text: str, stale: Mapping[str, tuple[str, ...]]) -> str:
+    """Return a document whose list of older records is the right one.
+
+    Parameters
+    ----------
+    text : Markdown.
+    stale : which packages changed, by script, as of `older`.
+    """
+    other = [f"`{name}`" for name, packages in stale.items() if OWN in packages]
+    same = [f"`{name}`" for name, packages in stale.items() if OWN not in packages]
+    words = (
+        f"- by another script than that of today: {', '.join(other) or 'none'};",
+        f"- by the script of today, on earlier packages: {', '.join(same) or 'none'}.",
+    )
+    lines = [
+        textwrap.fill(one, 110, subsequent_indent="  ", break_on_hyphens=False) for one in words
+    ]
+    return OLDER.sub("\n".join(lines) + "\n", text)
+
+
 def documents(root: Path = ROOT) -> list[Path]:
     """Return README.md and every Markdown file below docs.
 
@@ -359,20 +417,21 @@ def main(argv: list[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(description="Write recorded values into README.md and docs.")
     parser.add_argument("--check", action="store_true", help="write nothing")
-    check, values, bad = parser.parse_args(argv).check, recorded(), 0
+    check, values, bad, stale = parser.parse_args(argv).check, recorded(), 0, older()
     for path in documents():
         old = path.read_text(encoding="utf-8")
-        new = old if check else rewritten(old, values)
+        new = old if check else listed(rewritten(old, values), stale)
         name = path.relative_to(ROOT)
         if new != old:
             path.write_text(new, encoding="utf-8")
-            lines = zip(old.splitlines(), new.splitlines(), strict=True)
-            for line, (before, after) in enumerate(lines, start=1):
-                if before != after:
-                    print(f"{name}:{line}\n- {before}\n+ {after}")
+            before, after = old.splitlines(), new.splitlines()
+            told = difflib.unified_diff(before, after, name.as_posix(), lineterm="", n=0)
+            print("\n".join(told))
         for at, what in complaints(new, values):
             bad += 1
             print(f"{name}:{new.count(chr(10), 0, at) + 1}: {what}")
+    for script, packages in stale.items():
+        print(f"{script}: recorded before {', '.join(packages)} changed")
     return 1 if bad else 0
 
 

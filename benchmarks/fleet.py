@@ -1,9 +1,12 @@
 """A fleet: speed, merging, priors, what the watch finds, and a cluster that loses a worker.
 
-    python -m benchmarks.fleet [--only speed hours merge prior watch cluster] [--record]
+    python -m benchmarks.fleet [--only speed hours store merge prior watch cluster] [--record]
 
-speed    500 logs of 60 s, CSV, by `tireid fleet learn`: everyday drives, each some times over.
-hours    1000 h in Parquet files of an hour, all of them one file's content under other names.
+speed    500 logs of 60 s, CSV, by `tireid fleet learn`: everyday drives, each some times over, with
+         as many empty lines behind as make them different.
+hours    30 h in Parquet files of an hour, the same drives in each; 1000 h are told from them.
+store    100 000 rows that differ, of 50 cars: `tireid fleet merge` and what it holds, beside what
+         it holds of 1000.
 merge    random cars of four classes, six drives each: information of drives against that of all of
          them as one recording, at one reference (the prior); and the merged model, each drive at
          its own, against the model learnt over all drives in a row and against least squares at
@@ -54,11 +57,12 @@ from tireid.fleet.merge import fleet_prior, merge
 from tireid.fleet.store import LogRow, Store
 from tireid.fleet.watch import Watch, Watching, watch
 
-PARTS = ("speed", "hours", "merge", "prior", "watch", "cluster")
+PARTS = ("speed", "hours", "store", "merge", "prior", "watch", "cluster")
 LOGS, MINUTE = 500, 60.0
-HOURS = 1000
+HOURS, DRIVEN_HOURS = 1000, 30
+ROWS, FEW, ROW_CARS = 100_000, 1000, 50
 DISTINCT = 20  # drives that logs are made of
-DRIVEN = 40  # cars of the watched fleet that are driven
+DRIVEN = 24  # cars of the watched fleet that are driven
 CARS, AFTER = 500, 120  # cars, minutes of each after its baseline
 BASELINE, LATER, SOFTER, FAULTY = 20, 20, 12, 6  # minutes that are driven of a car
 LOSES = 5  # one of so many cars loses stiffness,
@@ -116,6 +120,16 @@ def run_learn(logs: str, folder: Path, jobs: int) -> Spent:
     """
     words = ["fleet", "learn", logs, "--vehicle", str(folder / "car.toml")]
     words += ["--out", str(folder / "store"), "--jobs", str(jobs)]
+    return run_command(words)
+
+
+def run_command(words: Sequence[str]) -> Spent:
+    """Run `tireid`; return what it took.
+
+    Parameters
+    ----------
+    words : behind its name.
+    """
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     command = subprocess.Popen([sys.executable, "-m", "tireid", *words], start_new_session=True)
     most = [0.0]
@@ -173,7 +187,9 @@ def speed(targets: Targets, jobs: int, count: int) -> None:
         for log in drives_of(car, DISTINCT, rng):
             texts.append(write_recording(log, folder / "one.csv").read_bytes())
         for k in range(count):
-            (folder / "logs" / f"{k:05d}.csv").write_bytes(texts[k % DISTINCT])
+            (folder / "logs" / f"{k:05d}.csv").write_bytes(
+                texts[k % DISTINCT] + b"\n" * (k // DISTINCT)
+            )
         spent = run_learn(str(folder / "logs" / "*.csv"), folder, jobs)
     show("processor time", f"{spent.processor:.1f} s")
     targets.at_most(f"{count} logs of 60 s, CSV", spent.seconds, 25.0, "s", "speed/seconds")
@@ -206,9 +222,10 @@ def hours(targets: Targets, jobs: int, count: int) -> None:
         }
         columns["t"] = 0.01 * np.arange(columns["r"].size)
         (folder / "logs").mkdir()
-        pyarrow.parquet.write_table(pyarrow.table(columns), folder / "hour.parquet")
+        table = pyarrow.table(columns)
         for k in range(count):
-            os.link(folder / "hour.parquet", folder / "logs" / f"{k:05d}.parquet")
+            path = folder / "logs" / f"{k:05d}.parquet"
+            pyarrow.parquet.write_table(table.replace_schema_metadata({"hour": str(k)}), path)
         spent = run_learn(str(folder / "logs" / "*.parquet"), folder, jobs)
     per_thousand = spent.seconds / 60.0 * HOURS / count
     show("processor time", f"{spent.processor:.1f} s for {count} h")
@@ -216,6 +233,51 @@ def hours(targets: Targets, jobs: int, count: int) -> None:
     targets.at_most("held by all processes", spent.held, 1.0, "GB", "hours/held")
     targets.record("hours/processor", spent.processor, "s")
     targets.record("hours/driven", count)
+
+
+def stored(targets: Targets, count: int) -> None:
+    """Measure what merging a store takes and holds.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    count : rows.
+    """
+    rng = np.random.default_rng(FIRST_SEED)
+    car = random_car("sedan", rng)
+    row = row_of(drives_of(car, 1, rng)[0], car, "", 0)
+    spent = {}
+    with in_folder() as folder:
+        for name, number in (("few", FEW), ("all", count)):
+            store = Store(str(folder / name))
+            for first in range(0, number, FEW):
+                store.keep([_altered(row, k, rng) for k in range(first, first + FEW)])
+            store.settle()
+            words = ["fleet", "merge", str(folder / name), "--by", "vehicle"]
+            spent[name] = run_command([*words, "--all", "--out", str(folder / f"{name}-merged")])
+    grown = 1000.0 * (spent["all"].held - spent["few"].held)
+    targets.at_most(
+        f"merge of {count} rows, beyond that of {FEW}", grown, 200.0, "MB", "store/grown"
+    )
+    targets.record("store/held", 1000.0 * spent["all"].held, "MB")
+    targets.record("store/seconds", spent["all"].seconds, "s")
+    targets.record("store/rows", count)
+
+
+def _altered(row: LogRow, k: int, rng: np.random.Generator) -> LogRow:
+    """A row of another log: its numbers a little others, so that they take their room on disk."""
+    factor = 1.0 + 0.01 * rng.standard_normal()
+    name = f"car-{k % ROW_CARS:02d}"
+    matrix, vector = factor * np.asarray(row.matrix), factor * np.asarray(row.vector)
+    return replace(
+        row,
+        log=f"/logs/{name}/{k:06d}.csv",
+        content=hashlib.blake2b(str(k).encode(), digest_size=16).hexdigest(),
+        vehicle=name,
+        matrix=matrix.tolist(),
+        vector=vector.tolist(),
+        model=row.model + rng.bytes(1000).hex(),
+    )
 
 
 # Merging and priors.
@@ -324,9 +386,7 @@ def row_of(log: Recording, car: RandomCar, name: str, k: int) -> LogRow:
     k : number of the log, a minute apart.
     """
     date = np.datetime_as_string(np.datetime64("2026-01-01T00:00") + np.timedelta64(k, "m"))
-    row = LogRow(
-        log=f"{name}-{k:04d}", setting="", size=0, vehicle=name, tires="", date=str(date), tags="{}"
-    )
+    row = LogRow(log=f"{name}-{k:04d}", vehicle=name, date=str(date))
     return learnt(row, log, car.told, Telling(log_map=LogMap()))
 
 
@@ -587,7 +647,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--logs", type=int, default=LOGS)
-    parser.add_argument("--hours", type=int, default=HOURS)
+    parser.add_argument("--hours", type=int, default=DRIVEN_HOURS)
+    parser.add_argument("--rows", type=int, default=ROWS)
     parser.add_argument("--cars", type=int, default=DRIVEN)
     options = parser.parse_args(argv)
     targets = Targets("fleet")
@@ -595,6 +656,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         speed(targets, options.jobs, options.logs)
     if "hours" in options.only:
         hours(targets, options.jobs, options.hours)
+    if "store" in options.only:
+        stored(targets, options.rows)
     if "merge" in options.only:
         merging(targets, max(options.cars // 4, 1))
     if "prior" in options.only:

@@ -2,7 +2,7 @@
 
     python -m benchmarks.guaranteed [--each N] [--drives N] [--first SEED] [--record]
 
-Random cars of four classes learn on a drive with good sensors, and `run.guaranteed()` states which
+Random cars of four classes learn on a drive with good sensors, and `run.guarantee()` states which
 forces they can have, by the motion alone. Then other random drives of each, of other speeds: one
 counts as outside where at any instant the true force of an axle is outside of `guaranteed_force`,
 known slip or not, with exact signals, as the band says nothing of sensors. Half the width of the
@@ -33,6 +33,7 @@ from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.ellipsoid import outer_ellipsoid
 from identifier.axle.guarantee import Doubt, ForceBound, Strips, least_bound, prior_box
 from identifier.run import History, identify
+from identifier.verdict import guaranteed
 from identifier.verdict.guaranteed import strips_of
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
@@ -175,9 +176,9 @@ def plant_case(job: tuple[str, int, int]) -> Car | None:
         return None
     run = learnt(drive.log(np.random.default_rng([seed, 1])), drive.car.told)
     begin = time.process_time()
-    model = run.guaranteed()
+    model = guaranteed(run)
     seconds = time.process_time() - begin
-    told = run.guaranteed(true_bound(run, exact))
+    told = guaranteed(run, true_bound(run, exact))
     assert isinstance(model, AxleModel) and isinstance(told, AxleModel)
     models = {"estimated": model, "told": told}
     each = [asked(models, one, STRAIGHT) for one in exact]
@@ -190,7 +191,7 @@ def carmaker_cases() -> dict[str, Asked]:
     runs = [read_recording(DATA / "carmaker.csv.gz", run=name) for name in RUNS]
     found = {}
     for taught, other in (runs, runs[::-1]):
-        model = learnt(taught, CARMAKER).guaranteed()
+        model = guaranteed(learnt(taught, CARMAKER))
         assert isinstance(model, AxleModel)
         found[other.name.split(":")[-1].split("_")[0]] = asked({"": model}, other, 1.0)[""]
     return found

@@ -64,7 +64,7 @@ def run(case: Case) -> Run:
 
 
 @cache
-def learnt_before(mu: float, seed: int, *, paper: bool = False) -> TireModel:
+def learnt_before(mu: float, seed: int, *, paper: bool = False, caution: float = 0.0) -> TireModel:
     """Return what the command learns before it drives: the same on every path.
 
     Parameters
@@ -72,8 +72,10 @@ def learnt_before(mu: float, seed: int, *, paper: bool = False) -> TireModel:
     mu : friction.
     seed : of noise and steering.
     paper : by the network and the law of the paper.
+    caution : of the drive; with it the band of the forces is calibrated.
     """
-    words = ["--mu", f"{mu:g}", "--seed", str(seed), *(["--paper"] if paper else [])]
+    words = ["--mu", f"{mu:g}", "--seed", str(seed), "--caution", f"{caution:g}"]
+    words += ["--paper"] if paper else []
     options = options_of(words)
     _, learnt = frozen_tires(options, [FROZEN], conditions_of(options))
     assert learnt is not None
@@ -88,7 +90,7 @@ def drive_with(conditions: Conditions, label: str) -> Run:
     conditions : path, car, road and seed.
     label : of `tireid.driving.runs.TIRES`.
     """
-    learnt = (
-        None if label in (LINEAR, ORACLE) else learnt_before(conditions.setup.mu, conditions.seed)
-    )
+    setup, seed, caution = conditions.setup, conditions.seed, conditions.caution
+    known = label in (LINEAR, ORACLE)
+    learnt = None if known else learnt_before(setup.mu, seed, caution=caution)
     return run_drive(label, conditions, learnt)

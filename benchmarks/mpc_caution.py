@@ -172,7 +172,7 @@ def learnt(car: int, situation: str) -> TireModel:
         taught = recording(car, "learnt").between(0.0, SHORT)
     else:
         taught = recording(car, situation)
-    return identify(taught, vehicle_of(car), check=False).calibrated()
+    return identify(taught, vehicle_of(car), check=False).tire
 
 
 def is_timed(case: Case) -> bool:

@@ -20,7 +20,7 @@ int main(int argc, char *argv[])
     while (fread(head, sizeof head, 1, file) == 1) {
         double steering, difference;
         if ((head[0] == 2.0) && (fread(&params, sizeof params, 1, file) != 1)) return 2;
-        if (head[0] > 0.0) (void)mpc_reset(&state, head[1]);
+        if (head[0] > 0.0) (void)mpc_reset(&state, &params, head[1]);
         if (fread(&input, sizeof input, 1, file) != 1) return 2;
         failures += mpc_step(&state, &params, &work, &input, &steering) != MPC_OK;
         difference = fabs(steering - head[2]);

@@ -141,11 +141,11 @@ def run(seed: int) -> Ended:
         assert stiffness is not None
         if not (np.isfinite(stiffness).all() and (np.array(stiffness) > 0.0).all()):
             return Ended(seed, drive.car.kind, "stiffness that is none")
-        if seed % JUDGED == 0 and not is_sound(history.verdict()):
+        if seed % JUDGED == 0 and not is_sound(history.verdict):
             return Ended(seed, drive.car.kind, "verdict that is none")
     except Exception as error:
         return Ended(seed, drive.car.kind, f"{type(error).__name__}: {error}")
-    sound = np.isfinite(history.axle_force).all()
+    sound = np.isfinite(history.force).all()
     return Ended(seed, drive.car.kind, "" if sound else "force online that is not finite")
 
 

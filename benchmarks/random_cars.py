@@ -19,11 +19,11 @@ import numpy as np
 from codegen.arrays import Array
 from models.faults import Fault, Passing, SensorFault, Together
 from models.maneuvers import RandomSteer
-from models.plant import Plant, PlantError, PlantRun
+from models.plant import Driver, Plant, PlantError, PlantRun
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.tires import DugoffTire, FialaTire, MagicFormula, Tire
-from models.vehicle import GRAVITY, Chassis, Vehicle, sedan
+from models.vehicle import FULL_SIZE, GRAVITY, Chassis, Vehicle, sedan
 
 FIRST_SEED = 1000
 LIKE = sedan()  # to whose size noise and faults are told
@@ -127,6 +127,11 @@ class RandomCar:
         """The car, ready to drive."""
         return Plant(self.vehicle, self.tires[0], rear_tire=self.tires[1])
 
+    def pulling(self, most: float) -> Plant:
+        """Return the car under a driver who brakes and pulls with that acceleration [m/s^2]."""
+        front, rear = self.tires
+        return Plant(self.vehicle, front, rear_tire=rear, driver=Driver(acceleration_limit=most))
+
     @property
     def sensors(self) -> Sensors:
         """Good sensors of its size."""
@@ -207,6 +212,7 @@ def _chassis(drawn: CarClass, car: Vehicle, rng: np.random.Generator) -> Chassis
         relaxation_length_rear=rng.uniform(*drawn.relaxation) * L,
         steering_lag=0.03,
         drive_front_share=float(rng.choice([0.0, 0.5, 1.0])),
+        brake_front_share=0.62 if L >= FULL_SIZE else 0.5,
     )
 
 
@@ -363,7 +369,11 @@ class RandomDrive:
 
 
 def random_drive(
-    car: RandomCar, rng: np.random.Generator, beginning: Beginning | None = None
+    car: RandomCar,
+    rng: np.random.Generator,
+    beginning: Beginning | None = None,
+    *,
+    pull: float = 0.0,
 ) -> RandomDrive:
     """Return a drive that excites both axles and does not spin.
 
@@ -372,6 +382,8 @@ def random_drive(
     car : that drives.
     rng : source of speed and steering.
     beginning : None is a straight road of `LEAD` seconds.
+    pull : share of the grip with which the driver brakes and pulls in the corners at most; then an
+        accelerometer shows a_x too. With 0 he holds his speed.
 
     Raises
     ------
@@ -379,16 +391,20 @@ def random_drive(
         Where none of `DRAWS` drives is such.
     """
     begin = beginning if beginning is not None else Beginning()
-    vehicle = car.vehicle
+    vehicle, most = car.vehicle, pull * min(car.friction) * GRAVITY
+    plant = car.pulling(most) if pull else car.plant
     for _ in range(DRAWS):
         speed = rng.uniform(2.6, 4.5) * vehicle.froude_speed
         maneuver = random_steering(car, speed, begin.lead, rng)
         if maneuver is None:
             continue
+        wanted = _speed_over_time(begin, speed)
+        if pull:
+            wanted = _changing(wanted, car, speed, most, maneuver, rng)
         try:
-            run = car.plant.simulate(
+            run = plant.simulate(
                 maneuver,
-                speed=_speed_over_time(begin, speed),
+                speed=wanted,
                 bank=lambda t: begin.bank * np.clip(begin.lead - t, 0.0, 1.0),
                 name=f"{car.kind}, {begin.kind}",
             )
@@ -396,6 +412,8 @@ def random_drive(
             continue
         if is_good(car, run, begin, speed):
             exact = _after_rest(run.recording(), begin)
+            if pull and not begin.rest:
+                exact = replace(exact, a_x=run.a_x)
             return RandomDrive(car=car, beginning=begin, exact=exact, speed=speed)
     raise PlantError(f"{DRAWS} drives of a {car.kind} did not excite both axles without a spin")
 
@@ -434,6 +452,29 @@ def _speed_over_time(begin: Beginning, speed: float) -> Callable[[Array], Array]
     if begin.speed in ("standing", "reversing"):
         return lambda t: np.minimum(0.05 * speed + PULL * t, speed)
     return lambda t: np.full(t.size, speed)
+
+
+SLOWER, FASTER = -0.3, 0.15  # of the wanted speed, to which a driver brakes and pulls
+HELD = (1.0, 4.0)  # sqrt(L/g) for which he holds it then
+
+
+def _changing(
+    wanted: Callable[[Array], Array],
+    car: RandomCar,
+    speed: float,
+    most: float,
+    maneuver: RandomSteer,
+    rng: np.random.Generator,
+) -> Callable[[Array], Array]:
+    """Return a wanted speed that changes at random in the corners, by at most that [m/s²]."""
+    times, changes = [maneuver.onset], [0.0]
+    while times[-1] < maneuver.duration:
+        change = rng.uniform(SLOWER, FASTER) * speed
+        took = abs(change - changes[-1]) / (rng.uniform(0.5, 1.0) * most)
+        held = rng.uniform(*HELD) * car.vehicle.froude_time
+        times += [times[-1] + took, times[-1] + took + held]
+        changes += [change, change]
+    return lambda t: wanted(t) + np.interp(t, times, changes)
 
 
 def is_good(car: RandomCar, run: PlantRun, begin: Beginning, speed: float) -> bool:

@@ -122,7 +122,7 @@ def asked(
     ratio, change : friction, and when it comes [s].
     wrong : from when on the old curve is wrong [s].
     """
-    found = ti.replay(model, log).friction()
+    found = ti.replay(log, model).friction()
     if found is None:
         return None
     roads = found.roads
@@ -143,9 +143,7 @@ def case(job: tuple[str, int]) -> dict[str, list[Asked]]:
     lesson, rng = drawn(kind, seed), np.random.default_rng([seed, 77])
     car, log = lesson.car, blind(lesson.log(rng))
     logs = {"with_v_y": log, "without_v_y": replace(log, v_y=None)}
-    models = {
-        way: ti.identify(one, car.told, check=False).calibrated() for way, one in logs.items()
-    }
+    models = {way: ti.identify(one, car.told, check=False).tire for way, one in logs.items()}
     less = np.exp(rng.uniform(math.log(LESS[0]), math.log(LESS[1]), DROPS))
     told: dict[str, list[Asked]] = {way: [] for way in WAYS}
     for ratio in (*[1.0] * SAME, *less.tolist(), *rng.uniform(*MORE, RISES).tolist()):
@@ -203,7 +201,7 @@ def real_car(targets: Targets) -> None:
     """
     runs = {name: vicon for name, (_, vicon) in own_sensors().items()}
     taught: Mapping[str, ti.TireModel] = {
-        name: ti.identify(blind(run), DART, check=False).calibrated()
+        name: ti.identify(blind(run), DART, check=False).tire
         for name, run in runs.items()
         if name != TAPE
     }
@@ -215,7 +213,7 @@ def real_car(targets: Targets) -> None:
         for other, run in runs.items():
             if other == name:
                 continue
-            roads = ti.replay(model, blind(run))
+            roads = ti.replay(blind(run), model)
             found = roads.friction()
             told = () if found is None else found.roads
             print(f"  {name} asked about {other}: {'; '.join(one.text for one in told) or 'same'}")

@@ -26,7 +26,7 @@ import tireid as ti
 from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
-from identifier.reproducibility import predict
+from identifier.prediction import predict
 from models.logs.clock import Raw, sampled
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle

@@ -1,8 +1,9 @@
 """What a benchmark measured: numbers by key beside their targets, printed, and recorded.
 
 A number that README or docs quote is recorded here first: `Targets("mpc_worth")` collects under the
-name of the script, `finish` writes benchmarks/results/mpc_worth.json where it is asked to, and the
-documents name script and key. A missed target is printed, recorded, and an exit code of 1.
+name of the script, `finish` writes benchmarks/results/mpc_worth.json where it is asked to, with a
+hash of the code that it measured, and the documents name script and key. A missed target is
+printed, recorded, and an exit code of 1.
 """
 
 import json
@@ -10,6 +11,8 @@ import platform
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from benchmarks.fingerprint import fingerprint
 
 RESULTS = Path(__file__).resolve().parent / "results"
 MISSED = 1
@@ -111,6 +114,7 @@ class Targets:
             text = {
                 "script": f"benchmarks/{self.script}.py",
                 "machine": f"{platform.machine()}, Python {platform.python_version()}",
+                "code": fingerprint(self.script),
                 "missed": self.missed,
                 "met": self.met,
                 "units": self.units,

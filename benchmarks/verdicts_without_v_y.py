@@ -96,13 +96,13 @@ def answers(each: int, first: int, kind: str) -> list[Told]:
             log, known = faulty(own, car, fault, rng)
             end = float(log.t[0]) + TAUGHT * log.duration
             run = ti.identify(log.between(log.t[0], end), known, check=False)
-            asked = ti.replay(run.freeze(), log.between(end, log.t[-1]))
+            asked = ti.replay(log.between(end, log.t[-1]), run.freeze())
             assert asked.against_truth is not None and asked.true_force is not None
             missed = 100.0 * max(
                 asked.against_truth.front / asked.true_force.front,
                 asked.against_truth.rear / asked.true_force.rear,
             )
-            told.append(Told(kind, fault, missed, run.verdict().valid))
+            told.append(Told(kind, fault, missed, run.verdict.valid))
     return told
 
 

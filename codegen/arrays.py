@@ -29,8 +29,6 @@ def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
     Parameters
     ----------
     n : samples, the end of the last part.
-    first : sample to begin at.
-    overlap : samples by which a part reaches into the next.
     """
     size = BLOCK if n > LONG else max(n, 1)
     for begin in range(first, n, size):
@@ -40,12 +38,7 @@ def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
 
 
 def thinning(n: int) -> int:
-    """Return which sample is looked at where not all are: each one of at most `LONG`.
-
-    Parameters
-    ----------
-    n : samples.
-    """
+    """Return which sample is looked at where not all are: each one of at most `LONG`."""
     return -(-n // LONG)
 
 
@@ -54,10 +47,6 @@ def large(shape: tuple[int, ...]) -> Array:
 
     The file lies in the folder for temporary files (TMPDIR) and goes with the array. Where that
     folder has no room the array is in memory.
-
-    Parameters
-    ----------
-    shape : of the array.
     """
     size = 8 * int(np.prod(shape, dtype=np.int64))
     if size > IN_MEMORY:
@@ -75,9 +64,6 @@ def on_disk(
 
     Parameters
     ----------
-    file : which may be closed then.
-    dtype : of its numbers.
-    shape : of the array.
     mode : "r", or "w+" to make the file as large as that.
     """
     mapped = np.memmap(file, dtype, mode=mode, shape=shape)
@@ -106,7 +92,6 @@ def filled(n: int, compute: Callable[[slice], Array]) -> Array:
 
     Parameters
     ----------
-    n : samples.
     compute : returns the values of a part of them (k,).
     """
     values = large((n,))

@@ -55,14 +55,10 @@ def run_lanes(
 
     Parameters
     ----------
-    scan : the step and what its ports are.
     n : number of samples.
     values : of every input: (size,), (n, size) for one that is sampled, with a first axis of runs
         for those of `lanes_over`; contiguous.
-    lanes_over : inputs that differ from run to run.
     kept : samples to record, rising.
-    runs : how many there are.
-    workers : threads.
 
     Raises
     ------
@@ -115,7 +111,6 @@ def in_threads(work: Callable[[int, int], None], n: int, workers: int) -> None:
     Parameters
     ----------
     work : lets go of the interpreter's lock, as compiled code does.
-    n : how many there are.
     workers : threads; 1 stays in this one.
     """
     parts = min(n, PARTS * workers if workers > 1 else 1)
@@ -166,7 +161,6 @@ class BatchScan:
     ----------
     step : SX function with named, dense ports. An input `p` named in `carry` has an output
         `p_next` of the same shape. Its name becomes part of a C identifier.
-    carry : inputs whose value is handed from one sample to the next.
     over : inputs with one row a sample. Every other input is constant.
     lanes_over : inputs, of any kind, that differ from run to run; all runs share the others.
 

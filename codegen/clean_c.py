@@ -37,7 +37,6 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
 
     Parameters
     ----------
-    graph : of single operations.
     whole : False leaves our own functions as the scalars that they are made of.
     """
     if not whole:
@@ -231,7 +230,6 @@ def literal(value: float, prefix: str) -> str:
     Parameters
     ----------
     value : finite.
-    prefix : of the macro.
     """
     size = abs(value)
     in_float = math.copysign(min(max(size, FLOAT_MIN), FLOAT_MAX), value) if size else 0.0
@@ -254,10 +252,8 @@ class Statements:
     Parameters
     ----------
     graph : the scalars; choices and our own functions are nodes.
-    prefix : of every function and macro.
     read : C expression of an entry of an input.
     write : C lvalue of an entry of an output.
-    returns : whether the one output is a truth value that is returned.
     sums : whether the sum of all that is written is returned, which is finite only where all is.
 
     Raises
@@ -355,12 +351,7 @@ class Statements:
         return list(found)
 
     def block(self, indent: int = 4) -> str:
-        """Return the statements, one a line.
-
-        Parameters
-        ----------
-        indent : spaces before each.
-        """
+        """Return the statements, one a line."""
         return "".join(f"{' ' * indent}{line}\n" for line in self.lines)
 
     def _real(self, place: int) -> str:

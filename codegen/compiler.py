@@ -19,6 +19,9 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from codegen.errors import TireidError
+from codegen.writing import write_file
+
 # Where compiled code is kept between runs: what is found there, this user put there.
 #
 # What is loaded runs with all rights of who loads it. So the folder and the file must belong to
@@ -51,10 +54,6 @@ def cache_folder() -> Path:
 def distrust(path: Path) -> str | None:
     """Return why another user could have written a file or what is in a folder; None if none could.
 
-    Parameters
-    ----------
-    path : of the file or folder itself, not of a link.
-
     Raises
     ------
     OSError
@@ -75,12 +74,6 @@ def distrust(path: Path) -> str | None:
 def keep(stem: str, ending: str, content: bytes) -> Path:
     """Keep a file for `kept`; return its path, which ends with the hash of its content.
 
-    Parameters
-    ----------
-    stem : what it is found by: a name and a hash of all that it was made of.
-    ending : of its name, with the dot.
-    content : the whole of it.
-
     Raises
     ------
     OSError
@@ -90,7 +83,7 @@ def keep(stem: str, ending: str, content: bytes) -> Path:
     file = folder / f"{stem}.{_digest(content)}{ending}"
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         part = Path(scratch) / file.name
-        part.write_bytes(content)
+        write_file(part, content)
         part.chmod(0o600)
         part.replace(file)  # atomic: two processes may keep the same file at once
     return file
@@ -100,11 +93,6 @@ def kept(stem: str, ending: str) -> Path | None:
     """Return a file that was kept, whole and by this user; None where there is none.
 
     What is damaged, or not to be trusted, is said and removed.
-
-    Parameters
-    ----------
-    stem : as `keep` was told.
-    ending : as `keep` was told.
     """
     for file in sorted(cache_folder().glob(f"{stem}.*{ending}")):
         try:
@@ -161,7 +149,7 @@ LONG = 50_000  # characters of a source, beyond which to optimize it takes longe
 KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
 
 
-class CompilationError(RuntimeError):
+class CompilationError(TireidError, RuntimeError):
     """The C compiler refused generated code; the message holds its first lines."""
 
 
@@ -230,7 +218,6 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     Parameters
     ----------
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
-    name : beginning of the file's name and of the messages.
     flags : of the compiler; None takes `FLAGS`.
 
     Returns
@@ -259,7 +246,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         c_file, built = Path(scratch) / f"{name}.c", Path(scratch) / name
-        c_file.write_text(source, encoding="utf-8")
+        write_file(c_file, source)
         command = [*words, str(c_file), "-o", str(built), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode != 0:

@@ -61,7 +61,6 @@ def polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
     Parameters
     ----------
     coefficients : c_0 first.
-    s : where.
     """
     *lower, value = coefficients
     for c in reversed(lower):
@@ -74,7 +73,6 @@ def where(condition: Any, a: Any, b: Any) -> Any:
 
     Parameters
     ----------
-    condition : entry by entry.
     a : expression, array or number.
     b : expression, array or number.
     """

@@ -15,12 +15,7 @@ SHOWN = 60  # characters of a value in a message
 
 
 def visible(text: str, *, keep: str = "") -> str:
-    r"""Return text with escapes, as `\x1b`, in place of all that does not print.
-
-    Parameters
-    ----------
-    keep : characters that stay as they are.
-    """
+    r"""Return text with escapes, as `\x1b`, in place of all that does not print."""
     return "".join(
         one
         if one in keep or one.isprintable() or unicodedata.category(one) == "Zs"
@@ -30,12 +25,7 @@ def visible(text: str, *, keep: str = "") -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value as a message shows it: short, on one line, without controls.
-
-    Parameters
-    ----------
-    value : as it was read.
-    """
+    """Return a value as a message shows it: short, on one line, without controls."""
     if isinstance(value, int) and value.bit_length() > 128:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, dict | list | tuple):

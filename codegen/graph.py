@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 
 OPERATIONS: Mapping[int, str] = {
     getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
@@ -44,7 +45,7 @@ BUILDERS: Mapping[str, Callable[..., Any]] = {
 }
 
 
-class UnknownOperationError(ValueError):
+class UnknownOperationError(TireidError, ValueError):
     """A function holds an operation that has no plain C of its own."""
 
 
@@ -79,12 +80,7 @@ class Graph:
         return place
 
     def constant(self, value: float) -> int:
-        """Return the place of a number.
-
-        Parameters
-        ----------
-        value : the number.
-        """
+        """Return the place of a number."""
         return self.add(Node("const", value=value + 0.0))  # -0 becomes 0
 
     def reached(self) -> list[int]:
@@ -128,12 +124,7 @@ class Graph:
 
 
 def graph_of(function: ca.Function) -> Graph:
-    """Return the graph of an SX function with dense outputs.
-
-    Parameters
-    ----------
-    function : its instructions are read one by one.
-    """
+    """Return the graph of an SX function with dense outputs."""
     graph, work = Graph(), dict[int, int]()
     graph.outputs = [[-1] * function.numel_out(i) for i in range(function.n_out())]
     for k in range(function.n_instructions()):
@@ -181,11 +172,6 @@ def function_of(
 ) -> ca.Function:
     """Return an SX function of a graph.
 
-    Parameters
-    ----------
-    like : function with the wanted name and ports.
-    builders : expression of each operation.
-
     Raises
     ------
     UnknownOperationError
@@ -217,12 +203,7 @@ CONDITIONS = ("lt", "le", "eq", "ne", "and", "or", "not")
 
 
 def decision(graph: Graph, ports: set[int]) -> int | None:
-    """Return the condition on some inputs alone that most choices depend on, or None.
-
-    Parameters
-    ----------
-    ports : numbers of the inputs that the condition may read.
-    """
+    """Return the condition on some inputs alone that most choices depend on, or None."""
     of_ports: set[int] = set()
     count: dict[int, int] = {}
     for place in graph.reached():
@@ -243,7 +224,6 @@ def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
 
     Parameters
     ----------
-    condition : place of the condition.
     holds : whether it holds.
     """
     known = {condition: holds}
@@ -298,7 +278,6 @@ def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function,
 
     Parameters
     ----------
-    function : SX.
     port : name of the input that is added, the last; constants (n,) in their order in `function`.
     """
     graph, n_in = graph_of(function), function.n_in()

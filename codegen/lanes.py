@@ -186,12 +186,6 @@ def find_target() -> Target | None:
 def lanes_source(step: ca.Function, carry: tuple[str, ...], lanes: int) -> str:
     """Return C++ of a loop over samples, `{step}_lanes`, each lane of which is a run of its own.
 
-    Parameters
-    ----------
-    step : SX function with named, dense ports.
-    carry : inputs whose value is handed from one sample to the next.
-    lanes : doubles in one register.
-
     Raises
     ------
     ValueError
@@ -213,12 +207,7 @@ def lanes_source(step: ca.Function, carry: tuple[str, ...], lanes: int) -> str:
 
 
 def scratch_size(step: ca.Function) -> int:
-    """Return how many vectors of lanes the loop needs to work in.
-
-    Parameters
-    ----------
-    step : as of `lanes_source`.
-    """
+    """Return how many vectors of lanes the loop needs to work in."""
     ports_in, ports_out = step.nnz_in(), step.nnz_out()
     return int(2 * ports_in + ports_out + step.sz_w())
 

@@ -86,7 +86,6 @@ class Scan:
     ----------
     step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
         of the same shape. Its name becomes part of a C identifier.
-    carry : inputs whose value is handed from one sample to the next.
     over : inputs with one row a sample. Every other input is constant.
     flags : of the compiler; None takes `codegen.compiler.FLAGS`.
 
@@ -225,7 +224,6 @@ class Scan:
         Parameters
         ----------
         n : number of samples.
-        values : one array for every input of the step.
 
         Raises
         ------
@@ -382,12 +380,7 @@ def shaped(flat: Array, size: tuple[int, int]) -> Array:
 
 
 def longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
-    """Return integers as C wants them.
-
-    Parameters
-    ----------
-    numbers : the integers.
-    """
+    """Return integers as C wants them."""
     return (ctypes.c_long * max(len(numbers), 1))(*numbers)
 
 
@@ -405,9 +398,7 @@ class Stepper:
 
     Parameters
     ----------
-    scan : the compiled step.
     values : start of the carried ports and the constants, by name.
-    samples : how many are taken at once.
 
     Raises
     ------
@@ -489,18 +480,12 @@ class Stepper:
 
         Parameters
         ----------
-        port : one of those that are carried.
         value : (rows, columns) of the port, flat where it is a column.
         """
         self._now[port][:] = np.ravel(value, order="F")
 
     def before(self, port: str) -> Array:
-        """Return the value of one carried port before the last sample, in its shape; a copy.
-
-        Parameters
-        ----------
-        port : one of those that are carried.
-        """
+        """Return the value of one carried port before the last sample, in its shape; a copy."""
         return shaped(self._before[port], self._sizes[port]).copy()
 
     def state(self) -> dict[str, Array]:
@@ -508,10 +493,5 @@ class Stepper:
         return {port: self.value(port) for port in self._now}
 
     def value(self, port: str) -> Array:
-        """Return the value of one carried port in effect, in its shape; a copy.
-
-        Parameters
-        ----------
-        port : one of those that are carried.
-        """
+        """Return the value of one carried port in effect, in its shape; a copy."""
         return shaped(self._now[port], self._sizes[port]).copy()

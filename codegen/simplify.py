@@ -17,12 +17,7 @@ CANCELLED = 1e-14  # relative size of a coefficient that is rounding only
 
 
 def simplified(graph: Graph) -> Graph:
-    """Return a graph with the same outputs up to rounding, in fewer operations.
-
-    Parameters
-    ----------
-    graph : of known operations.
-    """
+    """Return a graph with the same outputs up to rounding, in fewer operations."""
     return _Simplifier(graph).run()
 
 

@@ -33,7 +33,6 @@ def tuned(function: ca.Function, *, sampled: tuple[str, ...]) -> Tuned:
 
     Parameters
     ----------
-    function : SX, dense outputs.
     sampled : inputs that may decide which part of the function is computed.
     """
     return _tuned(function.serialize(), sampled)

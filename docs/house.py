@@ -44,6 +44,7 @@ ROWS = {
     "files": "Python files",
     "lines": "lines of Python",
     "imported_once": "Python files that one other imports",
+    "circles": "circles of files that import one another",
     "type_switches": "type switches on methods and models",
     "arrays": "definitions of `Array`",
     "pairs": "pairs of places that share six or more lines",
@@ -79,6 +80,7 @@ def counts(root: Path) -> Counts:
         "files": len(python),
         "lines": sum(text.count("\n") for text in python.values()),
         "imported_once": imported_once(parsed),
+        "circles": len(circles(parsed)),
         "type_switches": type_switches(parsed),
         "arrays": sum(defines(module, "Array") for module in parsed.values()),
         "pairs": len(pairs(tree)),
@@ -100,15 +102,59 @@ def imported_once(parsed: Mapping[str, ast.Module]) -> int:
     }
     importers: Counter[str] = Counter()
     for name, module in parsed.items():
-        found = set()
-        for node in ast.walk(module):
-            if isinstance(node, ast.Import):
-                found |= {homes.get(alias.name) for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                room = f"{node.module}"
-                found |= {homes.get(f"{room}.{a.name}", homes.get(room)) for a in node.names}
-        importers.update(home for home in found if home is not None and home != name)
+        importers.update(_imported(module, homes) - {name})
     return sum(count == 1 for count in importers.values())
+
+
+def circles(parsed: Mapping[str, ast.Module]) -> list[list[str]]:
+    """Return which files of a package import one another in a circle: Tarjan's components.
+
+    Imports in functions and for type checkers count.
+
+    Parameters
+    ----------
+    parsed : by path.
+    """
+    homes = {
+        name.removesuffix(".py").removesuffix("/__init__").replace("/", "."): name
+        for name in parsed
+    }
+    imports = {name: _imported(module, homes) - {name} for name, module in parsed.items()}
+    number: dict[str, int] = {}
+    least: dict[str, int] = {}
+    stack: list[str] = []
+    found = []
+
+    def visit(name: str) -> None:
+        number[name] = least[name] = len(number)
+        stack.append(name)
+        for other in imports[name]:
+            if other not in number:
+                visit(other)
+            if other in stack:
+                least[name] = min(least[name], least[other])
+        if least[name] == number[name]:
+            members = stack[stack.index(name) :]
+            del stack[stack.index(name) :]
+            if len(members) > 1:
+                found.append(sorted(members))
+
+    for name in imports:
+        if name not in number:
+            visit(name)
+    return found
+
+
+def _imported(module: ast.Module, homes: Mapping[str, str]) -> set[str]:
+    """Paths of the files that a file imports."""
+    found = set()
+    for node in ast.walk(module):
+        if isinstance(node, ast.Import):
+            found |= {homes.get(alias.name) for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            room = f"{node.module}"
+            found |= {homes.get(f"{room}.{a.name}", homes.get(room)) for a in node.names}
+    return {home for home in found if home is not None}
 
 
 def type_switches(parsed: Mapping[str, ast.Module]) -> int:

@@ -17,13 +17,8 @@ class Property:
 
     Parameters
     ----------
-    name : key, stable over versions.
-    title : what it means, in words.
-    value : measured value.
     limit : what the value is held against; None where it is a statement only.
     margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
-    status : pass, warn or fail.
-    unit : unit of value and limit.
     advice : one line; empty where there is nothing to say.
     """
 
@@ -99,7 +94,6 @@ def at_most(value: float, *, good: float, bad: float | None) -> Status:
     Parameters
     ----------
     value : to be judged; nan fails.
-    good : largest value that passes.
     bad : largest value that only warns.
     """
     if value <= good:
@@ -113,7 +107,6 @@ def at_least(value: float, *, good: float, bad: float | None) -> Status:
     Parameters
     ----------
     value : to be judged; nan fails.
-    good : smallest value that passes.
     bad : smallest value that only warns.
     """
     if value >= good:
@@ -122,15 +115,7 @@ def at_least(value: float, *, good: float, bad: float | None) -> Status:
 
 
 def statement(name: str, title: str, value: float, unit: str, advice: str = "") -> Property:
-    """Return a property that is only stated: it has no limit and passes.
-
-    Parameters
-    ----------
-    name : key.
-    title : what it means.
-    unit : of the value.
-    advice : remark.
-    """
+    """Return a property that is only stated: it has no limit and passes."""
     return Property(
         name=name,
         title=title,

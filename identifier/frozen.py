@@ -6,14 +6,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.rules import LARGEST_FORCE
 from models.schema import Table
-from models.vehicle import AREAS, BICYCLE, Vehicle
+from models.vehicle import AREAS, BICYCLE, LENGTHWISE, Vehicle
 
 FORMAT = "tireid frozen model 1"
 
 
-class FrozenModelError(ValueError):
+class FrozenModelError(TireidError, ValueError):
     """A file does not hold a frozen model; the message names the file and what is wrong."""
 
 
@@ -28,21 +29,18 @@ VEHICLE_KEYS = ("name", *BICYCLE)
 def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
 
-    Where the car has downforce its areas follow; where some numbers are estimated, `estimated`
-    lists which.
+    Where the car has downforce its areas follow, and what it tells of `LENGTHWISE`; where some
+    numbers are estimated, `estimated` lists which.
     """
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
     if vehicle.has_downforce:
         numbers |= {key: getattr(vehicle, key) for key in AREAS}
-    return numbers | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
+    told = {key: value for key in LENGTHWISE if (value := getattr(vehicle, key)) is not None}
+    return numbers | told | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
 
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
     """Return the car that `vehicle_numbers` describes.
-
-    Parameters
-    ----------
-    data : as from `vehicle_numbers`.
 
     Raises
     ------
@@ -75,7 +73,6 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
     Parameters
     ----------
     refusal : class of the error to raise.
-    tires : both axles.
 
     Raises
     ------

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.setup import AXLE_FORCE, HALF_BAND, Block, Port, Setup
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from identifier.inertial.beliefs import Body
 
 
-class CannotFreezeError(ValueError):
+class CannotFreezeError(TireidError, ValueError):
     """The method estimates a signal: there is no model of the tire to freeze."""
 
 
@@ -38,9 +39,6 @@ def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any)
 
     Parameters
     ----------
-    start : the stored model.
-    kind : of model that the method learns.
-    refusal : what to say of another.
     structure : what the method and the model must agree on, by attribute of the model.
 
     Raises
@@ -54,12 +52,7 @@ def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any)
 
 
 def fits(start: TireModel, kind: type[Model], **structure: Any) -> TypeGuard[Model]:
-    """Return whether a stored model is of the kind and structure that a method learns.
-
-    Parameters
-    ----------
-    start, kind, structure : as of `resumed`.
-    """
+    """Return whether a stored model is of the kind and structure that a method learns."""
     return isinstance(start, kind) and all(
         getattr(start, name) == value for name, value in structure.items()
     )

@@ -5,6 +5,7 @@ returns a method whose numbers follow from the vehicle alone.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from identifier.axle.design import AxleIdentifier
@@ -13,6 +14,7 @@ from identifier.baselines import (
     ExtendedStateObserver,
     ForceEkf,
     HorizonEstimator,
+    LaggedEkf,
     LinearBaseline,
     StiffnessRls,
     Washout,
@@ -24,12 +26,14 @@ from identifier.baselines import (
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.method import FitMethod
+from identifier.estimate.model import FittedModel
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.regression import RegressionIdentifier
 from identifier.tire_model import TireModel
+from models.rules import require_kind
 from models.vehicle import Vehicle
 
 Factory = Callable[[Vehicle, int], Method]
@@ -65,6 +69,8 @@ METHODS: Mapping[str, Factory] = {
     "linear": _seedless(LinearBaseline.for_vehicle),
     "stiffness_rls": _seedless(StiffnessRls.for_vehicle),
     "magic_formula_ekf": _seedless(magic_formula_ekf),
+    "textbook_ekf": _seedless(partial(magic_formula_ekf, textbook=True)),
+    "lagged_ekf": _seedless(LaggedEkf.for_vehicle),
     "dugoff_ekf": _seedless(dugoff_ekf),
     "eso": _seedless(ExtendedStateObserver.for_vehicle),
     "ekf_force": _seedless(ForceEkf.for_vehicle),
@@ -80,6 +86,7 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
     AxleModel.kind: lambda model, vehicle, dt: (
         InertialIdentifier if model.tells_v_y else AxleIdentifier
     ).for_vehicle(vehicle, dt=dt),
+    FittedModel.kind: lambda _, vehicle, dt: AxleIdentifier.for_vehicle(vehicle, dt=dt),
     NetworkModel.kind: lambda model, vehicle, dt: PaperIdentifier.for_vehicle(
         vehicle, network=model.network, dt=dt
     ),
@@ -119,7 +126,6 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
 
     Parameters
     ----------
-    model : what was learnt.
     dt : sampling interval [s].
 
     Raises
@@ -132,11 +138,28 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
     return LEARNERS[model.kind](model, vehicle, dt)
 
 
-def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+def methods() -> tuple[str, ...]:
+    """Return the names of all methods, the default first."""
+    return tuple(METHODS)
+
+
+def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
     """Return what is proven of a method: what the method itself says.
 
     Parameters
     ----------
+    method : a method, or its name as of `methods`.
     driving : how hard it is driven; None takes what the method was designed for.
+
+    Raises
+    ------
+    ValueError
+        Where no method has that name.
+    TypeError
+        Where an argument is of another kind.
     """
+    require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
+    if isinstance(method, str):
+        method = make_method(method, vehicle)
+    require_kind(Method, "as of make_method, or a name of methods()", method=method)
     return method.certify(vehicle, driving)

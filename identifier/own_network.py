@@ -15,6 +15,8 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from codegen.errors import TireidError
+from codegen.writing import write_file
 from identifier.frozen import (
     FORMAT,
     FrozenModelError,
@@ -47,7 +49,7 @@ BY_COUNT = {
 }  # what the columns mean where nobody says
 
 
-class UnusableNetworkError(ValueError):
+class UnusableNetworkError(TireidError, ValueError):
     """The network is not one of a tire, or uses what cannot be read; the message says what."""
 
 
@@ -97,7 +99,7 @@ def _imported(content: bytes) -> ca.Function:
         raise UnusableNetworkError(f"reading ONNX needs CasADi {needed}, this is {version}")
     with tempfile.TemporaryDirectory(prefix="tireid-") as folder:
         path = Path(folder) / "network.onnx"
-        path.write_bytes(content)
+        write_file(path, content)
         try:
             graph = ca.GraphBuilder(str(path), {})
             names = [*graph.name_in(), *graph.name_out()]
@@ -185,7 +187,6 @@ class OnnxModel(TireModel):
     Parameters
     ----------
     vehicle : the car, whose l_f and l_r make slip angles.
-    content : the ONNX file.
     min_speed : below this speed [m/s] the forces read zero.
     inputs : what the network's columns are, see `read_network`; None goes by names and number.
     slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -240,7 +241,6 @@ class OnnxModel(TireModel):
 
         Parameters
         ----------
-        path : the ONNX file.
         min_speed : below this speed [m/s] the forces read zero.
         inputs : what the network's columns are; None goes by names and number.
         slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -316,7 +316,6 @@ class OnnxModel(TireModel):
         x : [v_y, r] (2,).
         delta : angle of the front wheels [rad].
         v_x : longitudinal speed [m/s], positive.
-        least_lag : not looked at.
         """
         del slip, least_lag
         return self._static_force(x, delta, v_x), ca.MX(0, 1)
@@ -343,13 +342,7 @@ class OnnxModel(TireModel):
 
         Parameters
         ----------
-        data : as from `to_dict`.
         source : name of the file, for errors.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
         """
         try:
             table = Table(data, "", FrozenModelError)
@@ -405,7 +398,6 @@ class FrozenMethod(Method):
 
     Parameters
     ----------
-    model : the model, with its car.
     dt : sampling interval of recordings [s]; the model has none of its own.
 
     Raises
@@ -450,7 +442,6 @@ class FrozenMethod(Method):
         Parameters
         ----------
         vehicle : the car; the model keeps its own.
-        state : nothing is carried.
         """
         del vehicle, state
         return self.model

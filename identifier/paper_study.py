@@ -67,9 +67,6 @@ def paper_design(
     Parameters
     ----------
     law : one of `LAWS`.
-    seed : seed of the initial weights.
-    gains : those of the study, or others.
-    network : that of the study, or another.
     """
     return PaperIdentifier(gains=gains, network=network, seed=seed).with_law(law)
 
@@ -110,7 +107,6 @@ class Trial:
 
     Parameters
     ----------
-    history : the online run.
     replays : freeze time [s] to replay of the same recording; errors count from the onset on.
     errors : by column as `columns` names them: RMSE of both axles from the onset on [kN]; empty
         where the law diverged.
@@ -135,7 +131,6 @@ def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> T
 
     Parameters
     ----------
-    recording : of the maneuver.
     maneuver : "step_steer" or "slalom".
     design : from `paper_design`.
     """
@@ -168,7 +163,6 @@ class Study:
 
     Parameters
     ----------
-    recordings : by maneuver.
     errors : by maneuver, then by law: the errors [kN] by column, for each seed.
     """
 

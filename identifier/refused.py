@@ -86,12 +86,7 @@ class SampleLimits(NamedTuple):
 
 
 def judges_samples(carry: Mapping[str, Any]) -> bool:
-    """Return whether a step judges samples itself.
-
-    Parameters
-    ----------
-    carry : its carried ports.
-    """
+    """Return whether a step judges samples itself."""
     return GATE in carry
 
 
@@ -123,9 +118,7 @@ def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
 
     Parameters
     ----------
-    n : samples.
     breaks : samples with which stretches begin, rising.
-    rest : samples of a rest.
     """
     begins = np.repeat(np.asarray(breaks, dtype=np.intp), rest)
     samples = np.arange(n)

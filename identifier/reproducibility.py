@@ -11,7 +11,6 @@ them, and any other recording too. There are two measures, and they answer diffe
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +21,6 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from identifier.verdict import RoadFriction, Verdict
-
 
 class NeverDrivesError(RecordingError):
     """No sample of a recording is as fast as a sample must be to count."""
@@ -32,13 +28,7 @@ class NeverDrivesError(RecordingError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxleRmse:
-    """Root mean square of a force error [N].
-
-    Parameters
-    ----------
-    front : front axle.
-    rear : rear axle.
-    """
+    """Root mean square of a force error [N]."""
 
     front: float
     rear: float
@@ -81,7 +71,6 @@ class Reproduction:
     ----------
     past_against_online : error for t < T_freeze against what was identified online, the measure of
         the paper's section IV-A; the linear part of both forces is the same and cancels.
-    past_against_truth : the same samples against the true force.
     after_against_truth : error for t > T_freeze against the true force.
     """
 
@@ -109,7 +98,6 @@ class MotionError:
     Parameters
     ----------
     lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
-    lateral_rms, yaw_rms : of these accelerations themselves.
     """
 
     lateral: float
@@ -133,8 +121,6 @@ def motion_error(
     Parameters
     ----------
     force : lateral axle forces (n, 2) [N], frame of the body.
-    recording : the motion.
-    vehicle : mass, inertia and geometry.
     counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """
     n = round(WINDOW / recording.dt)
@@ -183,76 +169,16 @@ def _mean_acceleration(
     return acceleration
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
-class Prediction:
-    """One recording as a frozen model predicts it.
-
-    Parameters
-    ----------
-    model : that predicted.
-    recording : what was predicted.
-    axle_force : forces of the frozen model (n, 2) [N].
-    against_truth : error over the samples that count, against the true force; None without truth.
-    true_force : root mean square of the true force over the same samples, None without truth.
-    motion : what the forces miss of the measured motion; None where the recording is too short.
-    """
-
-    model: TireModel
-    recording: Recording
-    axle_force: Array
-    against_truth: AxleRmse | None
-    true_force: AxleRmse | None
-    motion: MotionError | None
-
-    def __repr__(self) -> str:
-        name, error, size = self.recording.name, self.against_truth, self.true_force
-        if error is None or size is None:
-            told = "" if self.motion is None else f"; {self.motion_text()}"
-            return f"<Prediction of {name!r}: no true forces to compare with{told}>"
-        front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
-        return (
-            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
-            f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
-        )
-
-    def verdict(self) -> "Verdict":
-        """Return whether the model gives back the drive's motion; computed at each call."""
-        from identifier.verdict import judge_prediction
-
-        return judge_prediction(self.model, self.recording)
-
-    def friction(self) -> "RoadFriction | None":
-        """Return the friction of the drive's road over that of the one that taught, over time.
-
-        None where the model has no band, or too little is driven; computed at each call, as part
-        of the verdict.
-        """
-        return self.verdict().friction
-
-    def motion_text(self) -> str:
-        """Return what the forces explain of the motion, in a line; empty where nobody knows."""
-        if self.motion is None:
-            return ""
-        parts = zip(("lateral", "yaw"), self.motion.explained, strict=True)
-        shares = [
-            f"{f'{100.0 * share:.1f} %' if share > 0.0 else 'nothing'} of the {name}"
-            for name, share in parts
-            if share is not None
-        ]
-        return f"explained are {' and '.join(shares)} acceleration" if shares else ""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Replay:
     """One recording replayed with frozen weights.
 
     Parameters
     ----------
-    recording : what was replayed.
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over all samples against the true force, None without truth.
     against_online : error over all samples, before and after a freeze, against the forces that were
-        identified online over the same recording.
+        identified online over the same recording; None where the method learns from whole logs.
     reproduction : both sides of the freeze, None where the weights were not frozen in this
         recording.
     """
@@ -260,7 +186,7 @@ class Replay:
     recording: Recording
     axle_force: Array
     against_truth: AxleRmse | None
-    against_online: AxleRmse
+    against_online: AxleRmse | None
     reproduction: Reproduction | None = None
 
 
@@ -281,7 +207,6 @@ def counted_samples(
 
     Parameters
     ----------
-    recording : the signals.
     min_speed : samples below this speed [m/s] do not count.
     since : nor do samples before this time [s]; None begins at the first.
 
@@ -307,7 +232,6 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
 
     Parameters
     ----------
-    model : that predicts.
     recording : the drive; samples below the model's minimum speed do not count.
     """
     known = model.known_slip
@@ -325,33 +249,6 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
     return float(front), float(rear)
 
 
-def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
-    """Replay a recording with frozen weights and compare with its true forces, where it has any.
-
-    Parameters
-    ----------
-    model : the frozen model; samples below its minimum speed do not count.
-    recording : what is replayed.
-    since : samples before this time [s] do not count; None counts all.
-
-    Raises
-    ------
-    ValueError
-        Where no sample counts.
-    """
-    force = model.axle_force(recording)
-    counted = counted_samples(recording, model.min_speed, since)
-    truth = recording.axle_force
-    return Prediction(
-        model=model,
-        recording=recording,
-        axle_force=force,
-        against_truth=None if truth is None else axle_rms(force, counted, truth),
-        true_force=None if truth is None else axle_rms(truth, counted),
-        motion=motion_error(force, recording, model.vehicle, counted),
-    )
-
-
 def replay(model: TireModel, online: History, *, since: float | None = None) -> Replay:
     """Replay a recording with frozen weights and compare over all of it.
 
@@ -367,13 +264,13 @@ def replay(model: TireModel, online: History, *, since: float | None = None) -> 
     ValueError
         Where no sample counts.
     """
-    told = predict(model, online.recording, since=since)
+    force, truth = model.axle_force(online.recording), online.recording.axle_force
     counted = counted_samples(online.recording, model.min_speed, since)
     return Replay(
-        recording=told.recording,
-        axle_force=told.axle_force,
-        against_truth=told.against_truth,
-        against_online=axle_rms(told.axle_force, counted, online.axle_force),
+        recording=online.recording,
+        axle_force=force,
+        against_truth=None if truth is None else axle_rms(force, counted, truth),
+        against_online=axle_rms(force, counted, online.axle_force),
     )
 
 
@@ -382,7 +279,6 @@ def reproduce(online: History, t_freeze: float, *, since: float | None = None) -
 
     Parameters
     ----------
-    online : the run.
     t_freeze : time of the freeze in the recording's own clock [s].
     since : samples before this time [s] do not count; None counts all.
 
@@ -402,7 +298,8 @@ def reproduce(online: History, t_freeze: float, *, since: float | None = None) -
     truth = recording.axle_force
     past = counted.copy()
     past[np.searchsorted(recording.t, t_freeze - tolerance, side="left") :] = False
-    against_online = _side(whole.axle_force, online.axle_force, past)
+    known = online.axle_force if online.online else None
+    against_online = _side(whole.axle_force, known, past)
     against_truth = _side(whole.axle_force, truth, past)
     after = counted  # itself: a byte for each sample of a hundred hours is not little
     after[: np.searchsorted(recording.t, t_freeze + tolerance, side="right")] = False
@@ -421,7 +318,7 @@ def _side(force: Array, reference: Array | None, where: NDArray[np.bool_]) -> Ax
 
 
 def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
-    """Return the error of the forces identified online, None without truth.
+    """Return the error of the forces identified online, None without truth or without such forces.
 
     Parameters
     ----------
@@ -434,7 +331,7 @@ def online_error(history: History, *, since: float | None = None) -> AxleRmse | 
         Where no sample counts.
     """
     truth = history.recording.axle_force
-    if truth is None:
+    if truth is None or not history.online:
         return None
     counted = counted_samples(history.recording, history.design.min_speed, since)
     return axle_rms(history.axle_force, counted, truth)
@@ -445,7 +342,6 @@ def force_rms(history: History, *, since: float | None = None) -> AxleRmse | Non
 
     Parameters
     ----------
-    history : an online run.
     since : samples before this time [s] do not count; None counts all.
 
     Raises

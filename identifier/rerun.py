@@ -32,12 +32,7 @@ class Rerun:
 
     Parameters
     ----------
-    setup : of the run.
-    recording : what it ran over.
-    parts : its blocks, one after the other.
-    begins : values carried into each of them, by port.
     last : values carried after the last sample of the recording, by port.
-    first, end : samples of the part, from first to before end.
     """
 
     setup: Setup
@@ -55,12 +50,7 @@ class Rerun:
         return self.end - self.first
 
     def ports(self, kind: Kind) -> tuple[str, ...]:
-        """Return the names of the carried ports, or of the outputs but for the axle forces.
-
-        Parameters
-        ----------
-        kind : which.
-        """
+        """Return the names of the carried ports, or of the outputs but for the axle forces."""
         scan = self.setup.scan
         outputs = tuple(port for port in scan.outputs if port != AXLE_FORCE.name)
         return scan.carry if kind == "state" else outputs
@@ -143,13 +133,7 @@ def _last_row(state: Mapping[str, Array], port: str) -> Array:
 
 
 class OnDemand(Mapping[str, Array]):
-    """Values by port, each computed when it is asked for.
-
-    Parameters
-    ----------
-    ports : names of them.
-    compute : returns the values of one.
-    """
+    """Values by port, each computed when it is asked for."""
 
     def __init__(self, ports: tuple[str, ...], compute: Callable[[str], Array]) -> None:
         self._ports, self._compute = ports, compute
@@ -176,7 +160,6 @@ class Recalled(OnDemand):
 
     Parameters
     ----------
-    run : computed again.
     kind : "state" or "outputs".
     """
 
@@ -196,10 +179,5 @@ class Recalled(OnDemand):
         return found
 
     def of(self, first: int, end: int) -> "Recalled":
-        """Return the same of the samples from first to before end.
-
-        Parameters
-        ----------
-        first, end : of the whole run.
-        """
+        """Return the same of the samples from first to before end."""
         return Recalled(replace(self.run, first=first, end=end), self._kind)

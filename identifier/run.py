@@ -4,13 +4,13 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
+from codegen.errors import TireidError
 from identifier.method import Method, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.rerun import Recalled, Rerun, holds
@@ -19,14 +19,10 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from identifier.axle.guarantee import ForceBound
-    from identifier.verdict import Verdict  # which runs the method again, on parts of the drive
-
 IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
 
 
-class DivergedError(ArithmeticError):
+class DivergedError(TireidError, ArithmeticError):
     """The law diverged before the instant that was asked for."""
 
 
@@ -35,13 +31,10 @@ def state_index(recording: Recording, t: float) -> int:
 
     Parameters
     ----------
-    recording : n samples.
     t : time in the recording's own clock [s].
 
     Raises
     ------
-    TypeError
-        Where the time is no number.
     ValueError
         Where the recording begins after that time.
     """
@@ -61,8 +54,6 @@ class History:
 
     Parameters
     ----------
-    vehicle : the car, as far as the method knew it.
-    design : the method that ran.
     recording : what it ran over, with the v_y that the method told where there was none.
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
@@ -81,6 +72,11 @@ class History:
     start: TireModel | None = None
     models: dict[int, TireModel] = field(default_factory=dict)
     """Of a method that learns from whole logs: the model by number of samples that taught it."""
+
+    @property
+    def online(self) -> bool:
+        """Whether forces were identified sample by sample, not from the whole recording at once."""
+        return not self.design.whole
 
     @property
     def diverged_at(self) -> float | None:
@@ -108,12 +104,7 @@ class History:
         return joined
 
     def tracks_over(self, block: Block) -> tuple[Track, ...]:
-        """Return what the method says it had learnt of the axles over a block of the run.
-
-        Parameters
-        ----------
-        block : of k samples.
-        """
+        """Return what the method says it had learnt of the axles over a block of the run."""
         return self.design.tracks(self.vehicle, block.before)
 
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
@@ -183,90 +174,26 @@ class History:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
 
-    def calibrated(self, t: float | None = None) -> TireModel:
-        """Return the model of `freeze`, its `band` calibrated on stretches that did not teach it.
-
-        It takes as long as four times what learning took. Where the method has no band, or too
-        little is driven, it is the frozen model.
+    def asked(self, recording: Recording, t: float | None = None) -> "History":
+        """Return what the model frozen at a time says of another recording, which teaches nothing.
 
         Parameters
         ----------
-        t : time of the freeze in the recording's own clock [s]; None is the end.
+        t : time of the freeze in this recording's own clock [s]; None is the end.
 
         Raises
         ------
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
         ValueError
-            Where the recording begins after that time.
+            Where the run is online: then `identify` runs over the other recording, too.
         """
-        from identifier.verdict import calibrated
-
-        return self.freeze(t) if self.design.whole else calibrated(self, t)
-
-    def guaranteed(
-        self,
-        bound: "float | ForceBound | None" = None,
-        t: float | None = None,
-        model: TireModel | None = None,
-    ) -> TireModel:
-        """Return the model of `freeze` with a guaranteed band: what no curve can leave.
-
-        Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
-        lies in `guaranteed_band`. It is the frozen model where the method learns no curve of slip,
-        no lateral velocity was measured, or too little is driven.
-
-        Parameters
-        ----------
-        bound : e of both axles [static axle loads], or e and τ of each, as a `ForceBound`; None
-            estimates them from the drive.
-        t : time of the freeze in the recording's own clock [s]; None is the end.
-        model : frozen at that time, which is to carry it, as of `calibrated`; None freezes one.
-
-        Raises
-        ------
-        BoundViolatedError
-            Where no curve keeps a bound that was told.
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the recording begins after that time, or the bound is impossible.
-        """
-        from identifier.verdict import guaranteed
-
-        return guaranteed(self, bound, t, model)
-
-    def verdict(self, t: float | None = None) -> "Verdict":
-        """Return whether the answer is good, and what speaks against it; computed at each call.
-
-        Parameters
-        ----------
-        t : time of the freeze in the recording's own clock [s]; None is the end.
-
-        Raises
-        ------
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the recording begins after that time.
-        """
-        from identifier.verdict import judge
-
-        return judge(self, t)
+        if self.online:
+            raise ValueError("an online run is beside another drive as of identify")
+        model = self.freeze(t)
+        force = model.axle_force(recording)
+        return replace(self, recording=recording, axle_force=force, models={len(recording): model})
 
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
-        """Return the run over each of the recordings that the drive was joined of.
-
-        Parameters
-        ----------
-        recordings : in the order in which they were joined.
-        """
+        """Return the run over each of the recordings that the drive was joined of."""
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
@@ -281,7 +208,9 @@ class History:
                 outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
             found.append(
-                replace(self, recording=one, axle_force=force, state=state, outputs=outputs)
+                replace(
+                    self, recording=one, axle_force=force, state=state, outputs=outputs, models={}
+                )
             )
             first = end
         return found
@@ -296,10 +225,6 @@ class History:
 
 def check_recording(recording: Recording, design: Method) -> None:
     """Refuse a recording that a method cannot run over.
-
-    Parameters
-    ----------
-    recording : what the design is to run over.
 
     Raises
     ------
@@ -333,7 +258,6 @@ def identify(
     Parameters
     ----------
     recording : signals, sampled at the design's interval; its forces are not looked at.
-    vehicle : the car, as far as the method knows it.
     design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
     progress : called now and then with the share that is done, 0 to 1.
@@ -407,7 +331,6 @@ def learn(
 
     Parameters
     ----------
-    recording, vehicle, design, start : as of `identify`.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -444,9 +367,7 @@ class Counts:
 
     Parameters
     ----------
-    samples : that the method took.
     refused : that held a number which is not finite or beyond what any car reaches.
-    missed : of these, the newest in a row.
     """
 
     samples: int = 0
@@ -459,7 +380,6 @@ class OnlineIdentifier:
 
     Parameters
     ----------
-    vehicle : the car, as far as the method knows it.
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.
     stale_time : time of refused samples after which forces read zero [s].

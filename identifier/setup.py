@@ -156,7 +156,6 @@ class Setup(NamedTuple):
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
-        port : of the output.
         """
         told = large((len(recording), self.scan.step.numel_out(port)))
         for block in self.run(recording, ports=(port,)):
@@ -168,7 +167,6 @@ class Setup(NamedTuple):
 
         Parameters
         ----------
-        recording : its signals are the input.
         n : samples that are taken.
         """
         following = self.begun(recording)
@@ -177,23 +175,12 @@ class Setup(NamedTuple):
         return following
 
     def begun(self, recording: Recording) -> dict[str, Array]:
-        """Return what is carried into the first sample of a recording, by port.
-
-        Parameters
-        ----------
-        recording : its first sample is looked at.
-        """
+        """Return what is carried into the first sample of a recording, by port."""
         v_y = math.nan if recording.v_y is None else recording.v_y[0]
         return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
     def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
-        """Return what the step is shown of a recording.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        part : samples that are shown.
-        """
+        """Return what the step is shown of a recording."""
         judges = judges_samples(self.carry)
         return shown(recording, self.scan.over, rest=self.rest, judges=judges, part=part)
 
@@ -297,10 +284,8 @@ def shown(
 
     Parameters
     ----------
-    recording : its samples.
     over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
         there is none.
-    rest : samples of a rest.
     judges : whether the step judges samples itself.
     part : samples that are shown; a stretch that begins with the first of them has its rest.
     """

@@ -4,21 +4,27 @@ Slip angles α = δ - (v_y ± l r)/v_x have the paper's sign, the negative of IS
 F = +C α. Axle forces are lateral, in the frame of the body, left positive.
 """
 
+import importlib
 import json
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
+from codegen.escape import shown
+from identifier.frozen import FORMAT, FrozenModelError, require_alive
+from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
 from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
+from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
@@ -29,6 +35,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
+UNCALIBRATED = "what learning believes, not calibrated; `run.tire` checks it on the drive"
 
 
 class TireFunctions(NamedTuple):
@@ -54,8 +61,8 @@ class Fact(NamedTuple):
 
     @property
     def words(self) -> list[str]:
-        """The values in four digits, 127000 as such and not as 1.27e+05."""
-        return [f"{float(f'{value:.4g}'):.10g}" for value in self.values]
+        """The values in three digits, 127000 as such and not as 1.27e+05."""
+        return [printed_value(float(value), None, self.unit) for value in self.values]
 
 
 class Estimate(NamedTuple):
@@ -72,6 +79,25 @@ class Estimate(NamedTuple):
     unit: str
     told: float | None
     learnt: bool
+
+    @property
+    def words(self) -> str:
+        """Value and standard deviation in three digits, and whether the drive left it open."""
+        value = printed_value(self.value, self.sd, self.unit)
+        return value if self.learnt else f"{value} ({NOT_IDENTIFIABLE})"
+
+    def with_missed(self, share: float) -> "Estimate":
+        """Return the number with the share that is missed of a force in its standard deviation.
+
+        The recursion knows of noise only; what its curves cannot say is in what they miss.
+
+        Parameters
+        ----------
+        share : of the force of its axle, rms [-].
+        """
+        if self.sd is None or self.title not in (STIFFNESS, GRIP):
+            return self
+        return self._replace(sd=math.hypot(self.sd, share * self.value))
 
 
 class Reached(NamedTuple):
@@ -212,6 +238,18 @@ class TireModel(ABC):
         """Return the model as one that goes on learning where a lateral velocity is told."""
         return self
 
+    def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
+        """Return the model in the hidden units of the axle identifier where it projects on them.
+
+        What is in such units already, and what cannot be, is returned as it is.
+
+        Parameters
+        ----------
+        ladder : slip scales of the units [rad]; None takes those that come closest.
+        """
+        del ladder
+        return self
+
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
@@ -298,6 +336,15 @@ class TireModel(ABC):
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
 
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
+        """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
+        return np.zeros(t.shape, dtype=bool)
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
+        return ()
+
     def at_bounds(self) -> "tuple[Reached, ...]":
         """Return the learnt numbers that rest at their bounds."""
         return ()
@@ -330,18 +377,41 @@ class TireModel(ABC):
         raise ValueError(f"forces of a {type(self).__name__} are no curves of slip")
 
     @property
+    def force_missed(self) -> Array | None:
+        """Share [-] of the force that the motion of the drive that taught shows and the model
+        misses, rms, white noise taken off, (2,); None where nobody looked: `calibrated` does.
+        """
+        return None
+
+    @property
     def has_band(self) -> bool:
         """Whether the model can tell how sure it is."""
         return False
 
-    def with_calibration(self, calibration: "BandCalibration | None") -> "TireModel":
+    @property
+    def band_origin(self) -> str:
+        """Where the width of the band comes from, in words."""
+        return "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
+
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of `band` was found on parts of the drive that did not teach.
+
+        As of `Run.tire`, where enough was driven; else it is what learning believes.
+        """
+        return False
+
+    def with_calibration(
+        self, calibration: "BandCalibration | None", force_missed: Array | None = None
+    ) -> "TireModel":
         """Return the model, its band calibrated; as it is where it has none.
 
         Parameters
         ----------
         calibration : None takes errors to be as learning is told.
+        force_missed : of the drive that taught, (2,); None where nobody looked.
         """
-        del calibration
+        del calibration, force_missed
         return self
 
     def spread_by_range(
@@ -427,7 +497,8 @@ class TireModel(ABC):
     ) -> tuple[float, float] | tuple[Array, Array] | None:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
 
-        None where the model cannot tell how sure it is.
+        None where the model cannot tell how sure it is; `band_calibrated` says whether it is so in
+        that share of cases, or as learning believes.
 
         Parameters
         ----------
@@ -567,24 +638,38 @@ class TireModel(ABC):
         )
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
-        lines = [Fact(STIFFNESS, self.stiffness, "N/rad")]
-        if self.known_slip is not None:
-            lines.append(Fact("known up to a slip of", np.degrees(self.known_slip), "deg"))
-        return tuple(lines)
+        """Return what `summary` says beside the estimates."""
+        if self.known_slip is None:
+            return ()
+        return (Fact("known up to a slip of", np.degrees(self.known_slip), "deg"),)
 
     def summary(self) -> str:
-        """Return what was learnt, in a few lines."""
-        facts = self.facts()
-        width = max(len(fact.title) for fact in facts)
-        lines = [
-            f"{type(self).__name__} of {self.vehicle.name!r}",
-            f"{'':{width}}  {'front':>10}  {'rear':>10}",
-            *(
-                "  ".join([f"{fact.title:{width}}", *(f"{v:>10}" for v in fact.words), fact.unit])
-                for fact in facts
-            ),
-        ]
+        """Return what was learnt, in a few lines; ± is one standard deviation.
+
+        It begins with the share of the force that the model misses where that is known: of a
+        model of `calibrated`, also stored and read again. Without, ± knows of noise only.
+        """
+        missed = self.force_missed
+        rows = [["", *AXLES]]
+        if missed is not None:
+            fact = Fact("force missed in the drive that taught", 100.0 * missed, "%")
+            rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
+        by_title: dict[str, dict[str, str]] = {}
+        for one in self.estimates():
+            share = 0.0 if missed is None else float(missed[AXLES.index(one.axle)])
+            title = f"{one.title} [{printed_unit(one.unit)}]"
+            by_title.setdefault(title, {})[one.axle] = one.with_missed(share).words
+        rows += [[title, *(cells.get(axle, "") for axle in AXLES)]
+                 for title, cells in by_title.items()]  # fmt: skip
+        rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in self.facts()]
+        widths = [max(len(row[k]) for row in rows) for k in range(3)]
+        lines = [f"{type(self).__name__} of {self.vehicle.name!r}"]
+        for row in rows:
+            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            lines.append("  ".join(cells).rstrip())
+        if self.has_band:
+            how = self.band_origin
+            lines.append(f"band: {how}")
         if self.vehicle.estimates:
             lines.append(self.vehicle.estimates)
         return "\n".join(lines)
@@ -652,19 +737,17 @@ class TireModel(ABC):
         FrozenModelError
             Where the file is not such a model; one line that names it.
         """
-        from identifier.stored import load_model
-
-        return load_model(Path(path))
+        return load_model(path)
 
     def __repr__(self) -> str:
-        front, rear = self.stiffness
+        front, rear = Fact(STIFFNESS, self.stiffness, "N/rad").words
         known = (
             ""
             if self.known_slip is None
             else ", known to {:.1f} / {:.1f} deg".format(*np.degrees(self.known_slip))
         )
         name = f"{type(self).__name__} of {self.vehicle.name!r}"
-        return f"<{name}: stiffness {front:.4g} / {rear:.4g} N/rad{known}>"
+        return f"<{name}: stiffness {front} / {rear} kN/rad{known}>"
 
 
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
@@ -688,3 +771,77 @@ def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
     """
     r = v_x * (slope[1] - slope[0]) / vehicle.wheelbase
     return ca.vertcat(-v_x * slope[0] - vehicle.l_f * r, r)
+
+
+# Frozen models as JSON files: weights.json, whatever kind of model it holds.
+
+MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported where one is read
+    "network": ("identifier.paper.network", "NetworkModel"),
+    "axle": ("identifier.axle.model", "AxleModel"),
+    "curve": ("identifier.baselines.curves", "CurveModel"),
+    "onnx": ("identifier.own_network", "OnnxModel"),
+    "fit": ("identifier.estimate.model", "FittedModel"),
+}
+
+
+def load_model(path: str | PathLike[str]) -> TireModel:
+    """Read a frozen model of any kind.
+
+    Parameters
+    ----------
+    path : a file that the `save` of a frozen model wrote.
+
+    Raises
+    ------
+    FrozenModelError
+        Where the file is not such a model; one line that names it.
+    """
+    path = Path(path)
+    table = _stored(path)
+    _verdict_of(table)
+    kind = table.text("kind")
+    if kind not in MODELS:
+        table.refuse("kind", f"must be one of {list(MODELS)}, it is {shown(kind)}")
+    module, name = MODELS[kind]
+    model: TireModel = getattr(importlib.import_module(module), name).from_dict(
+        dict(table.data), str(path)
+    )
+    try:
+        require_alive(FrozenModelError, model)
+    except FrozenModelError as error:
+        raise FrozenModelError(f"{path}: {error}") from None
+    return model
+
+
+def stored_verdict(path: str | PathLike[str]) -> bool | None:
+    """Return whether a stored model was found valid when it was learnt; None where nobody judged.
+
+    Parameters
+    ----------
+    path : a file that the `save` of a frozen model wrote.
+
+    Raises
+    ------
+    FrozenModelError
+        Where the file is not such a model; one line that names it.
+    """
+    return _verdict_of(_stored(Path(path)))
+
+
+def _stored(path: Path) -> Table:
+    """Return the table of a file that says it is a frozen model."""
+    try:
+        table = Table(read_json(path, FrozenModelError), f"{path}: ", FrozenModelError)
+    except OSError as error:
+        reason = error.strerror or "not a file"
+        raise FrozenModelError(f"{path}: cannot be read: {reason.lower()}") from error
+    if "format" not in table or table.value("format") != FORMAT:
+        raise FrozenModelError(f"{path}: not a frozen model, format must be {FORMAT!r}")
+    return table
+
+
+def _verdict_of(table: Table) -> bool | None:
+    valid = table.value("valid") if "valid" in table else None
+    if valid is not None and not isinstance(valid, bool):
+        table.refuse("valid", f"must be true or false, it is {shown(valid)}")
+    return valid

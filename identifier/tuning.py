@@ -17,8 +17,6 @@ class Range(NamedTuple):
 
     Parameters
     ----------
-    low : smallest value.
-    high : largest value.
     log : whether values are spread evenly on a logarithmic scale, both ends being positive.
     """
 
@@ -55,7 +53,6 @@ def ranges_around(record: Any, factors: Mapping[str, float]) -> dict[str, Range]
 
     Parameters
     ----------
-    record : a dataclass.
     factors : by name, what the number is multiplied and divided by.
     """
     return {
@@ -65,13 +62,7 @@ def ranges_around(record: Any, factors: Mapping[str, float]) -> dict[str, Range]
 
 
 def with_numbers(record: Record, values: Mapping[str, float]) -> Record:
-    """Return a record with other numbers.
-
-    Parameters
-    ----------
-    record : a dataclass.
-    values : by name.
-    """
+    """Return a record with other numbers."""
     return reduce(lambda now, name: _set(now, name, values[name]), values, record)
 
 

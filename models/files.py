@@ -11,6 +11,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from codegen.writing import naming
+
 
 def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[bytes]) -> None:
     """Write a file; whoever reads it meanwhile, or after a failure, sees the old one whole.
@@ -34,7 +36,7 @@ def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[
     whole = content.encode("utf-8") if isinstance(content, str) else content
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as scratch:
         part = Path(scratch) / target.name  # in the same folder, thus on the same disk
-        with part.open("wb") as file:
+        with naming(target), part.open("wb") as file:
             file.writelines([whole] if isinstance(whole, bytes) else whole)
         part.replace(target)
 
@@ -52,10 +54,6 @@ def _require_file_or_nothing(target: Path) -> None:
 
 def resolved(path: str | PathLike[str]) -> Path:
     """Return where a path leads, by all its links.
-
-    Parameters
-    ----------
-    path : of anything, or nothing.
 
     Raises
     ------
@@ -79,12 +77,7 @@ def digest(content: Any) -> str:
 
 
 def digest_of_bytes(parts: Iterable[bytes]) -> str:
-    """Return twelve characters that stand for bytes.
-
-    Parameters
-    ----------
-    parts : of them, one after the other.
-    """
+    """Return twelve characters that stand for bytes."""
     found = hashlib.sha256()
     for part in parts:
         found.update(part)

@@ -14,12 +14,13 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.rules import require_positive
 
 MAX_PLACES = 4  # changes over the place that a compiled plant has room for
 
 
-class FrictionError(ValueError):
+class FrictionError(TireidError, ValueError):
     """A friction breaks a rule; the message names the rule and the value."""
 
 
@@ -67,7 +68,6 @@ class Friction:
     Parameters
     ----------
     scale : friction over the tire's own before the first change [-].
-    changes : in the order in which they are met.
 
     Raises
     ------

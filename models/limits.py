@@ -4,10 +4,12 @@ import math
 import os
 from dataclasses import asdict, dataclass, fields
 
+from codegen.errors import TireidError
+
 VARIABLE = "TIREID_LIMITS"
 
 
-class LimitError(ValueError):
+class LimitError(TireidError, ValueError):
     """The limits that the environment asks for are none."""
 
 
@@ -20,17 +22,11 @@ class InputLimits:
     megabytes : of a log, unpacked; it is read piece by piece: 10 h at 1 kHz of 20 columns fit.
     samples : rows of a log, steps of a recording.
     path : samples of a path, rows of way-points.
-    columns : of a log or of way-points.
     block : megabytes of a part of a log that is read whole: a MATLAB variable, a compressed chunk.
     document : megabytes of a JSON, ONNX or tire file, or of way-points.
-    toml : megabytes of a TOML file.
-    line : characters of a line of TOML.
-    depth : of tables and lists inside one another.
     values : numbers, texts, tables and lists in a JSON or TOML file.
     hidden : units of a network, whose code is compiled: 100 take ten seconds, 300 minutes.
-    hours : that a car is driven for.
     runs : designs, starts, seeds or random drives that one command is asked for.
-    processes : that one command is asked for.
     """
 
     megabytes: float = 16000.0

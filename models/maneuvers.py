@@ -14,9 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 
 
-class ManeuverError(ValueError):
+class ManeuverError(TireidError, ValueError):
     """A number of a maneuver breaks a rule; the message names it, the rule and the value."""
 
 
@@ -292,7 +293,6 @@ class RandomSteer:
     ----------
     amplitude : largest angle [rad].
     frequency : of the fastest swing [Hz].
-    seed : of the random numbers.
     onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
     duration : length [s].

@@ -15,7 +15,6 @@ def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
     Parameters
     ----------
     refusal : class of the error to raise.
-    name : of the value.
 
     Raises
     ------
@@ -37,7 +36,6 @@ def require_positive(refusal: type[ValueError], /, **values: float) -> None:
     Parameters
     ----------
     refusal : class of the error to raise.
-    **values : what to check, by name.
 
     Raises
     ------
@@ -53,10 +51,6 @@ def require_positive(refusal: type[ValueError], /, **values: float) -> None:
 def require_positive_fields(record: Any) -> None:
     """Refuse a record in which a number is not finite and above zero.
 
-    Parameters
-    ----------
-    record : a dataclass whose fields are all numbers.
-
     Raises
     ------
     ValueError
@@ -71,8 +65,6 @@ def require_within(refusal: type[ValueError], low: float, high: float, /, **valu
     Parameters
     ----------
     refusal : class of the error to raise.
-    low, high : ends of the interval, in the unit of the values.
-    **values : what to check, by name.
 
     Raises
     ------
@@ -87,12 +79,6 @@ def require_within(refusal: type[ValueError], low: float, high: float, /, **valu
 
 def require_kind(kind: type, remedy: str, /, **values: Any) -> None:
     """Refuse every argument of another kind, at the doors that users call.
-
-    Parameters
-    ----------
-    kind : that it must be.
-    remedy : how one is made.
-    **values : what to check, by name.
 
     Raises
     ------

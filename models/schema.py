@@ -38,10 +38,7 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
     Parameters
     ----------
     refusal : class of the error to raise.
-    where : file or option, begins the message.
-    count : what is asked for.
     limit : field of `InputLimits`.
-    what : is counted, in the plural.
 
     Raises
     ------
@@ -56,12 +53,48 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
         )
 
 
+def swells(size: float, packed: float) -> bool:
+    """Return whether data unpack to what no log packs to.
+
+    Parameters
+    ----------
+    size : unpacked, as memory holds it [bytes].
+    packed : as the file holds them [bytes].
+    """
+    return size > SWOLLEN_FROM and size > SWELLS * packed
+
+
+def most_unpacked(packed: float) -> int:
+    """Return how many bytes a part of a log that is unpacked whole may have at most."""
+    return int(min(1e6 * limits().block, max(SWOLLEN_FROM, SWELLS * packed)))
+
+
+def require_dense(
+    refusal: type[ValueError], where: str, size: float, packed: float, what: str
+) -> None:
+    """Refuse data that swell as no log does.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+
+    Raises
+    ------
+    ValueError
+        Of that class.
+    """
+    if swells(size, packed):
+        raise refusal(
+            f"{where}: {what} must be a log, they swell to {size / max(packed, 1):.0f} times their "
+            f"size, above {SWELLS}; unpack the file first if it is one"
+        )
+
+
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
     """Refuse what is no regular file, and files that are too large.
 
     Parameters
     ----------
-    path : to be read.
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes it may hold.
 
@@ -108,7 +141,6 @@ def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[byt
 
     Parameters
     ----------
-    path : a regular file.
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes there may be, unpacked.
 
@@ -136,11 +168,8 @@ def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[byt
                 return
             size += len(part)
             _require_size(path, refusal, size, limit)
-            if zipped and size > SWOLLEN_FROM and size > SWELLS * raw.tell():
-                raise refusal(
-                    f"{path}: gzip data must be a log, they swell to {size / raw.tell():.0f} times "
-                    f"their size, above {SWELLS}; unpack the file first if it is one"
-                )
+            if zipped:
+                require_dense(refusal, str(path), size, raw.tell(), "gzip data")
             yield part
 
 
@@ -155,7 +184,6 @@ def read_text(
 
     Parameters
     ----------
-    path : a regular file.
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes it may hold.
     encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
@@ -178,7 +206,6 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
 
     Parameters
     ----------
-    path : a regular file.
     refusal : class of the error to raise.
 
     Raises
@@ -250,7 +277,6 @@ class Table:
 
     Parameters
     ----------
-    data : the table as it was read.
     where : begins every message, as "car.toml: "; may be empty.
     refusal : class of the errors to raise.
     prefix : of the names of values in messages, as in "chassis.".
@@ -275,95 +301,49 @@ class Table:
 
         Parameters
         ----------
-        key : of the value.
         rule : that it breaks, as in "must be a number".
         """
         raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
 
     def value(self, key: str) -> Any:
-        """Return a value that must be there, of any type.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a value that must be there, of any type."""
         if key not in self.data:
             self.refuse(key, "is missing")
         return self.data[key]
 
     def only(self, *known: str) -> None:
-        """Refuse every other key.
-
-        Parameters
-        ----------
-        known : the keys that may be there.
-        """
+        """Refuse every other key."""
         for key in self.data:
             if key not in known:
                 self.refuse(visible(key[:SHOWN]), f"is unknown, known are {', '.join(known)}")
 
     def number(self, key: str) -> float:
-        """Return a number as float; it may be infinite, which the record that it is for refuses.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a number as float; it may be infinite, which the record that it is for refuses."""
         return float(self._as(float, key, self.value(key)))
 
     def whole(self, key: str) -> int:
-        """Return a whole number.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a whole number."""
         return int(self._as(int, key, self.value(key)))
 
     def text(self, key: str) -> str:
-        """Return a text.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a text."""
         return str(self._as(str, key, self.value(key)))
 
     def table(self, key: str) -> "Table":
-        """Return a table inside.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a table inside."""
         prefix = f"{self._prefix}{key}."
         return Table(self.value(key), self._where, self._refusal, prefix)
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Return a list of texts.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a list of texts."""
         return tuple(self._as(tuple[str, ...], key, self.value(key)))
 
     def wholes(self, key: str) -> tuple[int, ...]:
-        """Return a list of whole numbers.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a list of whole numbers."""
         return tuple(self._as(tuple[int, ...], key, self.value(key)))
 
     def tables(self, key: str) -> list["Table"]:
-        """Return a list of tables.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return a list of tables."""
         found = self.value(key)
         if not isinstance(found, list):
             self.refuse(key, f"must be a list, it is {shown(found)}")
@@ -371,12 +351,7 @@ class Table:
         return [Table(one, self._where, self._refusal, prefix) for one in found]
 
     def array(self, key: str) -> Array:
-        """Return nested lists of finite numbers, all rows alike, as an array of any shape.
-
-        Parameters
-        ----------
-        key : of the value.
-        """
+        """Return nested lists of finite numbers, all rows alike, as an array of any shape."""
         value = self.value(key)
         shape, level = [], [value]
         while level and isinstance(level[0], list):
@@ -390,13 +365,7 @@ class Table:
         return np.array(level, dtype=np.float64).reshape(shape)
 
     def only_fields(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
-        """Refuse every key that is no field of a dataclass; return the fields by name.
-
-        Parameters
-        ----------
-        cls : the dataclass.
-        skip : fields that do not come from this table.
-        """
+        """Refuse every key that is no field of a dataclass; return the fields by name."""
         known = {field.name: field for field in fields(cls) if field.name not in skip}
         self.only(*known)
         return known
@@ -407,7 +376,6 @@ class Table:
         Parameters
         ----------
         cls : the dataclass; its fields are the keys that may be there.
-        skip : fields that do not come from this table.
         """
         known = self.only_fields(cls, skip=skip)
         for key, field in known.items():
@@ -450,7 +418,6 @@ def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
     Parameters
     ----------
     refusal : class of the error to raise.
-    key : what the name is of.
 
     Raises
     ------

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.recordings import Recording
 
 # What a sensor can show at all: beyond it, and NaN, is no number of a sensor.
@@ -24,7 +25,7 @@ LARGEST_SHOWN: Mapping[str, float] = {
 }
 
 
-class SensorError(ValueError):
+class SensorError(TireidError, ValueError):
     """A number of a sensor breaks a rule; the message names it, the rule and the value."""
 
 
@@ -35,7 +36,6 @@ class Sensor:
     Parameters
     ----------
     noise : standard deviation of white Gaussian noise, in the unit of the signal.
-    bias : constant offset, in the unit of the signal.
     delay : the signal comes this much later [s], by interpolation; before, its first value holds.
     resolution : step of the quantization, in the unit of the signal; 0 for none.
 
@@ -95,7 +95,6 @@ class Sensors:
 
         Parameters
         ----------
-        recording : the exact signals.
         rng : source of the noise; the same generator state gives the same noise.
         """
         t = recording.t

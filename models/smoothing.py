@@ -10,12 +10,7 @@ NEGLIGIBLE = 1e-20  # share of an earlier sample
 
 
 def window(half: int) -> Array:
-    """Return a Hann window of sum one, (2 half + 1,).
-
-    Parameters
-    ----------
-    half : samples on each side of its middle.
-    """
+    """Return a Hann window of sum one, (2 half + 1,)."""
     bell = np.hanning(2 * half + 3)[1:-1]
     return np.asarray(bell / bell.sum(), dtype=np.float64)
 
@@ -26,7 +21,6 @@ def smoothed(signal: Array, half: int) -> Array:
     Parameters
     ----------
     signal : samples (n,).
-    half : samples on each side of the middle of the window.
     """
     padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
     return np.asarray(np.convolve(padded, window(half), "valid"), dtype=np.float64)

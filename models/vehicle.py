@@ -8,7 +8,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
@@ -28,7 +29,7 @@ from models.schema import Table, read_toml, require_name
 # plant never starts from a value that is not physical.
 
 
-class VehicleError(ValueError):
+class VehicleError(TireidError, ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
 
 
@@ -53,7 +54,8 @@ class Chassis:
     relaxation_length_front, relaxation_length_rear : distance rolled until 63 % of a slip change
         has become force [m].
     steering_lag : time constant from commanded to actual road-wheel angle [s].
-    drive_front_share : share of the front axle in the driving and braking force [-].
+    drive_front_share : share of the front axle in the driving force [-].
+    brake_front_share : the same of the braking force [-].
     tire : property file (.tir) of all four tires, or None where a tire object is handed over.
 
     Raises
@@ -77,6 +79,7 @@ class Chassis:
     relaxation_length_rear: float
     steering_lag: float
     drive_front_share: float
+    brake_front_share: float = 0.62
     tire: Path | None = None
 
     def __post_init__(self) -> None:
@@ -122,6 +125,7 @@ class Chassis:
             1.0,
             roll_stiffness_front_share=self.roll_stiffness_front_share,
             drive_front_share=self.drive_front_share,
+            brake_front_share=self.brake_front_share,
         )
         require_within(
             VehicleError,
@@ -148,9 +152,6 @@ def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str]
     Parameters
     ----------
     record : the dataclass to write; fields that are None are left out.
-    folder : paths are written relative to it.
-    table : name of the field that becomes a table of its own, last in the file.
-    leave_out : names of fields that are not written.
     """
     lines = [
         f"{one.name} = {_value(getattr(record, one.name), folder)}"
@@ -202,6 +203,15 @@ LIGHTEST = 0.2  # load of an axle that lifts, over the static one: a car that fl
 DOWNFORCE_SPEED = 30.0  # m/s
 LEAST_PRESS, MOST_PRESS = -0.5, 5.0  # static axle loads of downforce there
 AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
+
+# What a car may tell of braking and driving: height of its center of gravity over the wheelbase,
+# shares of the front axle, and drag area, ½ ρ A v_x² against the motion.
+
+OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # told there as well
+LENGTHWISE = (*OF_CHASSIS, "drag_area")  # of a `Vehicle`
+MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
+DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
+MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
 
 
 def load_ratio(downforce: Any, v_x: Any) -> Any:
@@ -282,6 +292,11 @@ class Vehicle:
         (both tires) over its slip angle at zero, at its static load [N/rad].
     downforce_area_front, downforce_area_rear : coefficient of downforce times area of the axle
         [m^2]: it adds ½ ρ A v_x^2 to the static load; negative where the body lifts.
+    cg_height : height of the center of gravity above the road [m]; None is that of the chassis, or
+        not known.
+    drive_front_share, brake_front_share : share of the front axle in the driving and the braking
+        force [-]; None is that of the chassis, or not known.
+    drag_area : coefficient of drag times frontal area [m^2]; None is not known.
     chassis : what the double-track plant needs, or None.
     estimated : names of the values that nobody measured, but that follow from the others by a
         rule; two cars that differ in it alone are equal.
@@ -289,8 +304,8 @@ class Vehicle:
     Raises
     ------
     VehicleError
-        For a value that is not positive and finite, for an inertia, a stiffness or a downforce
-        that no car of that mass has, or for springs too soft to carry the body.
+        For a value that is not positive and finite, for an inertia, a stiffness, a downforce or a
+        drag that no car of that mass has, or for springs too soft to carry the body.
     """
 
     name: str = "car"
@@ -302,6 +317,10 @@ class Vehicle:
     cornering_stiffness_rear: float
     downforce_area_front: float = 0.0
     downforce_area_rear: float = 0.0
+    cg_height: float | None = None
+    drive_front_share: float | None = None
+    brake_front_share: float | None = None
+    drag_area: float | None = None
     chassis: Chassis | None = None
     estimated: tuple[str, ...] = field(default=(), compare=False)
 
@@ -354,6 +373,38 @@ class Vehicle:
                     f"static loads of the axle at {DOWNFORCE_SPEED:g} m/s, it is "
                     f"{getattr(self, name):g}: check the units"
                 )
+        most_drag = MOST_DRAG * self.weight / (0.5 * AIR_DENSITY * DOWNFORCE_SPEED**2)
+        highest = {"cg_height": MOST_HEIGHT * self.wheelbase, "drag_area": most_drag}
+        for name in LENGTHWISE:
+            if (value := getattr(self, name)) is None:
+                continue
+            require_number(VehicleError, name, value)
+            require_within(VehicleError, 0.0, highest.get(name, 1.0), **{name: value})
+
+    def lengthwise(self, name: str) -> float | None:
+        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, None as neither.
+
+        Parameters
+        ----------
+        name : of the number.
+        """
+        told: float | None = getattr(self, name)
+        if told is None and self.chassis is not None:
+            told = getattr(self.chassis, name)
+        return told
+
+    def without_chassis(self) -> "Vehicle":
+        """Return the car alone, with the numbers of `OF_CHASSIS` that its chassis tells."""
+        told: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}
+        return replace(self, chassis=None, **told)
+
+    @property
+    def drag(self) -> float:
+        """Deceleration by the air over v_x^2 [1/m]; of a passenger car where no area is told."""
+        area = self.drag_area
+        if area is None:
+            area = DRAG_AREA if self.wheelbase >= FULL_SIZE else 0.0
+        return 0.5 * AIR_DENSITY * area / self.mass
 
     @property
     def wheelbase(self) -> float:
@@ -489,9 +540,9 @@ class Vehicle:
     def from_toml(cls, path: str | os.PathLike[str]) -> "Vehicle":
         """Read a vehicle from a TOML file: mass, l_f, l_r and what else is known of it.
 
-        Name, yaw inertia, cornering stiffnesses, areas of downforce and the table [chassis] may be
-        left out; inertia and stiffnesses are estimated then, see `estimated`, and the axles carry
-        their static loads at any speed.
+        Name, yaw inertia, cornering stiffnesses, areas of downforce, what `LENGTHWISE` names and
+        the table [chassis] may be left out; inertia and stiffnesses are estimated then, see
+        `estimated`, and the axles carry their static loads at any speed.
 
         Parameters
         ----------
@@ -500,11 +551,14 @@ class Vehicle:
         Raises
         ------
         VehicleError
-            One line with file, key and rule: key unknown or missing, type or value wrong.
-        FileNotFoundError
-            When there is no such file.
+            One line with file, key and rule: no such file, key unknown or missing, type or value
+            wrong.
         """
         file = Path(path)
+        if not file.exists():
+            raise VehicleError(
+                f"{file}: there is no such file; `tireid init` writes one to fill in"
+            )
         data = read_toml(file, VehicleError)
         inner = data.pop("chassis", None)
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
 from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
@@ -18,7 +19,7 @@ from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
 N_SOFT = 3  # e_y, slip in front, slip at the rear
 
 
-class NotConvergedError(RuntimeError):
+class NotConvergedError(TireidError, RuntimeError):
     """IPOPT did not find a solution; the message holds what it said."""
 
 
@@ -33,11 +34,8 @@ class Solution(NamedTuple):
 
 @cache
 def build_errors(structure: TireStructure) -> ca.Function:
-    """Return what costs and what is bounded, of x, kappa, v_x, car, w: y (7,) and slip (2,) [rad].
-
-    Parameters
-    ----------
-    structure : of the tire.
+    """Return what costs and what is bounded, of x, kappa, v_x, car, w: y (7,) and slip (2,)
+    [rad].
     """
     p = stage_ports(structure)
     at = motion(structure, p)
@@ -91,7 +89,6 @@ def numbers(problem: Problem, tire: PredictionTire, kappa: ArrayLike, v_x: Array
 
     Parameters
     ----------
-    tire : weights and car.
     kappa : curvature of each stage [1/m], (N,).
     v_x : speed of each stage [m/s], (N,).
     """
@@ -109,7 +106,6 @@ def bounds(problem: Problem, x0: ArrayLike) -> dict[str, Array]:
 
     Parameters
     ----------
-    problem : limits.
     x0 : state at the beginning (n_x,).
     """
     N, limits = problem.horizon, problem.limits
@@ -149,12 +145,10 @@ def solve_converged(
 
     Parameters
     ----------
-    tire : of the prediction, with its car.
     x0 : state at the beginning (n_x,).
     kappa : curvature of each stage [1/m], (N,) or a number.
     v_x : speed of each stage [m/s], (N,) or a number.
     guess : x (N + 1, n_x) and u (N,) to begin with; None begins at x0 held.
-    tolerance : of IPOPT.
 
     Raises
     ------

@@ -66,12 +66,7 @@ def stage_ports(structure: TireStructure) -> Ports:
 
 
 def motion(structure: TireStructure, p: Ports) -> Motion:
-    """Return the equations of motion and their derivatives, chained through the axle forces.
-
-    Parameters
-    ----------
-    p : symbols.
-    """
+    """Return the equations of motion and their derivatives, chained through the axle forces."""
     e_y, e_psi, v_y, r, delta, *lagged = ca.vertsplit(p.x)
     car = Car(*ca.vertsplit(p.car))
     at = Point(v_y, r, delta, p.v_x, car, p.w)

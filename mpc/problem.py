@@ -138,11 +138,6 @@ class Limits:
     soft_slip : Z of slip angles [1/rad²]. Chosen on ISO 3888-1, the slalom and a course of other
         turns, at 97 % of the grip on friction 0.5: with 3000 and more plans alternate between the
         limits of the steering rate, with 100 courses are driven up to 1.4 times as far off.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive and finite.
     """
 
     steering: float = 0.5
@@ -173,8 +168,6 @@ class Problem:
     ----------
     horizon : number of stages N.
     dt : length of a stage [s].
-    cost : weights.
-    limits : bounds.
 
     Raises
     ------

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.optional_tools import listen, unlisted
+
 gc.disable()  # until all is collected: what is imported until then stays
 for flag in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL"):  # packages are built as from a shell
     os.environ.pop(flag, None)
@@ -19,6 +21,8 @@ for flag in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL"):  # packages are built as from 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 # Of these each test takes longest: begun first, they do not keep one worker busy at the end.
 LONGEST = ("tests/tireid/", "tests/benchmarks/")
+ASKED: set[str] = set()  # commands that the test which runs has looked for or run
+listen(ASKED)
 HEAVY = tomllib.loads(Path(__file__).with_name("heavy.toml").read_text(encoding="utf-8"))["heavy"]
 
 
@@ -67,9 +71,21 @@ def pytest_collection_finish():
 
 def pytest_runtest_setup(item):
     """Leave out what is heavy and begins after a moment that was told, and say so."""
+    ASKED.clear()
     until = os.environ.get("TIREID_HEAVY_UNTIL")
     if until and item.get_closest_marker("heavy") and time.time() > float(until):
         pytest.skip("no time is left for what is heavy: `make heavy` runs it")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    """Fail where a test asks for an optional tool in a file that `make bare` does not run."""
+    try:
+        return (yield)
+    finally:
+        wrong = unlisted(item.nodeid.partition("::")[0], ASKED)
+        if wrong:
+            pytest.fail(wrong, pytrace=False)
 
 
 @pytest.fixture(scope="session")

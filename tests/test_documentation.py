@@ -1,8 +1,10 @@
-"""Public docstrings document parameters that there are, and say what arrays hold."""
+"""Docstrings name parameters that there are; those of the interface say what arrays hold."""
 
 import ast
+import inspect
 import re
 from pathlib import Path
+from types import ModuleType
 
 import tireid as ti
 from tests.sources import tree_of
@@ -73,31 +75,45 @@ def is_overload(node: Documented) -> bool:
     return "overload" in {ast.unparse(decorator) for decorator in node.decorator_list}
 
 
-def public_definitions(source: str) -> list[Documented]:
-    """Public functions, classes and methods."""
-    found: list[Documented] = []
+def documented_definitions(source: str) -> list[tuple[Documented, str]]:
+    """Functions, classes and methods, each with the name of the top level that it belongs to."""
+    found: list[tuple[Documented, str]] = []
     for node in tree_of(source).body:
-        if isinstance(node, Documented) and not node.name.startswith("_"):
-            found.append(node)
+        if isinstance(node, Documented):
+            found.append((node, node.name))
             if isinstance(node, ast.ClassDef):
-                found += [
-                    item
-                    for item in node.body
-                    if isinstance(item, ast.FunctionDef) and not item.name.startswith("_")
-                ]
-    return [node for node in found if not is_overload(node)]
+                methods = [item for item in node.body if isinstance(item, ast.FunctionDef)]
+                found += [(item, node.name) for item in methods]
+    return [(node, top) for node, top in found if not is_overload(node)]
 
 
-def complaints(source: str) -> list[str]:
-    """Drift between docstrings and signatures, and arrays of which no shape or unit is said.
+def interface() -> dict[Path, set[str]]:
+    """Names of what `tireid` offers and its bases, by the file that defines them."""
+    offered = [getattr(ti, name) for name in ti.__all__]
+    for module in [one for one in offered if isinstance(one, ModuleType)]:
+        offered += [value for name, value in vars(module).items() if not name.startswith("_")]
+    named: dict[Path, set[str]] = {}
+    for one in offered:
+        for part in one.__mro__ if inspect.isclass(one) else [one]:
+            if getattr(part, "__module__", "").split(".")[0] in PACKAGES and hasattr(
+                part, "__qualname__"
+            ):
+                named.setdefault(Path(inspect.getfile(part)), set()).add(part.__qualname__)
+    return named
 
-    A parameter whose name and type say what it is needs no entry.
+
+def complaints(source: str, offered: set[str]) -> list[str]:
+    """Drift between docstrings and signatures; what the interface leaves without a docstring, and
+    its arrays of which no shape or unit is said.
+
+    A parameter whose name and type say what it is needs no entry, nor does one that is not offered.
     """
     wrong = []
-    for node in public_definitions(source):
+    for node, top in documented_definitions(source):
         docstring = ast.get_docstring(node)
+        public = top in offered and not node.name.startswith("_")
         if docstring is None:
-            wrong.append(f"{node.name} has no docstring")
+            wrong += [f"{node.name} has no docstring"] * public
             continue
         documented, actual = documented_parameters(docstring), actual_parameters(node)
         if list(documented) != [name for name in actual if name in documented]:
@@ -107,7 +123,7 @@ def complaints(source: str) -> list[str]:
         wrong += [
             f"{node.name} says neither the shape nor the unit of {name}"
             for name, annotation in actual.items()
-            if is_array(annotation) and not describes_itself(node)
+            if public and is_array(annotation) and not describes_itself(node)
             if not re.search(SHAPE_OR_UNIT, documented.get(name, ""))
             and not re.search(rf"`{name}` (?:{SHAPE_OR_UNIT})", docstring)
         ]
@@ -115,13 +131,21 @@ def complaints(source: str) -> list[str]:
 
 
 def test_documented_parameters_are_those_of_the_signature():
+    offered = interface()
     wrong = [
         f"{path.relative_to(ROOT)}: {line}"
         for package in PACKAGES
         for path in sorted((ROOT / package).rglob("*.py"))
-        for line in complaints(path.read_text(encoding="utf-8"))
+        for line in complaints(path.read_text(encoding="utf-8"), offered.get(path, set()))
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_the_interface_is_what_tireid_names_with_its_bases():
+    named = {name for names in interface().values() for name in names}
+    assert named > {"Vehicle", "AxleIdentifier", "Method", "TireModel", "read_recording"}
+    assert "Path" in named  # of `tireid.paths`
+    assert not named & {"Tracker", "Scan", "gate"}
 
 
 def test_a_drifted_docstring_is_caught():
@@ -174,13 +198,15 @@ class Corner(NamedTuple):
     x: float
     y: Array
 '''
-    assert complaints(source) == [
+    offered = {"silent", "volume", "Box", "Corner"}
+    assert complaints(source, offered) == [
         "area documents ['width', 'depth'], its parameters are ['width', 'height']",
         "ratio documents ['below', 'above'], its parameters are ['above', 'below']",
         "silent has no docstring",
         "volume says neither the shape nor the unit of samples",
         "Box says neither the shape nor the unit of corners",
     ]
+    assert complaints(source, set()) == complaints(source, offered)[:2]
 
 
 def missing_names(page: str) -> set[str]:
@@ -233,3 +259,25 @@ def test_every_page_is_in_the_table_of_contents():
     files = [*DOCUMENTS[2:], *(ROOT / "docs").rglob("*.ipynb")]
     pages = {p.relative_to(ROOT / "docs").with_suffix("").as_posix() for p in files}
     assert listed == pages - {"index"}
+
+
+def written_twice(text: str) -> list[str]:
+    """Folders that the commands of a document, run in their order, find written by an earlier one.
+
+    A store of a fleet grows; what is forced replaces.
+    """
+    lines = "\n".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)).splitlines()
+    commands = [re.sub(r"\s#.*", "", line) for line in lines if "--force" not in line]
+    found = [re.search(r"^tireid (?!fleet).* --(?:out|repair) (\S+)", line) for line in commands]
+    names = [match[1] for match in found if match]
+    return sorted({name for name in names if names.count(name) > 1})
+
+
+def test_no_command_of_a_document_meets_the_folder_of_another():
+    for path in DOCUMENTS:
+        assert not written_twice(path.read_text(encoding="utf-8")), path
+    twice = (
+        "```sh\ntireid export --out a\n```\n\n```sh\ntireid export --band --out a  # --force\n```\n"
+    )
+    assert written_twice(twice) == []
+    assert written_twice(twice.replace("  # --force", "")) == ["a"]

@@ -96,6 +96,7 @@ def test_a_tree_is_counted(tmp_path):
         "files": 2,
         "lines": 19,
         "imported_once": 1,
+        "circles": 0,
         "type_switches": 3,
         "arrays": 1,
         "pairs": 0,

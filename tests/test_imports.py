@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.sources import nodes_of
+from tests.test_house import house, modules
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = ("codegen", "models", "identifier", "mpc", "tireid")
@@ -40,6 +41,24 @@ def test_the_rule_catches_a_planted_import():
     assert wrong_imports("codegen", "import models.vehicle as v") == {"models"}
     assert wrong_imports("identifier", "import matplotlib.pyplot") == {"matplotlib"}
     assert wrong_imports("tireid", "import matplotlib, identifier, models") == set()
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_no_files_of_a_package_import_one_another_in_a_circle(package):
+    paths = (ROOT / package).rglob("*.py")
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+    assert not house.circles({name: ast.parse(text) for name, text in texts.items()})
+
+
+def test_the_rule_catches_planted_circles_of_late_and_of_typed_imports():
+    late = "def solve():\n    from m.c import solve"
+    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from m import a"
+    tree = {"m__a": "import m.b", "m__b": late, "m__c": typed, "m__d": "from m.a import x"}
+    assert house.circles(modules(**tree)) == [["m/a.py", "m/b.py", "m/c.py"]]
+    assert house.circles(modules(**tree | {"m__c": "import ast"})) == []
+    through = {"m/__init__.py": "from m.a import x", "m/a.py": "from m import x"}
+    parsed = {name: ast.parse(text) for name, text in through.items()}
+    assert house.circles(parsed) == [["m/__init__.py", "m/a.py"]]
 
 
 def commands_imported(source: str) -> set[str]:

@@ -2,12 +2,15 @@
 
 import importlib
 import importlib.util
+import os
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+
+from tests.test_own_packages import SEDAN, SPAWNED, put_strangers
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
@@ -25,7 +28,7 @@ many = tire.force(np.linspace(-0.1, 0.1, 11), axle="rear")
 reveal_type(many)
 reveal_type(run)
 reveal_type(tire.stiffness)
-reveal_type(ti.replay(tire, log).against_truth)
+reveal_type(ti.replay(log, tire).against_truth)
 reveal_type(ti.certify(ti.PaperIdentifier.for_vehicle(car), car).verdict)
 reveal_type(ti.drive(ti.paths.iso_3888_2(), car, tire).scores)
 reveal_type(ti.__version__)
@@ -80,7 +83,8 @@ def installed(tmp_path_factory):
 
 def run_in(folder: Path, *command: object) -> subprocess.CompletedProcess[str]:
     words = [str(word) for word in command]
-    return subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(words, cwd=folder, env=own, capture_output=True, text=True, check=False)
 
 
 def test_every_package_says_that_it_is_typed(installed):
@@ -98,6 +102,14 @@ def test_the_wheel_runs_from_another_folder(installed, tmp_path):
     done = run_in(tmp_path, python, "-c", code)
     assert done.stdout.split() == [str(packages), "sedan", "False"], done.stderr
     assert run_in(tmp_path, python, "-m", "tireid").stdout.startswith("usage: tireid")
+
+
+@pytest.mark.parametrize("code", [SEDAN, SPAWNED], ids=["here", "spawned"])
+def test_the_wheel_runs_beside_strangers_of_its_packages_names(installed, tmp_path, code):
+    python, packages = installed
+    put_strangers(tmp_path)
+    done = run_in(tmp_path, python, "-c", f"{code}\nprint(ti.__file__)")
+    assert done.stdout.split() == ["sedan", f"{packages}/tireid/__init__.py"], done.stderr
 
 
 def test_a_project_outside_sees_the_types(installed, tmp_path):

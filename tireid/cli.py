@@ -23,12 +23,7 @@ class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all errors of tireid."""
 
     def error(self, message: str) -> NoReturn:
-        """Print one line and exit with code 2.
-
-        Parameters
-        ----------
-        message : what is wrong with the words.
-        """
+        """Print one line and exit with code 2."""
         complain(f"{self.prog}: error: {one_line(message)} ({_hint(message, self.prog)})")
         sys.exit(BAD_INPUT)
 
@@ -43,12 +38,7 @@ def _hint(message: str, program: str) -> str:
 
 
 def build_parser(words: Sequence[str]) -> Parser:
-    """Return the parser of a command line: all commands, and the options of the one it names.
-
-    Parameters
-    ----------
-    words : after `tireid`.
-    """
+    """Return the parser of a command line: all commands, and the options of the one it names."""
     parser = Parser(
         prog="tireid",
         description="Learns a car's lateral tire forces while it drives and freezes them.",
@@ -121,12 +111,7 @@ def _expected_errors() -> tuple[type[Exception], ...]:
 
 
 def one_line(error: Exception | str) -> str:
-    """Return what an error says, in one line; files are named first.
-
-    Parameters
-    ----------
-    error : any error, or its text.
-    """
+    """Return what an error says, in one line; files are named first."""
     if isinstance(error, OSError) and error.filename is not None:
         words = f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
     elif isinstance(error, OSError) and error.strerror:

@@ -1,7 +1,9 @@
 """Work spread over a Dask cluster: the same functions, on as many machines as have workers.
 
 Every worker must have this very version of tireid, which is checked. Results come in any order. A
-worker that is lost is made good for by the scheduler; what several workers died of is told of.
+worker that is lost is made good for by the scheduler; what several workers died of is told of. Of
+the threads of a worker one works: CasADi's graphs must not be built by two at once. Which workers
+have more is said, and how to start processes instead.
 """
 
 import importlib
@@ -11,13 +13,16 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+from codegen.errors import TireidError
 from identifier.compare.work import Map, source_digest
+from models.extras import needs
+from tireid.progress import say
 
 PATIENCE = 30.0  # s that the scheduler and the first worker may take to answer
 _ONE_AT_A_TIME = threading.Lock()  # CasADi's graphs must not be built by two threads of a worker
 
 
-class ClusterError(OSError):
+class ClusterError(TireidError, OSError):
     """The cluster cannot be reached or cannot be used; one line that names its address."""
 
 
@@ -34,18 +39,19 @@ def cluster(address: str) -> Iterator[Map]:
     ClusterError
         Where the scheduler or a worker does not answer, or a worker has another version of tireid.
     ImportError
-        Where Dask is not installed; the message names the extra.
+        Where Dask is not installed; the message says how to install it.
     """
     try:
         dask: Any = importlib.import_module("distributed")
     except ImportError as error:
-        raise ImportError("--scheduler needs Dask: pip install 'tireid[cluster]'") from error
+        raise ImportError(needs("--scheduler", "Dask", "cluster")) from error
     try:
         client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         _require_workers(client, address)
+        _tell_of_idle_threads(client, address)
         yield partial(_map, dask, client, address)
     finally:
         client.close()
@@ -57,12 +63,27 @@ def _require_workers(client: Any, address: str) -> None:
     except TimeoutError as error:
         raise ClusterError(f"{address}: the scheduler has no workers") from error
     try:
-        versions = client.run(source_digest)
+        versions = client.run(_digest)
     except Exception as error:
         raise ClusterError(f"{address}: a worker cannot load tireid: {error}") from error
     other = sorted(worker for worker, digest in versions.items() if digest != source_digest())
     if other:
         raise ClusterError(f"{address}: worker {other[0]} has another version of tireid")
+
+
+def _digest() -> str:
+    """Return the digest by a function of tireid, which finds its own packages on a worker."""
+    return source_digest()
+
+
+def _tell_of_idle_threads(client: Any, address: str) -> None:
+    threads = {worker: count for worker, count in client.nthreads().items() if count > 1}
+    if threads:
+        worker, count = next(iter(threads.items()))
+        say(
+            f"worker {worker} has {count} threads, of which one works; start it as processes: "
+            f"dask worker {address} --nworkers -1 --nthreads 1"
+        )
 
 
 def _map(

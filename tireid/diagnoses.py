@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
+from identifier.measured import with_doubt
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import Objection
 from models.recordings import LogMap, Recording, Repair
@@ -23,11 +24,11 @@ from tireid.report import (
     Report,
     Section,
     Table,
+    Tone,
     printed,
     write_report,
 )
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.verdicts import with_doubt
 
 HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -58,13 +59,7 @@ GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer i
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --repair.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : is done with the repair, for the help.
-    """
+    """Add --repair."""
     parser.add_argument(
         "--repair",
         nargs="?",
@@ -76,12 +71,7 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
-    """Return what was found as rows: what, size, confidence, repair.
-
-    Parameters
-    ----------
-    diagnosis : of a log.
-    """
+    """Return what was found as rows: what, size, confidence, repair."""
     return [
         [
             " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
@@ -94,12 +84,7 @@ def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
 
 
 def size_text(finding: Finding) -> str:
-    """Return the size of a finding to the digits that its deviation leaves, with its unit.
-
-    Parameters
-    ----------
-    finding : with or without a size.
-    """
+    """Return the size of a finding to the digits that its deviation leaves, with its unit."""
     if math.isnan(finding.size):
         return ""
     scale, unit = {"s": (1e3, "ms"), "rad": (math.degrees(1.0), "deg")}.get(
@@ -116,7 +101,6 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
 
     Parameters
     ----------
-    diagnosis : of a log.
     unseen : whether what the log cannot tell stands below.
     """
     count = len(diagnosis.findings)
@@ -127,27 +111,22 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
 
 
-def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
-    """Return what was found as warnings of a report.
+def tone_of(diagnosis: Diagnosis) -> Tone:
+    """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
+    if not diagnosis.healthy:
+        return "bad"
+    return "doubt" if diagnosis.findings else "good"
 
-    Parameters
-    ----------
-    diagnosis : of a log.
-    """
+
+def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
+    """Return what was found as warnings of a report."""
     return [printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
 def diagnosis_section(
     diagnosis: Diagnosis, more: Sequence[Block] = (), heading: str = "Is the log right?"
 ) -> Section:
-    """Return the section of a report that holds a diagnosis.
-
-    Parameters
-    ----------
-    diagnosis : of a log.
-    more : blocks that follow.
-    heading : of the section.
-    """
+    """Return the section of a report that holds a diagnosis."""
     rows = finding_rows(diagnosis)
     blocks: list[Block] = [
         Paragraph(text="What is wrong with the log, or with what is told of its car, asked of the "
@@ -167,8 +146,6 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
 
     Parameters
     ----------
-    diagnosis : of a log.
-    repair : that was applied.
     path : of --repair, None where it was not asked for.
     """
     lines = [diagnosis_text(diagnosis, unseen=False)]
@@ -213,13 +190,7 @@ def write_doctor_report(
 
     Parameters
     ----------
-    folder : where to.
-    recording : as it was read.
-    vehicle : as it was told.
-    diagnosis : of both.
     after : that of the repaired log, None where nothing was repaired.
-    figure : of force over slip, before and after.
-    command : as it was typed.
     """
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
     sections = [
@@ -230,11 +201,16 @@ def write_doctor_report(
         sections.append(diagnosis_section(after, heading="After the repair"))
     count = len(diagnosis.findings)
     numbers = [
-        Headline(str(count), f"finding{'s' * (count != 1)} in the log or the car's file"),
+        Headline(
+            str(count),
+            f"finding{'s' * (count != 1)} in the log or the car's file",
+            tone_of(diagnosis),
+        ),
         Headline(str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"),
     ]
     if after is not None:
-        numbers.append(Headline(str(len(after.findings)), "left after the repair"))
+        left = str(len(after.findings))
+        numbers.append(Headline(left, "left after the repair", tone_of(after)))
     report = Report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",
@@ -246,14 +222,7 @@ def write_doctor_report(
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:
-    """Write how a log is read with what is sure taken out of it, and return it.
-
-    Parameters
-    ----------
-    path : of the log.toml.
-    told : how the log was read.
-    diagnosis : of what was read so.
-    """
+    """Write how a log is read with what is sure taken out of it, and return it."""
     repaired = replace(told, repair=told.repair.then(diagnosis.repair))
     repaired.to_toml(path)
     return repaired

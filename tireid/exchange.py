@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from codegen.errors import TireidError
+
 try:
     import fcntl
 except ImportError:  # not on Windows
@@ -19,7 +21,7 @@ CANNOT = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP}  # here, 
 UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
 
 
-class ClaimedError(OSError):
+class ClaimedError(TireidError, OSError):
     """Another process holds the claim."""
 
     def refusal(self, doing: str) -> str:
@@ -49,10 +51,6 @@ def _renameat2() -> Any:
 
 def exchange(one: Path, other: Path) -> bool:
     """Let two folders change places in one step; return whether the system could.
-
-    Parameters
-    ----------
-    one, other : both exist, on the same disk.
 
     Raises
     ------

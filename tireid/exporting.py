@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import find_compiler
+from codegen.errors import TireidError
+from codegen.writing import write_file
 from identifier.export.package import Package, build_package, readme
 from identifier.export.processor import Cost, figures_text, measure, with_figures
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import continuing
-from identifier.run import History
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
@@ -22,6 +23,7 @@ from mpc.export.processor import measure_mpc, mpc_figures_text, time_here, with_
 from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
 from tireid.progress import Progress
+from tireid.run import Run
 
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 COSTS, TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
@@ -39,15 +41,7 @@ PARTS = (  # of an export: about how long each takes, and the option that asks f
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Exported:
-    """What was written.
-
-    Parameters
-    ----------
-    folder : that was written.
-    package : of the identifier.
-    costs : on the processors that could be measured here.
-    told : what is to be said of the tracker, line by line.
-    """
+    """What was written."""
 
     folder: Path
     package: Package
@@ -67,16 +61,15 @@ class Exported:
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
-        estimates = [step.vehicle.estimates] if step.vehicle.estimates else []
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
-        return "\n".join([*lines, *self.told, *estimates, reads, *told, wrote])
+        return "\n".join([*lines, *self.told, reads, *told, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
 
 
 def export(
-    source: History | TireModel | Method,
+    source: Run | TireModel | Method,
     folder: str | PathLike[str],
     *,
     vehicle: Vehicle | None = None,
@@ -95,7 +88,7 @@ def export(
     Parameters
     ----------
     source : a run, whose method goes on from its end; a tire model, from which the method that
-        made it goes on; or a method, which begins afresh.
+        made it goes on; or a method, which begins afresh. From a fit the axle identifier goes on.
     folder : to write.
     vehicle : the car; None takes that of the run or the model, for a method the sedan.
     name : prefix of every symbol.
@@ -122,12 +115,14 @@ def export(
     if not overwrite and target.is_dir() and any(target.iterdir()):
         raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
     start: TireModel | None = None
-    if isinstance(source, History):
-        method, car = source.design, vehicle or source.vehicle
+    if isinstance(source, Run):
+        method, car = source.method, vehicle or source.vehicle
         try:
-            start = source.calibrated() if band else source.freeze()
+            start = source.tire if band else source.freeze()
         except CannotFreezeError:  # a filter of forces learns nothing that a run could begin with
             start = None
+        if method.whole and start is not None:
+            method = continuing(start, car, method.dt)
     elif isinstance(source, TireModel):
         start, car = source, vehicle or source.vehicle
         method = continuing(source, car)
@@ -171,16 +166,11 @@ def export_method(
     Parameters
     ----------
     start : model to begin with; None begins afresh.
-    folder : to write.
-    name : prefix of every symbol.
     single : float unless the build says double.
     with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
     band : half the width of the band around each force is an output too, calibrated as `start` is.
     fmu : also FMUs 2.0 and 3.0.
-    onnx : also the model, frozen, as ONNX.
-    mpc : also a tracker.
     caution : of that tracker, from 0 to 1.
-    overwrite : replace the folder if it exists.
 
     Raises
     ------
@@ -241,7 +231,7 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
 def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
+        write_file(folder / path, text)
 
 
 def _write_onnx(
@@ -273,7 +263,6 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     Parameters
     ----------
     folder : where the identifier lies in a folder of that name.
-    package : of the identifier.
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1.
 
@@ -311,7 +300,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
 
 
-class SelfTestError(RuntimeError):
+class SelfTestError(TireidError, RuntimeError):
     """A package does not compile or fails its own test; the message holds what was printed."""
 
 
@@ -328,8 +317,6 @@ def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
 
     Parameters
     ----------
-    folder : with the package.
-    name : prefix of its symbols.
     single : whether to compute in float.
 
     Raises

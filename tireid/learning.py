@@ -7,33 +7,36 @@ from identifier.doctor import diagnose
 from identifier.estimate.method import FitMethod
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
-from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
-from identifier.run import DivergedError, History
+from identifier.methods import make_method
+from identifier.prediction import Prediction, predict
+from identifier.reproducibility import counted_samples, freeze_key
+from identifier.run import DivergedError
 from identifier.run import identify as run_over
 from identifier.tire_model import TireModel
 from models.recordings import Recording, check_against_vehicle
 from models.rules import require_kind
 from models.vehicle import Vehicle
+from tireid.run import Run
 
 log = logging.getLogger("tireid.doctor")
 
 # How to make what a door wants, for who hands it something else.
-RECORDING = "as of read_recording or Recording.from_dataframe"
+RECORDING = "as of read_recording"
 VEHICLE = "as of Vehicle.from_toml or sedan"
-METHOD = 'as of make_method("axle", vehicle)'
-TIRE = "as of History.freeze or TireModel.load"
+METHOD = 'as of make_method("axle", vehicle), or a name of methods()'
+TIRE = "as of Run.tire or TireModel.load"
 
 
 def identify(
     recording: Recording,
     vehicle: Vehicle,
-    method: Method | None = None,
+    method: Method | str | None = None,
     *,
     start: TireModel | None = None,
     check: bool = True,
     progress: Callable[[float], None] | None = None,
-) -> History:
-    """Learn the tires of a car from a drive, sample by sample.
+) -> Run:
+    """Learn the tires of a car from a drive.
 
     What the doctor finds wrong with the drive or the car, and that matters, is logged as warnings
     of "tireid.doctor", each with its finding as `record.finding`; nothing is repaired: `diagnose`
@@ -43,8 +46,9 @@ def identify(
     ----------
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
-    method : the identifier; None takes `FitMethod.for_vehicle` at the recording's interval, or
-        `InertialIdentifier.for_vehicle`, which estimates v_y, where the recording has none.
+    method : the identifier, or its name as of `methods`; None takes `FitMethod.for_vehicle` at the
+        recording's interval, or `InertialIdentifier.for_vehicle`, which estimates v_y, where the
+        recording has none.
     start : model to go on learning from; None begins afresh.
     check : whether what this vehicle cannot have driven is refused, and the doctor asked.
     progress : called now and then with the share that is done, 0 to 1.
@@ -58,12 +62,14 @@ def identify(
     NeverDrivesError
         Where the car never drives.
     ValueError
-        Where recording and method differ in their sampling interval.
+        Where recording and method differ in their sampling interval, or nothing has that name.
     TypeError
         Where an argument is of another kind.
     """
     require_kind(Recording, RECORDING, recording=recording)
     require_kind(Vehicle, VEHICLE, vehicle=vehicle)
+    if isinstance(method, str):
+        method = make_method(method, vehicle)
     if method is not None:
         require_kind(Method, METHOD, method=method)
     usual = InertialIdentifier if recording.logged_v_y is None else FitMethod
@@ -80,17 +86,17 @@ def identify(
         at = freeze_key(history.diverged_at)
         law = getattr(design, "law", type(design).__name__)
         raise DivergedError(f"{recording.name}: the {law} law diverged at {at} s")
-    return history
+    return Run(history=history)
 
 
-def replay(tire: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
+def replay(recording: Recording, tire: TireModel, *, since: float | None = None) -> Prediction:
     """Predict the axle forces of a drive and compare them with its true ones, where it has any.
 
     Parameters
     ----------
-    tire : what was learnt.
     recording : another drive; samples below the model's minimum speed do not count. Where it has
         no v_y, the inertial identifier estimates it, beginning with `tire`.
+    tire : what was learnt.
     since : samples before this time [s] do not count; None counts all.
 
     Raises
@@ -100,8 +106,8 @@ def replay(tire: TireModel, recording: Recording, *, since: float | None = None)
     TypeError
         Where an argument is of another kind.
     """
-    require_kind(TireModel, TIRE, tire=tire)
     require_kind(Recording, RECORDING, recording=recording)
+    require_kind(TireModel, TIRE, tire=tire)
     return predict(tire, with_v_y(recording, tire), since=since)
 
 
@@ -110,7 +116,6 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
 
     Parameters
     ----------
-    recording : with or without.
     tire : where it can go on learning from it, it begins with it.
 
     Raises

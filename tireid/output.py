@@ -20,6 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
+from codegen.writing import naming, write_file
+from models.extras import needs
 from models.files import resolved
 from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
@@ -30,7 +33,7 @@ FORMAT = "tireid output 1"
 SPARE_NAMES = 1000  # results-2, results-3, ...
 
 
-class OutputError(ValueError):
+class OutputError(TireidError, ValueError):
     """The output folder cannot be used; the message says why and what to do."""
 
 
@@ -46,7 +49,6 @@ def require_free(path: Path, *, force: bool) -> None:
 
     Parameters
     ----------
-    path : to be written.
     force : whether what is there may be replaced.
 
     Raises
@@ -90,13 +92,27 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
         new = scratch / "new"
         try:
             new.mkdir()
-            yield new
-            _write_marker(new)
+            with _named_as_final(new, target):
+                yield new
+                _write_marker(new)
             _put_in_place(new, target, final, force=force, aside=scratch / "old")
         finally:
             _discard(new)
             with suppress(OSError):  # it holds what could not be put back
                 scratch.rmdir()
+
+
+@contextmanager
+def _named_as_final(new: Path, target: Path) -> Iterator[None]:
+    """Say of a file that cannot be written where it was to be: nobody knows the scratch folder."""
+    try:
+        yield
+    except OSError as error:
+        path = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else new
+        if new not in path.parents:
+            raise
+        at = target / path.relative_to(new)
+        raise OSError(error.errno, error.strerror, str(at)) from error
 
 
 def _require_replaceable(target: Path, final: Path, force: bool) -> None:
@@ -142,7 +158,7 @@ def _write_marker(folder: Path) -> None:
         else:
             files[name] = [path.stat().st_size, _hash(path)]
     content = {"format": FORMAT, "files": files, "folders": folders}
-    (folder / MARKER).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_file(folder / MARKER, json.dumps(content, indent=1) + "\n")
 
 
 def _hash(path: Path) -> str:
@@ -285,7 +301,7 @@ def write_json(path: Path, data: Any) -> None:
     ----------
     data : dictionaries, lists, numbers, strings and None.
     """
-    path.write_text(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
 
 
 def _finite(data: Any) -> Any:
@@ -312,13 +328,8 @@ ROWS = 4096  # that are put into words at once
 
 
 def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
-    """Write columns that come part by part, as `write_csv` does.
-
-    Parameters
-    ----------
-    parts : each with the same columns.
-    """
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    """Write columns that come part by part, as `write_csv` does."""
+    with naming(path), path.open("w", encoding="utf-8", newline="\n") as file:
         for k, columns in enumerate(parts):
             if k == 0:
                 file.write(",".join(columns) + "\n")
@@ -330,18 +341,12 @@ def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
-    """Write columns that come part by part: as `write_csv` does, or as Parquet with all digits.
-
-    Parameters
-    ----------
-    path : .csv or .parquet.
-    parts : each with the same columns.
-    """
+    """Write columns that come part by part: as `write_csv` does, or as Parquet with all digits."""
     if path.suffix != ".parquet":
         write_long_csv(path, parts)
         return
     pyarrow, parquet = _parquet()
-    with ExitStack() as stack:
+    with naming(path), ExitStack() as stack:
         writer: Any = None
         for columns in parts:
             arrays = {  # by their buffers: what makes arrays of NumPy's imports pandas
@@ -379,7 +384,7 @@ def _parquet() -> tuple[Any, Any]:
     try:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError:
-        raise ValueError("--curves parquet needs pyarrow: pip install tireid[parquet]") from None
+        raise ValueError(needs("--curves parquet", "pyarrow", "parquet")) from None
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:
@@ -389,7 +394,6 @@ def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = 
     ----------
     rows : cells; a row may be shorter than others.
     align : of each column, `<` left or `>` right; columns without are left.
-    indent : before each line.
     """
     count = max((len(row) for row in rows), default=0)
     sides = align.ljust(count, "<")

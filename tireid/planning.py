@@ -46,7 +46,7 @@ def plan(
     area : length and width of what may be driven on [m].
     speed : that is held [m/s].
     time : of steering, over all passes through the area [s].
-    after : what was learnt already, as the axle identifier leaves it; None knows nothing.
+    after : what was learnt already, of a fit or the axle identifier; None knows nothing.
     friction : believed of tires and road, within 30 % [-]; None takes 0.8. What was learnt knows
         it better: they exclude each other.
     share : of the grip that is used at most, 0.2 to 0.97.
@@ -64,7 +64,7 @@ def plan(
     PlanError
         Where the area, the speed or the time make no maneuver.
     ValueError
-        Where a number is out of its range, or `after` is no model of the axle identifier or that
+        Where a number is out of its range, or `after` does not know how sure it is or is that
         of another car.
 
     Examples
@@ -103,10 +103,6 @@ def plan(
 def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
     """Return how the double-track car of the vehicle drives a plan; none where it has no tires.
 
-    Parameters
-    ----------
-    found : the plan.
-
     Raises
     ------
     PlanError
@@ -124,10 +120,12 @@ def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
 
 
 def _of_car(model: TireModel, vehicle: Vehicle) -> AxleModel:
-    """Return the model, judged."""
+    """Return the model in hidden units, judged."""
+    kind = model.kind
+    model = model.in_units()
     if not isinstance(model, AxleModel):
         raise ValueError(
-            f"a plan needs to know how sure a model is, as that of the axle identifier does: "
-            f"this one is of kind {model.kind!r}"
+            "a plan needs to know how sure a model is, as a fit and the axle identifier do: "
+            f"this one is of kind {kind!r}"
         )
     return model if model.vehicle == vehicle else model.mounted_on(vehicle)

@@ -29,24 +29,14 @@ def _escaped(text: str) -> str:
 
 
 def say(text: str) -> None:
-    """Print one line for the person who waits.
-
-    Parameters
-    ----------
-    text : the line.
-    """
+    """Print one line for the person who waits."""
     from codegen.escape import visible
 
     complain(f"  {visible(text)}")
 
 
 def complain(text: str) -> None:
-    """Print a text on standard error, where there is one to print on.
-
-    Parameters
-    ----------
-    text : one or several lines.
-    """
+    """Print a text on standard error, where there is one to print on."""
     _print(f"{_wiped()}{_escaped(text)}\n")
 
 
@@ -65,10 +55,6 @@ def tell(text: str) -> None:
     """Print results on standard output; `unwritten` remembers whether they could not be written.
 
     A reader that went away, as `head` does, has seen enough: the rest is not printed.
-
-    Parameters
-    ----------
-    text : one or several lines.
     """
     _write_out(f"{_escaped(text)}\n")
 
@@ -162,7 +148,6 @@ class Progress:
 
     Parameters
     ----------
-    what : that goes on.
     parts : names of its parts in order, and about how long each takes beside the others; None has
         one.
     long : whether it is known to last, so that the beginning of each part is told at once.
@@ -208,18 +193,12 @@ class Progress:
         Parameters
         ----------
         of : steps of the part.
-        text : what was done, in place of the part's name.
         """
         self._done += 1
         self(min(self._done / max(of, 1), 1.0), text)
 
     def along(self, lengths: Sequence[float]) -> Callable[[str], None]:
-        """Return who is told in words of each of several steps of the part, when it is done.
-
-        Parameters
-        ----------
-        lengths : about how long each takes beside the others.
-        """
+        """Return who is told in words of each of several steps of the part, when it is done."""
         ends, whole = iter(accumulate(lengths)), sum(lengths)
 
         def told(text: str) -> None:
@@ -242,7 +221,6 @@ class Progress:
         Parameters
         ----------
         share : done of the part, 0 to 1.
-        text : what is being done, in place of the part's name.
         """
         now = time.perf_counter()
         live = _on_terminal()

@@ -9,8 +9,9 @@ import re
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from codegen.escape import html
 from models.files import write_atomically
@@ -39,10 +40,26 @@ dl.numbers div { padding: .7rem .9rem; background: #f6f5f2; border-radius: 6px; 
 dl.numbers dt { font-size: .85rem; line-height: 1.35; color: #444; }
 dl.numbers dd { margin: 0 0 .15rem; font-size: 1.35rem; font-weight: 600; line-height: 1.25;
   font-variant-numeric: tabular-nums; }
-dl.numbers div { display: flex; flex-direction: column-reverse; justify-content: flex-end; }
+dl.numbers div { display: flex; flex-direction: column; }
+dl.numbers dt { order: 1; }
+dl.numbers div.good { background: #dff1e4; box-shadow: inset 0 0 0 2px #2f7d4f; }
+dl.numbers div.good dd { color: #1d5c37; }
+dl.numbers div.doubt { background: #fdecc8; box-shadow: inset 0 0 0 2px #b35c00; }
+dl.numbers div.doubt dd { color: #8a4600; }
+dl.numbers div.bad { background: #b3261e; }
+dl.numbers div.bad dd, dl.numbers div.bad dt { color: #fff; }
+td .bad { color: #b3261e; font-weight: 600; }
+.unknown, .refused { color: #767676; }
+.struck { color: #767676; text-decoration: line-through; }
+dl.numbers div.refused dd { color: #767676; }
+dl.numbers dd.pair { font-size: 1.1rem; }
+dl.numbers small, td small { display: block; font-weight: 400; white-space: normal; }
+dl.numbers small { font-size: .8rem; line-height: 1.3; }
 ul.warnings { margin: 1.2rem 0; padding: .7rem 1rem .7rem 2rem; border-left: 4px solid #b35c00;
   background: #fdf3e7; border-radius: 0 6px 6px 0; }
 ul.warnings li { overflow-wrap: break-word; }
+ul.warnings li.bad { color: #b3261e; font-weight: 600; }
+ul.refusals { border-color: #b3261e; background: #fdeceb; }
 p.fine { padding: .5rem 1rem; border-left: 4px solid #2f7d4f; background: #eef6f0; }
 details { margin: 2.6rem 0; border-top: 1px solid #ddd; }
 details > summary { cursor: pointer; padding-top: .8rem; }
@@ -78,7 +95,7 @@ td:first-child { min-width: 8rem; }
 td.number, th.number { text-align: right; }
 td.number { white-space: nowrap; }
 @media screen and (max-width: 36rem) { body { padding: 1.2rem .9rem 3rem; }
-  h1 { font-size: 1.5rem; } div.scroll img { min-width: 42rem; }
+  h1 { font-size: 1.5rem; }
   dl.numbers { grid-template-columns: 1fr 1fr; } dl.numbers dd { font-size: 1.15rem; }
   th, td { padding: .3rem .5rem; } }
 @media print { @page { margin: 18mm 16mm; } body { padding: 0; max-width: none; font-size: 10pt; }
@@ -89,7 +106,20 @@ td.number { white-space: nowrap; }
   nav { background: none; border: 1px solid #ddd; } a { color: inherit; } }
 """
 
-Cell = str | float | None
+# What something is worth. Of a headline: good (green), doubt (amber), bad (red). Of a number:
+# unknown (grey), of a refused answer refused (grey) or, where its own axle is, struck through.
+Tone = Literal["", "good", "doubt", "bad", "unknown", "refused", "struck"]
+
+
+class Marked(NamedTuple):
+    """A text with what it is worth, and a note below it that is never struck; all plain text."""
+
+    text: str
+    tone: Tone = ""
+    note: str = ""
+
+
+Cell = str | float | Marked | None
 
 # What texts say in ASCII, as it is printed in a book.
 LETTERS = {
@@ -119,20 +149,19 @@ def printed(text: str) -> str:
 
 
 class Headline(NamedTuple):
-    """A number that a hurried reader looks for: with its unit, and what it is, plain text."""
+    """A number that a hurried reader looks for: with its unit, and what it is, plain text.
 
-    value: str
+    value : the number, or those of several axles, a line each.
+    """
+
+    value: str | Sequence[Marked]
     meaning: str
+    tone: Tone = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paragraph:
-    """Running text.
-
-    Parameters
-    ----------
-    text : plain text, no markup.
-    """
+    """Running text."""
 
     text: str
 
@@ -143,8 +172,6 @@ class Table:
 
     Parameters
     ----------
-    caption : what the table shows, plain text.
-    header : title of each column.
     rows : cells by row; numbers are given four digits, None and what is not finite becomes a dash.
     verbatim : whether cells are to be read letter by letter, as commands are.
 
@@ -175,8 +202,6 @@ class Picture:
     Parameters
     ----------
     image : the SVG, PNG, GIF or WebP itself, or the path of its file.
-    caption : what the picture shows, plain text.
-    read : how to read it, in one line, plain text.
 
     Raises
     ------
@@ -199,12 +224,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Subheading:
-    """A heading inside a section.
-
-    Parameters
-    ----------
-    text : plain text, no markup.
-    """
+    """A heading inside a section."""
 
     text: str
 
@@ -218,7 +238,6 @@ class Section:
 
     Parameters
     ----------
-    heading : plain text.
     blocks : paragraphs, tables, pictures and smaller headings in order.
     folded : whether only the heading is seen until a reader opens it.
     """
@@ -234,50 +253,46 @@ class Report:
 
     Parameters
     ----------
-    title : plain text.
-    sections : its parts in order.
     summary : what a hurried reader should know, plain text.
     numbers : what stands at the top, with units; none where there is nothing to count.
-    warnings : what speaks against the results, plain text; None where nothing was looked at.
+    lead : what is looked at first, above the warnings.
+    warnings : what speaks against the results, plain text; what is marked bad refuses them. None
+        where nothing was looked at.
     """
 
     title: str
     sections: Sequence[Section]
     summary: str = ""
     numbers: Sequence[Headline] = ()
-    warnings: Sequence[str] | None = None
+    lead: Sequence[Block] = ()
+    warnings: Sequence[str | Marked] | None = None
 
 
 FINE = "No warnings."
 
 
 def report_html(report: Report) -> str:
-    """Return a report as one HTML page; tables and figures are numbered through.
-
-    Parameters
-    ----------
-    report : what it says.
-    """
+    """Return a report as one HTML page; tables and figures are numbered through."""
     title, sections = report.title, report.sections
+    tables, figures = count(1), count(1)
+
+    def written(block: Block) -> str:
+        if isinstance(block, Table):
+            return _table(block, next(tables))
+        if isinstance(block, Picture):
+            return _picture(block, next(figures))
+        tag = "h3" if isinstance(block, Subheading) else "p"
+        return f"<{tag}>{_inline(block.text)}</{tag}>"
+
+    lead = [written(block) for block in report.lead]
     entries, parts = [], []
-    tables = figures = 0
     for number, section in enumerate(sections, start=1):
         heading = _inline(section.heading)
         entries.append(f'<li><a href="#section-{number}">{heading}</a></li>')
         named = f'<h2 id="section-{number}">{number}. {heading}</h2>'
         folded = section.folded
         parts.append(f"<details>\n<summary>{named}</summary>" if folded else f"<section>\n{named}")
-        for block in section.blocks:
-            if isinstance(block, Table):
-                tables += 1
-                parts.append(_table(block, tables))
-            elif isinstance(block, Picture):
-                figures += 1
-                parts.append(_picture(block, figures))
-            elif isinstance(block, Subheading):
-                parts.append(f"<h3>{_inline(block.text)}</h3>")
-            else:
-                parts.append(f"<p>{_inline(block.text)}</p>")
+        parts += [written(block) for block in section.blocks]
         parts.append("</details>" if folded else "</section>")
     head = [
         "<!DOCTYPE html>",
@@ -293,7 +308,7 @@ def report_html(report: Report) -> str:
     ]
     if report.summary:
         head.append(f'<p class="summary">{_inline(report.summary)}</p>')
-    head += _numbers(report.numbers) + _warnings(report.warnings)
+    head += _numbers(report.numbers) + lead + _warnings(report.warnings)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
     return "\n".join([*head, *contents, *parts, "</body>", "</html>"]) + "\n"
 
@@ -304,7 +319,6 @@ def write_report(path: Path, report: Report) -> None:
     Parameters
     ----------
     path : the HTML file.
-    report : what it says.
     """
     write_atomically(path, report_html(report))
 
@@ -319,16 +333,34 @@ def _inline(text: str) -> str:
 def _numbers(numbers: Sequence[Headline]) -> list[str]:
     if not numbers:
         return []
-    cards = [f"<div><dt>{_inline(m)}</dt><dd>{_inline(value)}</dd></div>" for value, m in numbers]
+    cards = []
+    for value, meaning, tone in numbers:
+        parts = [Marked(value)] if isinstance(value, str) else value
+        pair = ' class="pair"' if len(parts) > 1 else ""
+        told = "".join(f"<dd{pair}>{_marked(one)}</dd>" for one in parts)
+        cards.append(f"<div{_class(tone)}><dt>{_inline(meaning)}</dt>{told}</div>")
     return ['<dl class="numbers">', *cards, "</dl>"]
 
 
-def _warnings(warnings: Sequence[str] | None) -> list[str]:
+def _class(tone: Tone) -> str:
+    return f' class="{tone}"' if tone else ""
+
+
+def _marked(one: Marked) -> str:
+    """Return a text with its worth as markup."""
+    text = f"<span{_class(one.tone)}>{_inline(one.text)}</span>" if one.tone else _inline(one.text)
+    return text + (f'<small class="unknown">{_inline(one.note)}</small>' if one.note else "")
+
+
+def _warnings(warnings: Sequence[str | Marked] | None) -> list[str]:
     if warnings is None:
         return []
     if not warnings:
         return [f'<p class="fine">{FINE}</p>']
-    return ['<ul class="warnings">', *(f"<li>{_inline(one)}</li>" for one in warnings), "</ul>"]
+    marked = [one if isinstance(one, Marked) else Marked(one) for one in warnings]
+    refused = any(one.tone == "bad" for one in marked)
+    lines = [f"<li{_class(one.tone)}>{_inline(one.text)}</li>" for one in marked]
+    return [f'<ul class="warnings{" refusals" if refused else ""}">', *lines, "</ul>"]
 
 
 def _table(table: Table, number: int) -> str:
@@ -347,7 +379,7 @@ def _table(table: Table, number: int) -> str:
         f'<div class="scroll">{opening}\n<thead><tr>{header}</tr></thead>\n<tbody>',
     ]
     for row in table.rows:
-        written = [html(_text(one)) if words else _inline(_text(one)) for one in row]
+        written = [html(_text(one)) if words else _marked(_of(one)) for one in row]
         cells = (f"<td{kind}>{one}</td>" for one, kind in zip(written, kinds, strict=True))
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return "\n".join([*lines, "</tbody>\n</table></div>", "</figure>"])
@@ -371,8 +403,13 @@ def _picture(picture: Picture, number: int) -> str:
     )
 
 
+def _of(cell: Cell) -> Marked:
+    return cell if isinstance(cell, Marked) else Marked(_text(cell))
+
+
 def _is_number(cell: Cell) -> bool:
     """Tell whether a cell is a number or a text that begins with one: "0.43 (0.41 to 0.45)"."""
+    cell = cell.text if isinstance(cell, Marked) else cell
     if not isinstance(cell, str):
         return cell is not None
     first = cell.split(" ", 1)[0].replace("\N{MINUS SIGN}", "-")
@@ -386,8 +423,8 @@ def _is_number(cell: Cell) -> bool:
 def _text(cell: Cell) -> str:
     if cell is None:
         return "\N{EN DASH}"
-    if isinstance(cell, str):
-        return cell
+    if isinstance(cell, str | Marked):
+        return cell if isinstance(cell, str) else cell.text
     if isinstance(cell, int):
         return str(cell)
     finite = abs(cell) < float("inf")

@@ -1,64 +1,45 @@
 """A verdict as commands tell it: lines, a table of what was learnt, the exit code, a section."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from codegen.escape import visible
-from identifier.stored import stored_verdict
+from identifier.measured import NOT_IDENTIFIABLE, printed_unit
+from identifier.tire_model import AXLES, Axle, stored_verdict
 from identifier.verdict import Number, Verdict
+from identifier.verdict.verdict import MOST_MISSED, PERCENT
 from tireid.output import text_table
 from tireid.progress import complain
-from tireid.report import Block, Headline, Paragraph, Section, Table, printed
+from tireid.report import Block, Cell, Headline, Marked, Paragraph, Section, Table, Tone, printed
 
 HEADER = ("", "front", "is", "rear", "is")
 
 
-def number_cells(number: Number) -> tuple[str, str]:
-    """Return a number with its doubt, and what it is worth, as text.
-
-    Parameters
-    ----------
-    number : of a verdict.
-    """
-    return with_doubt(number.value, number.sd), number.state
-
-
-def with_doubt(value: float, sd: float | None) -> str:
-    """Return a value to the digits that its standard deviation leaves, as in "0.0123 ± 0.0045".
-
-    Parameters
-    ----------
-    sd : two digits of it are told; None where it is not known.
-    """
-    if sd is None or not (math.isfinite(value) and math.isfinite(sd) and sd > 0.0):
-        return f"{value:.4g}"
-    digits = 1 - math.floor(math.log10(float(f"{sd:.1e}")))
-    places = max(digits, 0)
-    return f"{round(value, digits):.{places}f} ± {round(sd, digits):.{places}f}"
-
-
-def number_rows(verdict: Verdict) -> list[list[str]]:
-    """Return the numbers of a verdict by title: front, its state, rear, its state.
-
-    Parameters
-    ----------
-    verdict : with numbers of both axles.
-    """
-    rows: dict[str, dict[str, Number]] = {}
+def numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
+    """Return the numbers of a verdict by title with the unit that is printed, and by axle."""
+    rows: dict[str, dict[Axle, Number]] = {}
     for number in verdict.numbers:
-        rows.setdefault(f"{number.title} [{number.unit}]", {})[number.axle] = number
-    return [
-        [
-            title,
-            *(
-                cell
-                for axle in ("front", "rear")
-                for cell in (number_cells(by_axle[axle]) if axle in by_axle else ("", ""))
-            ),
-        ]
-        for title, by_axle in rows.items()
-    ]
+        title = f"{number.title} [{printed_unit(number.unit)}]"
+        rows.setdefault(title, {})[number.axle] = number
+    return rows
+
+
+def marked_number(verdict: Verdict, number: Number | None) -> Marked:
+    """Return a number of a verdict as a report shows it: grey what was not identified.
+
+    Grey are all numbers of an answer that is not valid, struck those of the axle that refuses it.
+
+    Parameters
+    ----------
+    number : one of them; None leaves its place empty.
+    """
+    if number is None:
+        return Marked("")
+    if not number.learnt:
+        return Marked(number.words, "unknown", NOT_IDENTIFIABLE)
+    if not number.valid:
+        return Marked(number.words, "struck", "not valid")
+    return Marked(number.words, "" if verdict.valid else "refused")
 
 
 def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
@@ -68,8 +49,30 @@ def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
     ----------
     numbers : whether the table of what was learnt stands above it.
     """
-    table = [text_table([list(HEADER), *number_rows(verdict)])] if numbers else []
+    rows = [
+        [title, *(cell for axle in AXLES for cell in _cells(by_axle.get(axle)))]
+        for title, by_axle in numbers_by_title(verdict).items()
+    ]
+    table = [text_table([list(HEADER), *rows])] if numbers else []
     return "\n".join([*table, *verdict.lines])
+
+
+def _cells(number: Number | None) -> tuple[str, str]:
+    return ("", "") if number is None else (number.words, number.state)
+
+
+def asked_text(asked: Mapping[str, Verdict]) -> str:
+    """Return the verdicts on a model over drives that it was not learnt on, as lines of text."""
+    return _each(asked, "replayed on")
+
+
+def _each(verdicts: Mapping[str, Verdict], what: str) -> str:
+    lines = []
+    for name, verdict in verdicts.items():
+        told = "; ".join(line for line in (verdict.headline, verdict.missed_line) if line)
+        lines.append(f"{what} {visible(name)}: {told}")
+        lines += [f"  {finding.line}" for finding in verdict.findings]
+    return "\n".join(lines)
 
 
 def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
@@ -79,19 +82,56 @@ def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
     ----------
     verdicts : on the default method, by the name of the recording that it learnt on.
     """
-    lines = []
-    for name, verdict in verdicts.items():
-        lines.append(f"default learnt on {visible(name)}: {verdict.headline}")
-        lines += [f"  {finding.line}" for finding in verdict.findings]
-    return "\n".join(lines)
+    return _each(verdicts, "default learnt on")
 
 
-def verdict_headline(verdict: Verdict) -> Headline:
-    """Return the verdict as the first number of a report."""
-    meaning = "it gives back the motion that was measured" if verdict.valid else verdict.against
-    return Headline(
-        "valid" if verdict.valid else "NOT VALID", f"the verdict on this answer: {meaning}"
+def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
+    """Return the verdict as the first number of a report: green, amber with notes, red."""
+    if not verdict.valid:
+        return Headline("NOT VALID", f"the verdict on this answer: {verdict.against}", "bad")
+    notes = len(verdict.findings) + len(others)
+    noted = f", with {notes} note{'s' * (notes > 1)}" if notes else ""
+    meaning = f"the verdict on this answer: it gives back the motion that was measured{noted}"
+    return Headline("valid", meaning, "doubt" if notes else "good")
+
+
+def of_answer(verdict: Verdict, numbers: Sequence[Headline]) -> list[Headline]:
+    """Return numbers of a report as the verdict leaves them: of a refused answer none is right.
+
+    Those that are not bad are grey there.
+    """
+    if verdict.valid:
+        return list(numbers)
+    return [one if one.tone == "bad" else one._replace(tone="refused") for one in numbers]
+
+
+def missed_headline(verdict: Verdict) -> list[Headline]:
+    """Return the share of the force that the motion shows and the model misses, as a number.
+
+    There is none where too little is driven.
+    """
+    missed = verdict.force_missed
+    if missed is None:
+        return []
+    front, rear = (f"{PERCENT * share:.1f}" for share in missed)
+    meaning = (
+        "missed of the force that the motion shows, front / rear (limit "
+        f"{PERCENT * MOST_MISSED:.0f} %)"
     )
+    tone: Tone = "" if all(share <= MOST_MISSED for share in missed) else "bad"
+    return [Headline(f"{front} / {rear} %", meaning, tone)]
+
+
+def number_headlines(verdict: Verdict) -> list[Headline]:
+    """Return stiffness, grip and relaxation length of both axles, as numbers of a report."""
+    return [
+        Headline(
+            [marked_number(verdict, by_axle[axle]) for axle in AXLES],
+            f"{title}, front / rear",
+        )
+        for title, by_axle in numbers_by_title(verdict).items()
+        if len(by_axle) == len(AXLES)
+    ]
 
 
 def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
@@ -106,29 +146,40 @@ def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
     valid = sum(verdict.valid for verdict in verdicts.values())
     return [
         Headline(
-            f"{valid} of {len(verdicts)}", "recordings on which what the default learnt is valid"
+            f"{valid} of {len(verdicts)}",
+            "recordings on which what the default learnt is valid",
+            "good" if valid == len(verdicts) else "bad",
         )
     ]
 
 
-def verdict_warnings(verdict: Verdict) -> list[str]:
-    """Return the findings as warnings of a report."""
-    return [printed(finding.line) for finding in verdict.findings]
+def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
+    """Return the findings as warnings of a report; those that refuse the answer are marked."""
+    return [
+        Marked(prefix + printed(finding.line), "bad" if finding.refuses else "")
+        for finding in verdict.findings
+    ]
 
 
 def verdict_section(verdict: Verdict) -> Section:
     """Return the section of a report that holds a verdict; its findings are the warnings above."""
+    rows: list[list[Cell]] = [
+        [title, *(marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
+        for title, by_axle in numbers_by_title(verdict).items()
+    ]
+    lines = (verdict.headline, verdict.missed_line, *verdict.unseen)
     blocks: list[Block] = [
         Paragraph(
             text="The frozen model is integrated over the drive and must give back the force that "
             "the motion shows, at each axle, where it learnt and where it did not. ± is one "
             "standard deviation."
         ),
-        *(Paragraph(text=printed(line)) for line in (verdict.headline, *verdict.unseen)),
+        *(Paragraph(text=printed(line)) for line in lines if line),
         Table(
-            caption="What was learnt, and what it is worth.",
-            header=HEADER,
-            rows=number_rows(verdict),
+            caption="What was learnt. Grey was not identified; what is struck through is not "
+            "valid.",
+            header=("", *AXLES),
+            rows=rows,
         ),
     ]
     return Section(heading="Is it good?", blocks=blocks)
@@ -137,27 +188,31 @@ def verdict_section(verdict: Verdict) -> Section:
 def warn_of_stored(path: Path | str) -> None:
     """Say on standard error where a stored model was found not valid when it was learnt.
 
-    Parameters
-    ----------
-    path : of the file.
+    Raises
+    ------
+    FrozenModelError
+        Where the file is no such model; one line that names it.
+    """
+    for said in stored_warning(path):
+        complain(f"warning: {said.text}")
+
+
+def stored_warning(path: Path | str) -> list[Marked]:
+    """Return what speaks against a stored model that was found not valid when it was learnt.
 
     Raises
     ------
     FrozenModelError
         Where the file is no such model; one line that names it.
     """
-    if stored_verdict(path) is False:
-        complain(f"warning: {path} was found not valid when it was learnt: see its summary.json")
+    if stored_verdict(path) is not False:
+        return []
+    text = f"{path} was found not valid when it was learnt: see its summary.json"
+    return [Marked(text, "bad")]
 
 
 def warn_of(verdict: Verdict, what: str) -> None:
-    """Say on standard error where what is about to be used is not valid.
-
-    Parameters
-    ----------
-    verdict : on it.
-    what : is used.
-    """
+    """Say on standard error where what is about to be used is not valid."""
     if not verdict.valid:
         first = next(finding for finding in verdict.findings if finding.refuses)
         complain(f"warning: {what} is not valid: {first.line.removeprefix('not valid: ')}")

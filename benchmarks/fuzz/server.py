@@ -27,8 +27,7 @@ from matplotlib.figure import Figure
 import tireid.cli
 import tireid.output
 from codegen.arrays import Array
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from models.recordings import Recording
 from tireid.figures import style
 

@@ -258,7 +258,7 @@ static void tell_angle(reader *from)
     const tireid_mpc_state before = state;
     const tireid_mpc_status status = ((kind & 2U) != 0U)
         ? tireid_mpc_late(&state, (tireid_mpc_real)angle)
-        : tireid_mpc_reset(&state, (tireid_mpc_real)angle);
+        : tireid_mpc_reset(&state, &params, (tireid_mpc_real)angle);
     CHECK((status == TIREID_MPC_OK) || (status == TIREID_MPC_BAD_CALL));
     CHECK((status == TIREID_MPC_OK) || (memcmp(&before, &state, sizeof before) == 0));
     check_state();

@@ -1,8 +1,9 @@
 """Which faults are planted: drawn by a seed from all that the rules know, nobody chooses.
 
-The packages, and the C files of two of them, share the faults as they share the lines of code. In
-a package a kind of fault is drawn by the square root of how many there are, so that many swapped
-arguments do not drown few turned conditions; then one of its kind, all alike, none twice.
+Packages are folders of two levels, as `identifier/plan`, and what lies beside them, `identifier`.
+They, and the C files of two, share the faults as they share the lines of code. In a package a kind
+of fault is drawn by the square root of how many there are, so that many swapped arguments do not
+drown few turned conditions; then one of its kind, all alike, none twice.
 """
 
 import math
@@ -24,22 +25,33 @@ C_FOLDERS = (
 )
 
 
-def strata(root: Path) -> dict[str, list[str]]:
-    """Return the files whose faults are drawn together, by the name of the stratum.
+def package_of(file: str) -> str:
+    """Return the package that a file is drawn in.
+
+    Parameters
+    ----------
+    file : path from the root of the tree.
+    """
+    if file.endswith(".c"):
+        return f"{file.split('/')[0]}, C"
+    return "/".join(file.split("/")[:-1][:2])
+
+
+def strata(root: Path, only: str | None = None) -> dict[str, list[str]]:
+    """Return the files whose faults are drawn together, by the name of their package.
 
     Parameters
     ----------
     root : of the tree.
+    only : a file, or a folder whose files alone are returned; None takes all.
     """
-    found = {name: sorted((root / name).rglob("*.py")) for name in PACKAGES}
-    for folder in C_FOLDERS:
-        name = f"{folder.split('/')[0]}, C"
-        found[name] = found.get(name, []) + sorted((root / folder).glob("*.c"))
-    return {
-        name: [str(path.relative_to(root)) for path in paths]
-        for name, paths in found.items()
-        if paths
-    }
+    paths = [path for name in PACKAGES for path in sorted((root / name).rglob("*.py"))]
+    paths += [path for folder in C_FOLDERS for path in sorted((root / folder).glob("*.c"))]
+    found: dict[str, list[str]] = {}
+    for file in (path.relative_to(root).as_posix() for path in paths):
+        if only is None or f"{file}/".startswith(f"{only.rstrip('/')}/"):
+            found.setdefault(package_of(file), []).append(file)
+    return found
 
 
 def faults_of(root: Path, file: str) -> list[Fault]:
@@ -96,10 +108,17 @@ def draw(root: Path, *, seed: int, count: int, only: str | None = None) -> list[
     root : of the tree.
     seed : of the generator.
     count : number of faults.
-    only : the one file to draw from; None takes all.
+    only : the file or folder to draw from; None takes all.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such file, or there are fewer faults.
     """
     rng = np.random.default_rng(seed)
-    files = strata(root) if only is None else {only: [only]}
+    files = strata(root, only)
+    if not files:
+        raise ValueError(f"{only} is no file or folder of the packages")
     sizes = {
         name: sum(len((root / file).read_bytes().splitlines()) for file in members)
         for name, members in files.items()

@@ -15,23 +15,22 @@ the end to the beginning, g = c p'K, M = Σ p'm. That is a worst case that is re
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.certificate import corners, curve_facts, jump_by_learning
+from identifier.axle.certificate import Design, corners, curve_facts, jump_by_learning
 from identifier.axle.covariance import unpacked
 from identifier.axle.curve import doublings
 from identifier.axle.model import AxleModel
 from identifier.axle.step import LESSON, build_lesson
 from identifier.certificate import Property, at_most, statement
 from identifier.method import Run
-from identifier.tire_model import AXLES
-
-if TYPE_CHECKING:
-    from identifier.axle.design import AxleIdentifier  # which asks for this
+from identifier.setup import Setup
+from identifier.tire_model import AXLES, TireModel
+from models.vehicle import Vehicle
 
 SLIPS = 12  # over the range that is known, at which errors are bounded
 BEGIN = 3.0  # standard deviations of the prior, within which the truth lies before the drive
@@ -39,6 +38,16 @@ MOST = 360_000  # samples that are looked at, those at the end
 SMALLEST = 1e-4  # rad: where nothing is known
 TINY = 1e-30  # keeps a quotient finite
 ROUNDING = 1e-9  # of a bound
+
+
+class Learner(Design, Protocol):
+    """What of an `AxleIdentifier` a run is certified with."""
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
+        """Return the compiled step, and where it starts."""
+
+    def frozen(self, vehicle: Vehicle, values: Mapping[str, Array]) -> AxleModel:
+        """Return the model of carried values."""
 
 
 class Lessons(NamedTuple):
@@ -79,13 +88,8 @@ class Adjoint(NamedTuple):
     g: Array
 
 
-def lessons(design: "AxleIdentifier", history: Run) -> Lessons:
-    """Return what the samples of a run taught; of a long one those at its end.
-
-    Parameters
-    ----------
-    history : a run of the design.
-    """
+def lessons(design: Learner, history: Run) -> Lessons:
+    """Return what the samples of a run taught; of a long one those at its end."""
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
     step = build_lesson(doublings(design.ladder), pressed=pressed)
@@ -116,7 +120,6 @@ def _taught(
     Parameters
     ----------
     values : of its ports, (N, ...) but for the constants.
-    constants : ports that are alike for all samples.
     """
     N, names = len(values["v_x"]), step.name_in()
     alike = [i for i, name in enumerate(names) if name in constants]
@@ -142,7 +145,6 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
 
     Parameters
     ----------
-    taught : by the drive.
     slips : at which the force is looked at, of each axle (2, m) [rad].
     ladder : slip scales of the units [rad].
     """
@@ -166,14 +168,8 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
     return Adjoint(p + r, moved, g)
 
 
-def certified_along(design: "AxleIdentifier", history: Run) -> tuple[Property, ...]:
-    """Return what is proven of the curves that a drive taught.
-
-    Parameters
-    ----------
-    design : the identifier.
-    history : its run over the drive.
-    """
+def certified_along(design: Learner, history: Run) -> tuple[Property, ...]:
+    """Return what is proven of the curves that a drive taught."""
     model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
     taught = lessons(design, history)
     known = np.asarray(model.known_slip)
@@ -208,8 +204,6 @@ def _of_axle(
 
     Parameters
     ----------
-    model : that was learnt.
-    taught : by the drive.
     reach : of errors, at the slips of both axles (2, m).
     slips : [rad], up to the range that is known (m,).
     box : corners of the set of weights (k, n).
@@ -281,7 +275,6 @@ def begin_error(taught: Lessons, reach: Adjoint) -> Array:
 
     Parameters
     ----------
-    taught : by the drive.
     reach : of errors, at m slips.
     """
     variance = np.einsum("ami,aij,amj->am", reach.begin, taught.begin, reach.begin)

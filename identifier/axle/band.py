@@ -140,16 +140,10 @@ class BandCalibration:
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Return the calibration that `to_dict` describes.
 
-        Parameters
-        ----------
-        data : as from `to_dict`.
-
         Raises
         ------
         ValueError
             Where the ranges or the level are others, or a value is impossible.
-        KeyError
-            Where a key is missing.
         """
         for name, ours in (
             ("ranges", list(RANGES)),
@@ -183,11 +177,6 @@ def normal_quantile(level: float) -> float:
     Parameters
     ----------
     level : the share, above 0 and below 1.
-
-    Raises
-    ------
-    ValueError
-        Where it is not.
     """
     if not 0.0 < level < 1.0:
         raise ValueError(f"level must be above 0 and below 1, it is {level}")
@@ -233,11 +222,6 @@ def sensor_noise(recording: Recording, vehicle: Vehicle) -> Array:
     """Return the white noise of sensors as the slip of the axles feels it, (3,).
 
     Standard deviations: lateral velocity of front and rear axle [m/s], steering in front [rad].
-
-    Parameters
-    ----------
-    recording : with the noise.
-    vehicle : its geometry.
     """
     sideways, turning = white_noise(recording.needed("v_y")), white_noise(recording.r)
     return np.array(

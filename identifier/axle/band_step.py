@@ -42,23 +42,19 @@ class BandNumbers(NamedTuple):
     per_froude: Any
 
 
-def band_numbers(calibration: BandCalibration, froude_speed: float) -> Array:
-    """Return the numbers of `BandNumbers`, (2, 5).
+def band_numbers(calibration: BandCalibration, froude_speed: float) -> BandNumbers:
+    """Return the numbers of a step.
 
     Parameters
     ----------
-    calibration : of the band.
     froude_speed : sqrt(g L) [m/s].
     """
-    steering = np.array([calibration.noise[2] ** 2, 0.0])
-    return np.column_stack(
-        [
-            calibration.color - 1.0,
-            np.full(2, calibration.speed),
-            calibration.noise[:2] ** 2,
-            steering,
-            np.full(2, 1.0 / froude_speed),
-        ]
+    return BandNumbers(
+        color=calibration.color - 1.0,
+        speed=np.full(2, calibration.speed),
+        sideways=calibration.noise[:2] ** 2,
+        steering=np.array([calibration.noise[2] ** 2, 0.0]),
+        per_froude=np.full(2, 1.0 / froude_speed),
     )
 
 
@@ -83,7 +79,6 @@ def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
     ----------
     numbers : of an axle, k entries.
     at : the centers (k,).
-    x : where.
     """
     x, value = smaller(x, at[-1]), numbers[0]
     for change, begin in zip(numbers[1:], at[:-1], strict=True):
@@ -121,8 +116,6 @@ def half_band(
     ----------
     at : the axle at the sample.
     P, prior : factors of the covariance now and before the first sample.
-    numbers : of the axle.
-    slips, speeds : hinges of its factors.
     """
     h = [*at.units, ca.SX(0), ca.SX(0), at.slope * at.by_offset]
     left, before = excited(P, h, 0).a, excited(prior, h, LEAST_BEFORE).a

@@ -21,9 +21,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import larger, smaller, within
 from identifier.axle.learning import RegressionNumbers, filtered
 from models.rules import require_positive_fields
@@ -49,11 +47,6 @@ class RoadSlope:
     share : of the fast motion that the channel may miss [-].
     doubt : what it may miss beside, noise and the changes of the road [-].
     memory : of that comparison [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     time: float = 1.0
@@ -69,25 +62,23 @@ class RoadSlope:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `SlopeNumbers`, (9,).
+    def at(self, dt: float) -> "SlopeNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        return np.array(
-            [
-                -math.expm1(-dt / self.time),
-                self.level,
-                self.roll,
-                self.most,
-                self.step,
-                self.largest,
-                self.share**2,
-                self.doubt**2,
-                -math.expm1(-dt / self.memory),
-            ]
+        return SlopeNumbers(
+            gain=-math.expm1(-dt / self.time),
+            level=self.level,
+            roll=self.roll,
+            most=self.most,
+            step=self.step,
+            largest=self.largest,
+            share=self.share**2,
+            doubt=self.doubt**2,
+            memory=-math.expm1(-dt / self.memory),
         )
 
 
@@ -129,8 +120,6 @@ def slope_step(
 
     Parameters
     ----------
-    regression : whose filter y went through.
-    state : before the sample.
     a_y : of the accelerometer [m/s²], or NaN.
     motion : m = L(dv_y/dt + v_x r)/g [-].
     first : 1 at a restart, else 0.
@@ -157,7 +146,6 @@ def road_push(numbers: SlopeNumbers, state: SlopeState, offsets_alone: Any) -> A
 
     Parameters
     ----------
-    state : before the sample, so that nothing waits for the accelerometer.
     offsets_alone : force that teaches the sensors' offsets alone, the most that is believed of a
         channel that has not explained any motion yet [weights].
     """

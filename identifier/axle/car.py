@@ -28,16 +28,12 @@ class Car(NamedTuple):
 
 
 def car_numbers(vehicle: Vehicle) -> Array:
-    """Return the columns of `Car` (2, 4).
-
-    Parameters
-    ----------
-    vehicle : the car as the identifier is told of it.
-    """
+    """Return the columns of `Car` (2, 4)."""
     load = np.array(vehicle.axle_loads)
     yaw = np.array([1.0, -1.0]) * vehicle.yaw_inertia / (vehicle.wheelbase * load)
     arm = np.array([vehicle.l_f, -vehicle.l_r])
-    return np.column_stack([arm, load / vehicle.weight, yaw, load])
+    columns = Car(arm=arm, share=load / vehicle.weight, inertia=yaw, load=load)
+    return np.column_stack(columns)
 
 
 def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
@@ -73,25 +69,13 @@ Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
 def named_port(kind: type[Record], name: str) -> tuple[Any, Record]:
-    """Return a symbol (k,) and its k numbers by name.
-
-    Parameters
-    ----------
-    kind : a NamedTuple of k fields.
-    name : of the port.
-    """
+    """Return a symbol (k,) and its k numbers by name."""
     port = ca.SX.sym(name, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
     return port, kind(*ca.vertsplit(port))
 
 
 def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
-    """Return a symbol (2, k), rows front and rear, and its k columns (2, 1) by name.
-
-    Parameters
-    ----------
-    kind : a NamedTuple of k fields.
-    name : of the port.
-    """
+    """Return a symbol (2, k), rows front and rear, and its k columns (2, 1) by name."""
     port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
     return port, kind(*ca.horzsplit(port))
 
@@ -106,7 +90,6 @@ def larger(a: Any, b: Any) -> Any:
 
     Parameters
     ----------
-    a : expression.
     b : expression of the same shape, or a number.
     """
     return ca.if_else(a > b, a, b)
@@ -117,29 +100,16 @@ def smaller(a: Any, b: Any) -> Any:
 
     Parameters
     ----------
-    a : expression.
     b : expression of the same shape, or a number.
     """
     return ca.if_else(a < b, a, b)
 
 
 def within(a: Any, least: Any, most: Any) -> Any:
-    """Return a number clipped to a range.
-
-    Parameters
-    ----------
-    a : expression.
-    least : lower end.
-    most : upper end.
-    """
+    """Return a number clipped to a range."""
     return smaller(larger(a, least), most)
 
 
 def reciprocal(x: Any) -> Any:
-    """Return 1/x, rounded once, as a number that products share; 1 where x is 1.
-
-    Parameters
-    ----------
-    x : expression.
-    """
+    """Return 1/x, rounded once, as a number that products share; 1 where x is 1."""
     return 2 / (x + x)

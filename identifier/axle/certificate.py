@@ -12,21 +12,29 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
-from identifier.axle.learning import FLOAT, LARGEST_Q, LEAN, MOST_SLOW, SLOW_Q, Bounds, unit_slopes
-from identifier.axle.prior import friction_direction
+from identifier.axle.learning import (
+    FLOAT,
+    LARGEST_Q,
+    LEAN,
+    MOST_SLOW,
+    SLOW_Q,
+    Bounds,
+    ChangeDetector,
+    Regression,
+    unit_slopes,
+)
+from identifier.axle.prior import Prior, friction_direction
+from identifier.axle.watch import Watch
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from identifier.axle.design import AxleIdentifier  # which asks for this
 
 LARGEST_SLIP = 1.5  # rad
 CELLS = 2000  # of slip, each a part wider than the one before
@@ -36,13 +44,48 @@ LONGEST = 60.0  # s, beyond which a drop is not followed
 FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
 
 
+class Design(Protocol):
+    """What of an `AxleIdentifier` the proofs follow from; words and units are of its fields."""
+
+    @property
+    def prior(self) -> Prior:
+        """What is believed before the first sample."""
+
+    @property
+    def bounds(self) -> Bounds:
+        """Limits of what is learnt."""
+
+    @property
+    def regression(self) -> Regression:
+        """Filter, error model and memory."""
+
+    @property
+    def change(self) -> ChangeDetector:
+        """Detector of a change of friction."""
+
+    @property
+    def watch(self) -> Watch:
+        """When what is measured is not what was learnt, and how long to wait for it."""
+
+    @property
+    def ladder(self) -> tuple[float, ...]:
+        """Slip scales of the units [rad]."""
+
+    @property
+    def rising_until(self) -> float | None:
+        """Slip at which force curves do not fall yet [rad]; None bounds no slope."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+
+
 @cache
 def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | None) -> Array:
     """Return the corners of the set that weights are kept in, (k, n) [static axle loads].
 
     Parameters
     ----------
-    bounds : of the weights.
     ladder : slip scales of the units [rad].
     rising_until : as of `AxleIdentifier`; None bounds no slope.
     """
@@ -178,9 +221,7 @@ class FrictionDrop:
     direction: float = 1.5
     errors: float = 1.0
 
-    def time(
-        self, design: "AxleIdentifier", vehicle: Vehicle, friction: float, v_x: float
-    ) -> float:
+    def time(self, design: Design, vehicle: Vehicle, friction: float, v_x: float) -> float:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
         While both are, the mean of squared errors rises at least as fast as here, the alarm with
@@ -198,7 +239,7 @@ class FrictionDrop:
         told = r.error + r.relative_error * friction + r.noise * self.slope / v_x
         sure = r.error + r.relative_error * friction * self.to
         samples, step = r.correlation_time / dt, (1.0 - LEAN) * r.rate * dt
-        _, fast_gain, slow_gain, inflation, _ = change.numbers(dt)
+        at = change.at(dt)
         q = min(((wrong - self.noise) / told) ** 2, LARGEST_Q) if wrong > self.noise else 0.0
         prior = design.prior.covariance(vehicle, design.ladder)[:, :n, :n]
         widest = r.widest * np.trace(prior, axis1=1, axis2=2)
@@ -208,11 +249,11 @@ class FrictionDrop:
         room = float((self.free * widest / along**2).min())
         fast, slow, a, added = 0.0, self.errors, 0.0, 0.0
         for k in range(1, math.ceil(LONGEST / dt) + 1):
-            fast += fast_gain * (q - fast)
-            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * slow_gain), MOST_SLOW)
+            fast += at.fast * (q - fast)
+            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * at.slow), MOST_SLOW)
             alarm = min(max(fast / (slow * change.threshold) - 1.0, 0.0), 1.0)
-            if added + alarm * inflation <= room:
-                added, a = added + alarm * inflation, a + alarm * inflation * self.seen**2
+            if added + alarm * at.inflation <= room:
+                added, a = added + alarm * at.inflation, a + alarm * at.inflation * self.seen**2
             pull = max(a - self.unsure * math.sqrt(a), 0.0)
             move = min(
                 pull / (samples * slow * sigma**2 + a) * min(error - self.noise, r.clip * sigma)
@@ -227,16 +268,10 @@ class FrictionDrop:
         return math.inf
 
 
-def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
+def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
     """Return what is proven of a design, whatever is measured unless a title says more.
 
     Of a car with downforce without the time that a drop of friction takes.
-
-    Parameters
-    ----------
-    design : the identifier.
-    vehicle : the car, as far as the identifier knows it.
-    driving : its speed and friction are those of the drop.
     """
     b, dt = design.bounds, design.dt
     set_ = corners(b, design.ladder, design.rising_until)
@@ -309,7 +344,7 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
     return proven if vehicle.has_downforce else (*proven, _drop(design, vehicle, driving))
 
 
-def _drop(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> Property:
+def _drop(design: Design, vehicle: Vehicle, driving: Driving) -> Property:
     """Return how long the drop of friction of a car takes whose loads are the static ones."""
     follows = FrictionDrop().time(design, vehicle, driving.friction, driving.v_x)
     by_memory = design.regression.memory * math.log(2.0)
@@ -325,23 +360,21 @@ def _drop(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> Prope
     )
 
 
-def jump_by_learning(design: "AxleIdentifier") -> float:
+def jump_by_learning(design: Design) -> float:
     """Return by how much learning changes a force in one sample at most [static axle loads].
 
     The step that is let through, and its lean to the center: no partial sum of weights is further
     from there than n times the weight and the grip.
-
-    Parameters
-    ----------
-    design : the identifier.
     """
     b, n = design.bounds, len(design.ladder)
     return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
 
 
-def _lean_over_rounding(design: "AxleIdentifier") -> float:
+def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
     numbers = b.of_ladder(design.ladder, design.rising_until)
-    per_distance = numbers[5:9] if design.rising_until is not None else numbers[[5, 8]]
-    return float(LEAN / per_distance.max() / (8.0 * n * FLOAT * b.weight))
+    per_distance = [numbers.per_grip, numbers.per_weight]
+    if design.rising_until is not None:
+        per_distance += [numbers.per_falling, numbers.per_rising]
+    return float(LEAN / max(per_distance) / (8.0 * n * FLOAT * b.weight))

@@ -161,7 +161,6 @@ def width(trace: Any, others: list[Any], limits: list[Any]) -> Any:
 
     Parameters
     ----------
-    trace : of the block of the weights.
     others : variances of the other parameters.
     limits : 1/limit of the trace and of each other variance.
     """
@@ -214,7 +213,6 @@ def loosened(
     ----------
     spread : of P.
     amount : variance to add to the last parameter, not negative.
-    limits : as in `width`.
     """
     U, D = factors
     q, n = len(D), len(D) - len(spread.others)
@@ -242,7 +240,6 @@ def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
     Parameters
     ----------
     h : regressor, q entries.
-    least : added to a, so that it may be divided by.
     """
     U, D = factors
     q = len(D)
@@ -262,7 +259,6 @@ def updated(factors: Factors, direction: Excited, c: Any) -> Factors:
 
     Parameters
     ----------
-    direction : the regressor.
     c : more than -1/a by more than rounding.
     """
     U, D = dict(factors.U), list(factors.D)

@@ -147,7 +147,6 @@ def excited(state: Any, size: Any, *, dt: Any, samples: Any, learns: Any) -> Any
 
     Parameters
     ----------
-    state : before the sample.
     size : of slip [rad], (2,).
     dt : sampling interval [s].
     samples : in which errors are correlated: one alone does not make a range known.

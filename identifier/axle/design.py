@@ -13,8 +13,8 @@ from codegen.arrays import Array
 from identifier.axle.along import certified_along
 from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
-from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeNumbers, SlopeState, road_push
-from identifier.axle.car import car_numbers, downforce_numbers
+from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
+from identifier.axle.car import car_numbers, downforce_numbers, named_port
 from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -35,13 +35,11 @@ from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import AXLES, TireModel, brisk_speed
+from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
-from models.vehicle import GRAVITY, Vehicle
-
-STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
+from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 
@@ -227,13 +225,13 @@ class AxleIdentifier(Method):
                 "dt": np.array(self.dt),
                 "car": car_numbers(vehicle),
                 "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": self.plausibility.numbers(),
-                "roll": self.sway.numbers(),
-                "regression": self.regression.numbers(self.dt),
-                "change": self.change.numbers(self.dt),
-                "watching": self.watch.numbers(self.dt),
-                "road": self.road.numbers(self.dt),
-                "bounds": self.bounds.of_ladder(self.ladder, self.rising_until),
+                "plausibility": np.array(self.plausibility.numbers()),
+                "roll": np.array(self.sway.numbers()),
+                "regression": np.array(self.regression.at(self.dt)),
+                "change": np.array(self.change.at(self.dt)),
+                "watching": np.array(self.watch.at(self.dt)),
+                "road": np.array(self.road.at(self.dt)),
+                "bounds": np.array(self.bounds.of_ladder(self.ladder, self.rising_until)),
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
                 **self._rising(),
@@ -249,7 +247,7 @@ class AxleIdentifier(Method):
 
     def _resumed(self, start: TireModel) -> AxleModel:
         """Return stored weights to begin with, of this structure."""
-        return resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+        return resumed(start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
 
     def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
@@ -272,7 +270,7 @@ class AxleIdentifier(Method):
             scan=self._scan(vehicle, bands=True),
             constants={
                 **setup.constants,
-                "banding": band_numbers(calibration, vehicle.froude_speed),
+                "banding": np.column_stack(band_numbers(calibration, vehicle.froude_speed)),
                 "slip_factors": hinges(calibration.factors, CENTERS),
                 "speed_factors": hinges(calibration.speeds, AT_SPEEDS),
                 "prior": packed(self.prior.covariance(vehicle, self.ladder)),
@@ -296,9 +294,9 @@ class AxleIdentifier(Method):
         kept = np.vstack(
             [
                 np.array(
-                    project(np.append(W[i], own[i]), P[i, :n, :n], numbers, numbers[last], row)
+                    project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
                 )
-                for i, last in enumerate((STEERING, V_Y))
+                for i, offset in enumerate((numbers.steering, numbers.v_y))
             ]
         )
         return kept[:, :n], kept[:, n:]
@@ -367,8 +365,7 @@ class AxleIdentifier(Method):
         """
         offsets_alone = UNPROVEN * self.regression.sure * self.regression.error
         before = np.asarray(state["bank"]).reshape(-1, len(SlopeState._fields))[:-1].T
-        numbers = self.road.numbers(self.dt)
-        push = road_push(SlopeNumbers(*numbers), SlopeState(*map(ca.DM, before)), offsets_alone)
+        push = road_push(self.road.at(self.dt), SlopeState(*map(ca.DM, before)), offsets_alone)
         return np.array(push, dtype=np.float64).ravel()
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
@@ -395,15 +392,15 @@ class AxleIdentifier(Method):
 def _projection(n: int, rises: bool) -> ca.Function:
     """Return `bounded` of one axle: [weights, own], P of the weights, numbers, offset, slope."""
     theta, P, slope = ca.SX.sym("theta", n + 3), ca.SX.sym("P", n, n), ca.SX.sym("slope", n)
-    numbers, offset = ca.SX.sym("numbers", len(BoundNumbers._fields)), ca.SX.sym("offset")
+    (port, numbers), offset = named_port(BoundNumbers, "numbers"), ca.SX.sym("offset")
     kept = bounded(
-        BoundNumbers(*ca.vertsplit(numbers)),
+        numbers,
         ca.vertsplit(theta),
         {(j, k): P[j, k] for j, k in triangle(n)},
         offset=offset,
         slope=ca.vertsplit(slope) if rises else None,
     )
-    return ca.Function("bounded", [theta, P, numbers, offset, slope], [ca.horzcat(*kept)])
+    return ca.Function("bounded", [theta, P, port, offset, slope], [ca.horzcat(*kept)])
 
 
 @cache

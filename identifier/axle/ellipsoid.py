@@ -53,8 +53,6 @@ class Ellipsoid(NamedTuple):
         Parameters
         ----------
         h : (n,).
-        y : what was measured.
-        allowed : e.
         """
         c, P = self
         n, Ph = c.size, P @ h
@@ -88,9 +86,7 @@ def outer_ellipsoid(
 
     Parameters
     ----------
-    strips : of the drive.
     axle : 0 front, 1 rear.
-    bound : of the errors.
     ladder : slip scales of the units [rad].
     """
     known: Ellipsoid | None = Ellipsoid.around(len(ladder))

@@ -6,13 +6,11 @@ after three bad samples in a row, and while v_y and r repeat to the last bit (a 
 """
 
 import math
-from dataclasses import astuple, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import larger
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY, Vehicle
@@ -41,11 +39,6 @@ class Plausibility:
     steering_jump : what noise may add to the steering [rad].
     hold : longest time to go on with the last good sample, or with values that do not change [s].
     settle : time to wait before learning [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     min_speed: float
@@ -92,9 +85,33 @@ class Plausibility:
         """
         return math.floor(self.hold / dt) + 2
 
-    def numbers(self) -> Array:
-        """Return the fields in their order, (15,)."""
-        return np.array(astuple(self))
+    def numbers(self) -> "GateNumbers":
+        """Return the numbers of a step."""
+        return GateNumbers(**asdict(self))
+
+
+class GateNumbers(NamedTuple):
+    """The fields of `Plausibility`."""
+
+    min_speed: Any
+    learning_speed: Any
+    max_speed: Any
+    max_sideslip: Any
+    slow: Any
+    max_yaw_rate: Any
+    max_steering: Any
+    max_rate: Any
+    jump: Any
+    max_yaw_acceleration: Any
+    yaw_jump: Any
+    max_steering_rate: Any
+    steering_jump: Any
+    hold: Any
+    settle: Any
+
+    def possible_v_y(self, v_x: Any, v_y: Any) -> Any:
+        """Return whether v_y is one that a car may have at v_x, both [m/s]; NaN is not."""
+        return ca.fabs(v_y) < self.max_sideslip * larger(v_x, self.slow)
 
 
 class GateState(NamedTuple):
@@ -137,35 +154,31 @@ def _all(*conditions: Any) -> Any:
     return result
 
 
-def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
+def gate(limits: GateNumbers, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
     """Judge a sample.
 
     Parameters
     ----------
-    limits : the numbers of `Plausibility`, in their order, (15,).
     dt : sampling interval [s].
-    last : state before the sample.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     v_x : longitudinal speed [m/s].
     """
-    names = [field.name for field in fields(Plausibility)]
-    at = dict(zip(names, ca.vertsplit(limits), strict=True))
     v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
     possible = _all(
-        ca.fabs(v_x) < at["max_speed"],
-        ca.fabs(v_y) < at["max_sideslip"] * larger(ca.fabs(v_x), at["slow"]),
-        ca.fabs(r) < at["max_yaw_rate"],
-        ca.fabs(delta_f) < at["max_steering"],
-        ca.fabs(delta_r) < at["max_steering"],
+        ca.fabs(v_x) < limits.max_speed,
+        limits.possible_v_y(ca.fabs(v_x), v_y),
+        ca.fabs(r) < limits.max_yaw_rate,
+        ca.fabs(delta_f) < limits.max_steering,
+        ca.fabs(delta_r) < limits.max_steering,
     )
     since = dt * (1 + last.bad)
-    largest_change = at["max_rate"] * since + at["jump"]
-    turn = at["max_steering_rate"] * since + at["steering_jump"]
+    largest_change = limits.max_rate * since + limits.jump
+    turn = limits.max_steering_rate * since + limits.steering_jump
     near = _all(
         ca.fabs(v_x - last.v_x) < largest_change,
         ca.fabs(v_y - last.v_y) < largest_change,
-        ca.fabs(r - last.r) < at["max_yaw_acceleration"] * since + at["yaw_jump"],
+        ca.fabs(r - last.r) < limits.max_yaw_acceleration * since + limits.yaw_jump,
         ca.fabs(delta_f - last.delta_f) < turn,
         ca.fabs(delta_r - last.delta_r) < turn,
     )
@@ -176,19 +189,19 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
 
     sample = (v_x, v_y, r, delta_f, delta_r)
     used = [ca.if_else(good, new, old) for new, old in zip(sample, last[:5], strict=True)]
-    holds = ca.logic_and(last.on, bad * dt <= at["hold"])
-    on = ca.logic_and(used[0] >= at["min_speed"], ca.logic_or(good, holds))
+    holds = ca.logic_and(last.on, bad * dt <= limits.hold)
+    on = ca.logic_and(used[0] >= limits.min_speed, ca.logic_or(good, holds))
     # A slow sensor in a fast log holds its value for some samples; one that is stuck, for longer.
-    alive = stuck * dt <= at["hold"]
-    steady = _all(used[0] > at["learning_speed"], bad < BAD_IN_A_ROW, alive, on)
+    alive = stuck * dt <= limits.hold
+    steady = _all(used[0] > limits.learning_speed, bad < BAD_IN_A_ROW, alive, on)
     clock = ca.if_else(steady, last.on * last.steady + dt, 0)
     return Gate(
-        v_x=larger(used[0], at["min_speed"]),
+        v_x=larger(used[0], limits.min_speed),
         v_y=used[1],
         r=used[2],
         delta=ca.vertcat(used[3], used[4]),
         on=on,
         first=1 - last.on,
-        learns=_all(good, stuck < BAD_IN_A_ROW, clock >= at["settle"] - dt / 2),
+        learns=_all(good, stuck < BAD_IN_A_ROW, clock >= limits.settle - dt / 2),
         state=ca.vertcat(*used, on, clock, ca.if_else(on, bad, 0), stuck),
     )

@@ -4,9 +4,10 @@ For each mean over a moment |y - h'w| <= e (1 + β) + τ ρ, and the curve of an
 prior's box: both are linear in the weights w, in static axle loads.   y: force that the motion
 shows.   h: units at the lagged slip of the frozen model, times cos δ and, where the car has
 downforce, the load of the axle over the static one.   e: error of curve and sensors.   β: by how
-much slip is beyond that which taught, over it, now or a while ago; it fades with 0.3 s.   τ: time
-[s] by which force and curve may differ.   ρ: rate of the force [1/s], the larger of its size now
-and of its mean over the last 0.3 s.
+much slip is beyond that which taught, over it, now or a while ago, which fades with 0.3 s; and by
+how much ρ is beyond that which taught, over it: errors of lag that a drive of one tempo hides in e
+grow with ρ.   τ: time [s] by which force and curve may differ.   ρ: rate of the force [1/s], the
+larger of its size now and of its mean over the last 0.3 s.
 A linear function of w is largest at a vertex of the polytope, so that the two linear programs of
 every slip, max and min of t'w with t = tanh(α/α_j), are one product with all vertices. The force
 lies between them, wider by e (1 + β) + τ ρ (set membership: Milanese and Vicino, Automatica 27,
@@ -38,6 +39,7 @@ TINY = 1e-12  # of a size that is divided by: straight ahead nothing is said of 
 LARGEST_BOUND = 10.0  # static axle loads
 LONGEST_LATENESS = 1.0  # s
 MOST_VERTICES = 100_000
+PAIRS = ("error_static_axle_loads", "lateness_s", "fastest_static_axle_loads_per_s")
 AT_ONCE = 256  # samples times all vertices: so many products stay in the cache
 
 
@@ -105,11 +107,8 @@ class Doubt(NamedTuple):
 
     @classmethod
     def none(cls, n: int) -> Self:
-        """Return that of n steady forces within the slip that taught, along which nothing pushes.
-
-        Parameters
-        ----------
-        n : how many.
+        """Return that of n steady forces within the slip that taught, along which nothing
+        pushes.
         """
         return cls(*np.zeros((3, n, 2)))
 
@@ -128,12 +127,7 @@ class Strips(NamedTuple):
     t: Array
 
     def until(self, m: int) -> "Strips":
-        """Return the first m of them.
-
-        Parameters
-        ----------
-        m : how many.
-        """
+        """Return the first m of them."""
         return Strips(*(values[:m] for values in self))
 
 
@@ -161,7 +155,6 @@ def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
 
     Parameters
     ----------
-    bounds : limits of what is learnt.
     ladder : slip scales of the units [rad].
     """
     n, scales = len(ladder), np.array(ladder)
@@ -228,9 +221,7 @@ def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, floa
 
     Parameters
     ----------
-    strips : of the drive.
     axle : 0 front, 1 rear.
-    box : what any tire keeps.
     """
     y, h, rate = strips.y[:, axle], strips.h[:, axle], strips.rate[:, axle]
     n = h.shape[1]
@@ -279,10 +270,7 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
 
     Parameters
     ----------
-    strips : of the drive.
     axle : 0 front, 1 rear.
-    bound : of the errors.
-    box : what any tire keeps.
     """
     allowed = bound.allowed(strips.beyond, strips.rate)[:, axle]
     return vertices(box.both(strip_sides(strips.y[:, axle], strips.h[:, axle], allowed)))
@@ -294,25 +282,31 @@ class Guarantee:
 
     Parameters
     ----------
-    bound : of the errors.
     told : whether the bound was told; else it was estimated from the drive.
     corners : vertices of the possible weights of front and rear, (k, n) each.
     speed : mean of the drive that taught [m/s].
+    fastest : largest ρ of its means [static axle loads/s], (2,): beyond it the band opens.
 
     Raises
     ------
     ValueError
-        Where there are no corners, one is not finite, or the speed is not positive.
+        Where there are no corners, one is not finite, or speed or rate is not positive.
     """
 
     bound: ForceBound
     told: bool
     corners: tuple[Array, Array]
     speed: float
+    fastest: tuple[float, float]
 
     def __post_init__(self) -> None:
         if not 0.0 < self.speed < np.inf:
             raise ValueError(f"speed of the guarantee must be positive, it is {self.speed}")
+        for rate in self.fastest:
+            if not 0.0 < rate < np.inf:
+                raise ValueError(
+                    f"the fastest force of the guarantee must be positive, it is {rate}"
+                )
         for corners in self.corners:
             if corners.ndim != 2 or not 0 < len(corners) <= MOST_VERTICES:
                 raise ValueError(
@@ -320,6 +314,15 @@ class Guarantee:
                 )
             if not np.isfinite(corners).all():
                 raise ValueError("a corner of the possible weights holds no finite number")
+
+    def too_fast(self, rate: Array) -> Array:
+        """Return by how much ρ is beyond that of the drive that taught, over it, (k, 2).
+
+        Parameters
+        ----------
+        rate : ρ of both axles [1/s], (k, 2).
+        """
+        return beyond_driven(rate, np.array(self.fastest))
 
     def reach(self, units: Array) -> tuple[Array, Array]:
         """Return least and largest h'w of the possible weights, (k, 2) each [static axle loads].
@@ -338,7 +341,6 @@ class Guarantee:
         Parameters
         ----------
         units : h of both axles (k, 2, n).
-        doubt : that opens the band.
         """
         low, high = self.reach(units)
         kept, beside = 1.0 - doubt.lost, self.bound.allowed(doubt.beyond, doubt.rate)
@@ -348,10 +350,6 @@ class Guarantee:
         """Return which means of another drive no possible curve explains, (m, 2).
 
         One is proof that the bound does not hold there: other tires, another road, a sensor.
-
-        Parameters
-        ----------
-        strips : of that drive.
         """
         low, high = self.limits(strips.h, Doubt(strips.beyond, strips.rate, strips.lost))
         outside: NDArray[np.bool_] = (strips.y < low - SLACK) | (strips.y > high + SLACK)
@@ -365,6 +363,7 @@ class Guarantee:
             "told": self.told,
             "corners": [corners.tolist() for corners in self.corners],
             "speed_m_s": self.speed,
+            "fastest_static_axle_loads_per_s": list(self.fastest),
         }
 
     @classmethod
@@ -373,24 +372,16 @@ class Guarantee:
 
         Parameters
         ----------
-        data : as from `to_dict`.
         n : number of weights of an axle.
-
-        Raises
-        ------
-        ValueError
-            Where a value is impossible.
-        KeyError
-            Where a key is missing.
         """
         pairs = []
-        for name in ("error_static_axle_loads", "lateness_s", "corners"):
+        for name in (*PAIRS, "corners"):
             if not isinstance(data[name], list) or len(data[name]) != 2:
                 raise ValueError(f"{name} of the guarantee must be a pair, front and rear")
             pairs.append(data[name])
         if not isinstance(data["told"], bool):
             raise ValueError(f"told of the guarantee must be true or false, not {data['told']!r}")
-        error, lateness, both = pairs
+        error, lateness, fastest, both = pairs
         front, rear = (np.array(corners, dtype=np.float64) for corners in both)
         for corners in (front, rear):
             if corners.ndim != 2 or corners.shape[1] != n:
@@ -403,6 +394,7 @@ class Guarantee:
             told=data["told"],
             corners=(front, rear),
             speed=float(data["speed_m_s"]),
+            fastest=(float(fastest[0]), float(fastest[1])),
         )
 
 
@@ -451,12 +443,12 @@ def _faded(signal: Array, dt: float) -> Array:
 
 
 def beyond_driven(slip: Array, driven: Array) -> Array:
-    """Return by how much slip is beyond that of a drive, over it, (k, 2); 0 within: β of now.
+    """Return by how much slip, or ρ, is beyond that of a drive, over it, (k, 2); 0 within.
 
     Parameters
     ----------
-    slip : of both axles [rad], (k, 2), or (k, 1) where both have the same.
-    driven : largest of the drive (2,), positive [rad].
+    slip : of both axles [rad], (k, 2), or (k, 1) where both have the same; or ρ [1/s].
+    driven : largest of the drive (2,), positive, of the same unit.
     """
     return np.maximum(np.abs(slip) / driven - 1.0, 0.0)
 

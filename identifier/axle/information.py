@@ -38,6 +38,7 @@ from models.vehicle import Vehicle
 
 STEP = 0.05  # s between samples that are added: a fifth of the filter's time constant loses nothing
 CHUNK = 4000  # added samples that are held at once
+TOGETHER = 64  # drives whose sum is held as they are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,35 +124,64 @@ def total(parts: Iterable[Information], q: int) -> Information:
 
     Parameters
     ----------
-    parts : of drives.
     q : parameters of an axle.
     """
-    some = list(parts)
-    if not some:
-        return Information.nothing(q)
-
-    def added(name: str) -> Array:
-        rows = np.array([np.ravel(getattr(one, name)) for one in some])
-        sums = [math.fsum(column) for column in rows.T]
-        return np.reshape(sums, np.shape(getattr(some[0], name)))
-
-    return Information(
-        matrix=added("matrix"),
-        vector=added("vector"),
-        square=added("square"),
-        samples=math.fsum(one.samples for one in some),
-        seconds=math.fsum(one.seconds for one in some),
-    )
+    sums = Total(q)
+    for one in parts:
+        sums.add(one)
+    return sums.information
 
 
-def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:
-    """Return the model that nothing was learnt of: the brush tire of what is told of the car.
+class Total:
+    """What many tell together, in the room of a few: sums are exact to the last bit in any order.
+
+    Each sum is a few numbers of falling size whose exact sum it is (J. R. Shewchuk, Discrete &
+    Computational Geometry 18, 1997).
 
     Parameters
     ----------
-    design : whose prior it is.
-    vehicle : the car.
+    q : parameters of an axle.
     """
+
+    def __init__(self, q: int) -> None:
+        self._shapes = [(2, q, q), (2, q), (2,), (1,), (1,)]
+        self._rows = [np.zeros(sum(map(math.prod, self._shapes)))]
+
+    def add(self, one: Information) -> None:
+        """Add what a drive tells."""
+        values = (one.matrix, one.vector, one.square, one.samples, one.seconds)
+        self._rows.append(np.concatenate([np.ravel(value) for value in values]))
+        if len(self._rows) > TOGETHER:
+            self._rows = list(_exact(np.array(self._rows)))
+
+    @property
+    def information(self) -> Information:
+        """The sum."""
+        ends = np.cumsum([math.prod(shape) for shape in self._shapes])[:-1]
+        pieces = np.split(_exact(np.array(self._rows))[0], ends)
+        matrix, vector, square, samples, seconds = (
+            piece.reshape(shape) for piece, shape in zip(pieces, self._shapes, strict=True)
+        )
+        return Information(
+            matrix=matrix,
+            vector=vector,
+            square=square,
+            samples=float(samples[0]),
+            seconds=float(seconds[0]),
+        )
+
+
+def _exact(rows: Array) -> Array:
+    """Return few rows of the same exact sum, column by column; the first is it, rounded."""
+    found: list[Array] = []
+    while not found or found[-1].any():
+        left = np.vstack([rows, *(-one[None] for one in found)])
+        found.append(np.array([math.fsum(column) for column in left.T.tolist()]))
+    return np.array(found[:-1] or found)
+
+
+def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:
+    """Return the model that nothing was learnt of: the brush tire of what is told of the car."""
     W, own = design.prior.means(vehicle, design.ladder)
     P = design.prior.covariance(vehicle, design.ladder)
     return _model(design, vehicle, np.hstack([W, own]), P, P, np.zeros((2, 1 + len(EDGES))))
@@ -187,7 +217,6 @@ class Evidence:
 
     Parameters
     ----------
-    design : the identifier, whose regression it is.
     reference : the model θ₀ that lag, slip and variances are taken at.
 
     Raises
@@ -224,10 +253,10 @@ class Evidence:
                 "dt": np.array(design.dt),
                 "car": car_numbers(model.vehicle),
                 "scales": 1.0 / np.array(design.ladder)[None],
-                "plausibility": design.plausibility.numbers(),
-                "roll": design.sway.numbers(),
-                "regression": design.regression.numbers(design.dt),
-                "road": design.road.numbers(design.dt),
+                "plausibility": np.array(design.plausibility.numbers()),
+                "roll": np.array(design.sway.numbers()),
+                "regression": np.array(design.regression.at(design.dt)),
+                "road": np.array(design.road.at(design.dt)),
                 **downforce_numbers(model.vehicle),
             },
             ends_run=design.plausibility.rest(design.dt),
@@ -236,10 +265,6 @@ class Evidence:
 
     def of(self, recording: Recording) -> Information:
         """Return what a drive tells; each of its stretches begins anew.
-
-        Parameters
-        ----------
-        recording : with v_y, measured or estimated, at the design's interval.
 
         Raises
         ------
@@ -254,7 +279,6 @@ class Evidence:
 
         Parameters
         ----------
-        recording : with v_y, measured or estimated, at the design's interval.
         longest : time that a part may last [s]; stretches make parts of their own.
         """
         recording.needed("v_y")
@@ -305,9 +329,7 @@ def merged(
 
     Parameters
     ----------
-    design : whose prior and bounds hold.
     reference : that the information was taken at; its car is the model's.
-    told : by all drives together.
     excitation : largest slip and times of learning of all drives together, (2, 9).
     """
     vehicle = reference.vehicle
@@ -324,7 +346,6 @@ def posterior(told: Information, mean: Array, covariance: Array) -> tuple[Array,
 
     Parameters
     ----------
-    told : information of drives.
     mean : of the prior (2, q).
     covariance : of the prior (2, q, q).
     """
@@ -367,10 +388,7 @@ def change_from(
 
     Parameters
     ----------
-    told : by the drives.
     theta : [W, own] of the curves, (2, q).
-    design : whose units and offsets they are.
-    vehicle : the car.
     """
     n = len(design.ladder)
     M = friction_direction(design.ladder)

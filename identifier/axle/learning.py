@@ -45,15 +45,11 @@ class Regression:
         [`error`]: a smaller one could be theirs.
     moment : over which that force is meant [s]: noise is no force.
     sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
-    clip : largest error that counts in full [its standard deviation].
+    clip : largest error that counts in full, over the standard deviation that y is told to have
+        times `ErrorState.slow` [-].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
     rate : by which learning may change the force of a curve [static axle loads/s]; three times
         what a change of friction asks for.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     bandwidth: float = 4.0
@@ -73,31 +69,29 @@ class Regression:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `RegressionNumbers`, (14,).
+    def at(self, dt: float) -> "RegressionNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
         e = math.exp(-self.bandwidth * dt)
-        return np.array(
-            [
-                self.bandwidth,
-                e,
-                0.5 * (1.0 - e),
-                math.expm1(dt / self.memory),
-                self.error,
-                self.relative_error,
-                self.correlation_time / dt,
-                self.lateness * self.bandwidth,
-                self.noise,
-                self.sure * self.error,
-                math.exp(-dt / self.sure_time),
-                min(dt / self.moment, 1.0),
-                self.clip,
-                1.0 / (self.rate * dt),
-            ]
+        return RegressionNumbers(
+            bandwidth=self.bandwidth,
+            e=e,
+            half=0.5 * (1.0 - e),
+            forgetting=math.expm1(dt / self.memory),
+            error=self.error,
+            relative_error=self.relative_error,
+            samples=self.correlation_time / dt,
+            lateness=self.lateness * self.bandwidth,
+            noise=self.noise,
+            least_force=self.sure * self.error,
+            decay=math.exp(-dt / self.sure_time),
+            smooth=min(dt / self.moment, 1.0),
+            clip=self.clip,
+            per_step=1.0 / (self.rate * dt),
         )
 
 
@@ -127,8 +121,6 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
 
     Parameters
     ----------
-    numbers : of the filter.
-    v : its state.
     u : its input now, which is also its output at a restart.
     first : 1 at a restart, else 0.
     """
@@ -218,7 +210,7 @@ def update(
 
 LARGEST_Q = 25.0  # one outlier alone is no alarm
 SLOW_Q = 4.0  # and the slow mean shall not follow a change
-MOST_SLOW = 4.0  # errors above twice what is told are no noise that learning may get used to
+MOST_SLOW = 4.0  # squared errors: above twice what is told they are no noise to get used to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,11 +225,6 @@ class ChangeDetector:
     step_time : ... may happen in this time [s] during an alarm.
     offset_time : in which an alarm at an axle that is not known yet makes its offset as unsure as
         it may get [s]: a bias that was there on the straight is gone, or a new one came.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     threshold: float = 4.0
@@ -250,22 +237,19 @@ class ChangeDetector:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `ChangeNumbers`, (5,).
+    def at(self, dt: float) -> "ChangeNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        inflation = dt * self.step**2 / self.step_time
-        return np.array(
-            [
-                1.0 / self.threshold,
-                min(dt / self.fast, 1.0),
-                min(dt / self.slow, 1.0),
-                inflation,
-                dt / self.offset_time,
-            ]
+        return ChangeNumbers(
+            per_threshold=1.0 / self.threshold,
+            fast=min(dt / self.fast, 1.0),
+            slow=min(dt / self.slow, 1.0),
+            inflation=dt * self.step**2 / self.step_time,
+            offset=dt / self.offset_time,
         )
 
 
@@ -282,7 +266,8 @@ class ChangeNumbers(NamedTuple):
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast and slow mean of q [-]; recent peak of the measured force, which is a mean
+    """Columns (2,): fast mean of q [-]; slow mean of q, by which the variance of y is larger than
+    told, from 1 to 4 [-]; recent peak of the measured force, which is a mean
     of y over a moment [static axle loads].
     """
 
@@ -296,8 +281,6 @@ def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) 
 
     Parameters
     ----------
-    numbers : of the detector.
-    state : before the sample.
     q : squared error over its variance, (2,).
     learns : 1 where learning runs, else 0.
     """
@@ -312,7 +295,6 @@ def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
 
     Parameters
     ----------
-    numbers : of the detector.
     fast : mean of q (2,).
     slow : mean of q (2,).
     """
@@ -372,8 +354,8 @@ class Bounds:
             if not least < most:
                 raise ValueError(f"least_{of} must be below most_{of}, they are {least}, {most}")
 
-    def numbers(self, n: int, slopes: float, rising_until: float | None) -> Array:
-        """Return the numbers of `BoundNumbers`, (12,).
+    def at(self, n: int, slopes: float, rising_until: float | None) -> "BoundNumbers":
+        """Return the numbers of a step.
 
         n products of weights that lie in the box sum up to within n + 8 roundings.
 
@@ -405,38 +387,35 @@ class Bounds:
                 f"a ladder of {n} units of equal weight has a stiffness of {center * slopes:g} "
                 f"loads/rad, outside of {self.least_stiffness:g} to {self.most_stiffness:g}"
             )
-        return np.array(
-            [
-                least,
-                most,
-                flattest,
-                steepest,
-                center,
-                2.0 / (most - least),
-                1.0 / (center - flattest),
-                1.0 / (steepest - center),
-                1.0 / radius,
-                inward(self.compliance),
-                inward(self.steering),
-                inward(self.v_y),
-            ]
+        return BoundNumbers(
+            least_grip=least,
+            most_grip=most,
+            least_slope=flattest,
+            most_slope=steepest,
+            center=center,
+            per_grip=2.0 / (most - least),
+            per_falling=1.0 / (center - flattest),
+            per_rising=1.0 / (steepest - center),
+            per_weight=1.0 / radius,
+            compliance=inward(self.compliance),
+            steering=inward(self.steering),
+            v_y=inward(self.v_y),
         )
 
-    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> Array:
-        """Return the numbers of `BoundNumbers` for a ladder, (12,).
+    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
+        """Return the numbers of a step with a ladder.
 
         Parameters
         ----------
         ladder : slip scales of the units [rad].
-        rising_until : as of `numbers`.
 
         Raises
         ------
         ValueError
-            As `numbers` does.
+            As `at` does.
         """
         slopes = unit_slopes(ladder, rising_until or 0.0)
-        return self.numbers(len(ladder), float(slopes.sum()), rising_until)
+        return self.at(len(ladder), float(slopes.sum()), rising_until)
 
 
 def unit_slopes(ladder: tuple[float, ...], slip: float) -> Array:
@@ -509,7 +488,6 @@ def bounded(
     ----------
     theta : parameters, n + 3 entries.
     P : covariance of the weights, the metric: upper triangle by place.
-    offset : bound of the last one.
     slope : derivatives of the units at a slip over their sum, n entries; the curve's is bounded
         there.
     """

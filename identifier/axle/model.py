@@ -71,8 +71,6 @@ class AxleModel(TireModel):
     Parameters
     ----------
     ladder : slip scales α_j of the units [rad].
-    sway : roll of the body.
-    plausibility : which samples are believed.
     W : weights [static axle loads], (2, n).
     own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
     covariance : of [W, own], (2, n + 3, n + 3).
@@ -81,6 +79,8 @@ class AxleModel(TireModel):
     calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
     guarantee : weights that the drive left possible; None where nobody asked.
+    force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
+        None where nobody looked.
 
     Raises
     ------
@@ -102,6 +102,7 @@ class AxleModel(TireModel):
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
     guarantee: Guarantee | None = None
+    force_missed: Array | None = None
 
     def __post_init__(self) -> None:
         doublings(self.ladder)
@@ -127,6 +128,9 @@ class AxleModel(TireModel):
                 f"W must be static axle loads below {LARGEST_WEIGHT:g}, it reaches "
                 f"{np.abs(self.W).max():g}"
             )
+        missed = self.force_missed
+        if missed is not None and not (missed.shape == (2,) and (missed >= 0.0).all()):
+            raise ValueError(f"force_missed must be two shares of at least 0, it is {missed}")
         self._require_possible()
 
     def _require_possible(self) -> None:
@@ -200,14 +204,22 @@ class AxleModel(TireModel):
         """Whether the model can tell how sure it is: by its covariance."""
         return True
 
-    def with_calibration(self, calibration: BandCalibration | None) -> "AxleModel":
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of its band was found on parts of the drive that did not teach."""
+        return self.calibration is not None
+
+    def with_calibration(
+        self, calibration: BandCalibration | None, force_missed: Array | None = None
+    ) -> "AxleModel":
         """Return the model, its band calibrated.
 
         Parameters
         ----------
         calibration : None takes errors to be as learning is told.
+        force_missed : of the drive that taught, (2,); None where nobody looked.
         """
-        return replace(self, calibration=calibration)
+        return replace(self, calibration=calibration, force_missed=force_missed)
 
     @property
     def known_slip(self) -> Array:
@@ -257,13 +269,7 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        recording : its signals are the input.
         level : share of samples that the band shall hold, above 0 and below 1.
-
-        Raises
-        ------
-        ValueError
-            Where the level is impossible.
         """
         slip, noise = self.lagged_slip(recording), sensor_noise(recording, self.vehicle)
         half = np.zeros_like(slip)
@@ -294,7 +300,6 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        recording : its signals are the input.
         level : share of cases that the band shall hold, above 0 and below 1.
         """
         speed = np.maximum(recording.v_x, self.min_speed)
@@ -326,12 +331,7 @@ class AxleModel(TireModel):
         return slope
 
     def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2).
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""
         return self.slope_at(self.lagged_slip(recording)) * self.vehicle.load_ratio(recording.v_x)
 
     @property
@@ -372,7 +372,6 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        recording : its signals are the input.
         mean : over the windows: signals (n, ...) -> (m, ...).
         """
         size, count = np.abs(self.lagged_slip(recording)), len(CENTERS)
@@ -396,11 +395,6 @@ class AxleModel(TireModel):
         Parameters
         ----------
         sd_friction : standard deviation of ln μ between the roads [-], as of `Prior`.
-
-        Raises
-        ------
-        ValueError
-            Where it is negative or not finite.
         """
         if not 0.0 <= sd_friction < np.inf:
             raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
@@ -424,6 +418,7 @@ class AxleModel(TireModel):
         units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
         beyond = beyond_driven(alpha[:, None], self.driven_slip)
         rates = np.repeat(np.abs(rate)[:, None], 2, axis=1)
+        beyond = beyond + self.guarantee.too_fast(rates)
         low, high = self.guarantee.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
         return low * self._loads, high * self._loads
 
@@ -431,10 +426,6 @@ class AxleModel(TireModel):
         """Return least and largest axle force over a drive, (n, 2) [N], as `axle_force`.
 
         NaN below the lowest speed; None where no guarantee is stated.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
         """
         if self.guarantee is None:
             return None
@@ -444,12 +435,7 @@ class AxleModel(TireModel):
         return low * self._loads, high * self._loads
 
     def with_guarantee(self, guarantee: Guarantee) -> "AxleModel":
-        """Return the model with its guaranteed band.
-
-        Parameters
-        ----------
-        guarantee : weights that are possible.
-        """
+        """Return the model with its guaranteed band."""
         return replace(self, guarantee=guarantee)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
@@ -458,26 +444,24 @@ class AxleModel(TireModel):
         ρ is of the model's force; where a guarantee is stated, of that possible one which changes
         most, and the slower the car is against the drive that taught, the larger: the lag of a tire
         is a length.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
         """
         slip, dt, stretches = self.lagged_slip(recording), recording.dt, recording.stretches
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
         pressed = self.vehicle.load_ratio(recording.v_x)
         T *= pressed[..., None]
+        beyond = slip_beyond(slip, self.driven_slip, dt, stretches)
         if self.guarantee is None:
             rate = force_rate(T, (self.W[:1], self.W[1:]), dt, stretches)
         else:
             rate = force_rate(T, self.guarantee.corners, dt, stretches)
             v_x = np.maximum(recording.v_x, self.min_speed)
             rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
+            beyond += self.guarantee.too_fast(rate)
         v_y = 0.0 if recording.v_y is None else recording.v_y
         along = along_acceleration(recording.v_x, v_y * recording.r, dt, stretches)
         carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
         doubt = Doubt(
-            beyond=slip_beyond(slip, self.driven_slip, dt, stretches),
+            beyond=beyond,
             rate=rate,
             lost=grip_lost(along[:, None] * self.vehicle.mass / self._loads, carried),
         )
@@ -501,11 +485,6 @@ class AxleModel(TireModel):
 
     def samples(self, n: int, rng: np.random.Generator) -> tuple["AxleModel", ...]:
         """Return models drawn from what learning left open, and from the errors of a model.
-
-        Parameters
-        ----------
-        n : how many.
-        rng : source of randomness.
 
         Raises
         ------
@@ -543,7 +522,8 @@ class AxleModel(TireModel):
         zeros = np.array([at_most.max_steering, at_most.slow])
         low = np.column_stack([np.zeros((2, 2)), -zeros])
         high = np.column_stack([np.full(2, car.wheelbase), np.ones(2), zeros])
-        return replace(self, W=W, own=np.clip(self.own + away[:, n:], low, high))
+        own = np.clip(self.own + away[:, n:], low, high)
+        return replace(self, W=W, own=own, force_missed=None)
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
@@ -587,13 +567,9 @@ class AxleModel(TireModel):
         return bent
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
+        """Return what `summary` says beside the estimates."""
         known = self.known_slip
-        lines = [
-            Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
-            Fact(RELAXATION, self.relaxation_length, "m"),
-            Fact("known up to a slip of", np.degrees(known), "deg"),
-        ]
+        lines = list(TireModel.facts(self))
         if (known > 0.0).all():
             unsure = 100.0 * np.diag(self.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
@@ -610,7 +586,8 @@ class AxleModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle, guarantee=None)  # it was shown of this car alone
+        # Both were shown of this car alone.
+        return replace(self, vehicle=vehicle, guarantee=None, force_missed=None)
 
     def beside_v_y(self) -> "AxleModel":
         """Return the model as one that the axle identifier goes on learning, which is told v_y."""
@@ -622,11 +599,6 @@ class AxleModel(TireModel):
         Parameters
         ----------
         ratio : friction over that of the drive that taught, positive [-].
-
-        Raises
-        ------
-        ValueError
-            Where the ratio is not positive.
         """
         require_positive(ValueError, ratio=ratio)
         n = len(self.ladder)
@@ -640,7 +612,8 @@ class AxleModel(TireModel):
             covariance=self.covariance * np.outer(unit, unit),
             prior_covariance=self.prior_covariance * np.outer(unit, unit),
             excitation=excitation,
-            guarantee=None,  # of the road that taught
+            guarantee=None,  # of the road that taught, as is what is missed
+            force_missed=None,
         )
 
     @property
@@ -691,24 +664,14 @@ class AxleModel(TireModel):
         return above - np.column_stack([above[:, 1:], np.zeros(2)])
 
     def outside(self, recording: Recording) -> NDArray[np.bool_]:
-        """Return where the slip leaves the known range, (n, 2).
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return where the slip leaves the known range, (n, 2)."""
         outside: NDArray[np.bool_] = (
             self.setup(recording.dt).output(recording, "slip_size") > self.known_slip
         )
         return outside
 
     def lagged_slip(self, recording: Recording) -> Array:
-        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad].
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self.setup(recording.dt).output(recording, "lagged_slip")
 
     def setup(self, dt: float) -> Setup:
@@ -731,8 +694,8 @@ class AxleModel(TireModel):
                 "dt": np.array(dt),
                 "car": car_numbers(self.vehicle),
                 "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": self.plausibility.numbers(),
-                "roll": self.sway.numbers(),
+                "plausibility": np.array(self.plausibility.numbers()),
+                "roll": np.array(self.sway.numbers()),
                 **downforce_numbers(self.vehicle),
             },
             ends_run=self.plausibility.rest(dt),
@@ -762,6 +725,7 @@ class AxleModel(TireModel):
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
             **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
+            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
         }
 
     @classmethod
@@ -770,13 +734,7 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        data : as from `to_dict`.
         source : name of the file, for errors.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
         """
         _require_plausible(data, source)
         try:
@@ -795,6 +753,11 @@ class AxleModel(TireModel):
                     else None
                 ),
                 tells_v_y=bool(data.get("tells_v_y", False)),
+                force_missed=(
+                    np.array(data["force_missed"], dtype=np.float64)
+                    if "force_missed" in data
+                    else None
+                ),
             )
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error

@@ -35,11 +35,6 @@ class Prior:
     sway_share, sd_sway_share : share of the roll rate that moves the contact patch [-].
     sd_steering : of the front steering's zero [rad].
     sd_v_y : of the bias of v_y [m/s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     friction: float = 0.8

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import Car, within
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
@@ -60,7 +58,6 @@ def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
 
     Parameters
     ----------
-    gated : what the gate lets through.
     offset : δ₀ [rad] and b [m/s], (2,).
     """
     sideways = gated.v_y - offset[1] + car.arm * gated.r
@@ -90,7 +87,6 @@ def lagged_slip(h: Hold, last: SlipState, alpha: Any, first: Any) -> Any:
     Parameters
     ----------
     h : numbers of the step.
-    last : state before the step.
     alpha : slip angle now [rad], (2,).
     first : 1 at a restart, which begins without lag, else 0.
     """
@@ -116,8 +112,6 @@ def sensitivity(
     Parameters
     ----------
     h : numbers of the step.
-    last : slip before the step.
-    lasting : sensitivities before the step.
     compliance : s [m], (2,).
     alpha : slip angle now [rad], (2,).
     first : 1 at a restart, else 0.
@@ -187,17 +181,19 @@ class Sway:
     def for_vehicle(cls, vehicle: Vehicle) -> "Sway":
         """Return the roll that a car of this size has: 5 sqrt(g/L), 1.5 Hz for a sedan; of a toy
         below 7 cm 10 Hz.
-
-        Parameters
-        ----------
-        vehicle : its wheelbase sets the scale of time.
         """
         return cls(frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * FASTEST))
 
-    def numbers(self) -> Array:
-        """Return the numbers of `SwayNumbers`, (5,)."""
+    def numbers(self) -> "SwayNumbers":
+        """Return the numbers of a step."""
         omega, most = self.frequency, MOST_SWAY * GRAVITY
-        return np.array([omega**2, 2.0 * self.damping * omega, omega**-2, most, omega * most])
+        return SwayNumbers(
+            stiffness=omega**2,
+            damping=2.0 * self.damping * omega,
+            compliance=omega**-2,
+            most=most,
+            most_rate=omega * most,
+        )
 
 
 class SwayNumbers(NamedTuple):
@@ -237,7 +233,6 @@ def sway(
     ----------
     numbers : of the second-order system.
     dt : sampling interval [s].
-    state : before the step.
     first : 1 at a restart, which begins in steady cornering, else 0.
     v_x : longitudinal speed [m/s].
     r : yaw rate [rad/s].

@@ -28,7 +28,7 @@ from identifier.axle.car import (
 )
 from identifier.axle.covariance import factors_of, inflated, loosened, row_of, spread, triangle
 from identifier.axle.curve import EDGES, Curve, curve, excited
-from identifier.axle.gate import Gate, GateState, gate
+from identifier.axle.gate import Gate, GateNumbers, GateState, gate
 from identifier.axle.learning import (
     BoundNumbers,
     ChangeNumbers,
@@ -67,7 +67,6 @@ from models.vehicle import GRAVITY, load_ratio
 FROZEN_CARRY = ("gate", "sway", "slip")
 OVER = ("x", "u", "v_x")
 CONSTANTS = ("dt", "car", "scales", "plausibility", "roll")
-PLAUSIBILITY = 15  # numbers of `Plausibility`
 
 
 class Forward(NamedTuple):
@@ -106,7 +105,8 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
     n = len(steps) + 1
     W, own, dt = ca.SX.sym("W", 2, n), ca.SX.sym("own", 2, 3), ca.SX.sym("dt")
     x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
-    scales, plausibility = ca.SX.sym("scales", 1, n), ca.SX.sym("plausibility", PLAUSIBILITY)
+    scales = ca.SX.sym("scales", 1, n)
+    limit_port, limits = named_port(GateNumbers, "plausibility")
     gate_port, last_gate = named_port(GateState, "gate")
     sway_port, last_sway = named_port(SwayState, "sway")
     slip_port, last_slip = axle_port(SlipState, "slip")
@@ -114,7 +114,7 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
     roll_port, roll = named_port(SwayNumbers, "roll")
     compliance, share, offset = ca.horzsplit(own)
 
-    gated = gate(plausibility, dt, last_gate, x, u, v_x)
+    gated = gate(limits, dt, last_gate, x, u, v_x)
     body = sway(
         roll,
         car,
@@ -145,7 +145,7 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
         "dt": dt,
         "car": car_port,
         "scales": scales,
-        "plausibility": plausibility,
+        "plausibility": limit_port,
         "roll": roll_port,
     }
     if pressed:
@@ -179,7 +179,6 @@ def build_frozen(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
     Parameters
     ----------
     steps : doublings between the units.
-    pressed : as of `forward`.
     """
     f = forward(steps, pressed=pressed)
     return ca.Function(
@@ -305,7 +304,6 @@ def build_step(
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is told, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
-    pressed : as of `forward`.
     """
     n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)
@@ -375,13 +373,13 @@ def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
 
     h : regressors (2, q).   e : y - h'w (2,).   counts : share of e that counts, after clipping.
     gains : K (2, q), 0 where nothing is learnt; of lag and offsets also while the watch rests.
-    told : standard deviation that y is told to have (2,), the slow mean of errors in it.
+    told : standard deviation that y is told to have (2,), without what the slow mean of squared
+    errors adds.
     watched : whether kept weights come back, and by how much they follow the learnt ones.
 
     Parameters
     ----------
     steps : doublings between the units, the structure.
-    pressed : as of `forward`.
     """
     n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)
@@ -523,7 +521,6 @@ def build_evidence(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Funct
     Parameters
     ----------
     steps : doublings between the units.
-    pressed : as of `forward`.
     """
     f = forward(steps, pressed=pressed)
     n, ports = len(steps) + 1, dict(f.ports)

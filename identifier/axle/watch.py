@@ -21,9 +21,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen.arrays import Array
 from identifier.axle.car import larger, smaller
 from models.rules import require_positive_fields
 
@@ -44,11 +42,6 @@ class Watch:
     again : time for which the old weights must explain forces that are there [s].
     known : time for which weights must have explained forces before there is an alarm on them [s].
     give_up : time of alarm after which it is taken for another road [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     moment: float = 0.2
@@ -62,23 +55,21 @@ class Watch:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float) -> Array:
-        """Return the numbers of `WatchNumbers`, (7,).
+    def at(self, dt: float) -> "WatchNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        return np.array(
-            [
-                min(dt / self.moment, 1.0),
-                self.noticed,
-                self.calm,
-                min(dt / self.behind, 1.0),
-                self.again,
-                self.known,
-                self.give_up,
-            ]
+        return WatchNumbers(
+            gain=min(dt / self.moment, 1.0),
+            noticed=self.noticed,
+            calm=self.calm,
+            follow=min(dt / self.behind, 1.0),
+            again=self.again,
+            known=self.known,
+            give_up=self.give_up,
         )
 
 
@@ -140,7 +131,6 @@ def watched(
 
     Parameters
     ----------
-    state : before the sample.
     q : of the learnt weights, front and rear (2,).
     q_kept : of the kept ones (2,).
     dt : sampling interval [s].

@@ -6,6 +6,7 @@ from identifier.baselines.eso import ExtendedStateObserver
 from identifier.baselines.floor import Structure, fit_floor, share_of_force, structure_of
 from identifier.baselines.horizon import HorizonEstimator
 from identifier.baselines.kalman import ForceEkf
+from identifier.baselines.lagged_ekf import LaggedEkf
 from identifier.baselines.linear import LinearBaseline, StiffnessRls
 from identifier.baselines.slip_filter import SlipFilter, joint_ekf, linear_kf
 from identifier.baselines.washout import Washout
@@ -16,6 +17,7 @@ __all__ = [
     "ExtendedStateObserver",
     "ForceEkf",
     "HorizonEstimator",
+    "LaggedEkf",
     "LinearBaseline",
     "SlipFilter",
     "StiffnessRls",

@@ -85,9 +85,7 @@ def linear(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     Parameters
     ----------
     q : C [N/rad] (2, 1).
-    loads : not looked at.
     alpha : slip angles (2,) [rad].
-    u : not looked at.
     """
     del loads, u
     return q[:, 0] * alpha
@@ -101,7 +99,6 @@ def magic_formula(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     Parameters
     ----------
     q : B [1/rad], C [-], D [N] (2, 3).
-    loads : not looked at.
     alpha : slip angles (2,) [rad].
     u : [δ_f, δ_r] (2,).
     """
@@ -141,7 +138,6 @@ def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: 
 
     Parameters
     ----------
-    curve : whose slip it is.
     offset : zero of the front steering δ₀ [rad], which is added, and bias b of v_y [m/s], (2,).
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] as the sensors read them (2,).
@@ -289,7 +285,6 @@ class CurveModel(TireModel):
         Parameters
         ----------
         alpha : slip angles (2,) [rad], the wheels straight ahead.
-        v_x : not looked at.
         """
         del v_x
         return self._force(alpha, 0.0)
@@ -339,13 +334,7 @@ class CurveModel(TireModel):
 
         Parameters
         ----------
-        data : as from `to_dict`.
         source : name of the file, for errors.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
         """
         try:
             table = Table(data, "", FrozenModelError)

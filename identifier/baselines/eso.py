@@ -86,11 +86,6 @@ class ExtendedStateObserver(Method):
     bandwidth : ω_o [rad/s].
     dt : sampling interval [s].
     min_speed : below this speed [m/s] forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     estimates = "axle forces"

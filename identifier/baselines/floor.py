@@ -59,8 +59,6 @@ def fit_floor(
     ----------
     structure : from `floor_structures.structure_of`.
     recordings : one or several, with true forces; each counts equally, each axle too.
-    rng : source of the starts.
-    starts : how many.
     steps : downhill, at most, in each start.
 
     Raises
@@ -111,7 +109,6 @@ def share_of_force(model: TireModel, recording: Recording) -> Array:
     Parameters
     ----------
     model : the model; samples below its lowest speed do not count.
-    recording : with true forces.
 
     Raises
     ------

@@ -136,14 +136,7 @@ def build_stage() -> ca.Function:
 
 
 def smoothed(stages: list[Stage], z: Any, P: Any, limit: Any) -> list[Any]:
-    """Return the trajectory after the way back, that of the arrival first.
-
-    Parameters
-    ----------
-    stages : of the forward pass.
-    z, P : the arrival.
-    limit : keeps a state of the trajectory within its bounds.
-    """
+    """Return the trajectory after the way back, that of the arrival first."""
     adjoint, found = ca.MX.zeros(Z), []
     for stage in reversed(stages):
         adjoint = stage.keep.T @ adjoint - stage.pull
@@ -226,7 +219,6 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     Parameters
     ----------
     samples : N of the window.
-    iterations : Gauss-Newton steps a sample.
     """
     stage, constants = build_stage(), ("vehicle", "sampling", "numbers")
     rows = {"trajectory": (Z, samples + 1), "window": (len(Sampled._fields), samples + 1)}
@@ -293,9 +285,7 @@ class HorizonEstimator(Method):
 
     Parameters
     ----------
-    filter : the joint filter whose tires, noise and prior it has.
     window : how long what was measured is looked at again [s].
-    iterations : Gauss-Newton steps a sample.
 
     Raises
     ------

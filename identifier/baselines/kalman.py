@@ -86,7 +86,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
     Parameters
     ----------
-    name : of the function.
     tire : forces by θ.
     """
     s = sample_ports()
@@ -233,11 +232,6 @@ class ForceEkf(Method):
     outlier : standard deviations from which an innovation counts no more.
     dt : sampling interval [s].
     min_speed : below this speed [m/s] forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     estimates = "axle forces"

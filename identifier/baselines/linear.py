@@ -63,7 +63,6 @@ class LinearBaseline(Method):
 
         Parameters
         ----------
-        vehicle : the car, whose stiffness is used.
         start : None; there is nothing that a stored model could begin.
 
         Raises
@@ -75,12 +74,7 @@ class LinearBaseline(Method):
         return self.frozen(vehicle, {}).setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the linear tire itself.
-
-        Parameters
-        ----------
-        state : nothing is carried.
-        """
+        """Return the linear tire itself."""
         del state
         stiffness = [[vehicle.cornering_stiffness_front], [vehicle.cornering_stiffness_rear]]
         return CurveModel(

@@ -127,7 +127,6 @@ def lagged_slip(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
 
     Parameters
     ----------
-    last : before the step.
     alpha : slip angles now (2,) [rad].
     way : v_x T_s, what the tire has rolled [m].
     sigma : relaxation lengths (2,) [m], not negative.

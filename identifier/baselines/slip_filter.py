@@ -114,7 +114,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
     Parameters
     ----------
-    name : of the function.
     tire : forces by θ.
     """
     heard, n = heard_ports(), 2 + tire.unknowns
@@ -349,7 +348,6 @@ def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
 
     Parameters
     ----------
-    vehicle : the car.
     dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="linear", dt=dt)

@@ -84,11 +84,6 @@ class Washout(Method):
     cutoff : ω, below which the linear model counts [1/s].
     dt : sampling interval [s].
     min_speed : below this speed [m/s] forces and v_y read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     estimates = "lateral velocity"

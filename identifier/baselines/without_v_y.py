@@ -89,7 +89,6 @@ def predicted(
 
     Parameters
     ----------
-    tire, known : as of `axle_force`.
     estimate : [v_y, r, θ], symbols.
     v_x, u : means over the step.
     dt : sampling interval [s].
@@ -102,12 +101,7 @@ def predicted(
 def expected(
     tire: FilteredTire, p: BicycleParameters, known: Any, estimate: Any, v_x: Any, u: Any
 ) -> Any:
-    """Return what the sensors should show of an estimate: r [rad/s] and a_y [m/s²], (2,).
-
-    Parameters
-    ----------
-    tire, known, estimate, v_x, u : as of `axle_force`.
-    """
+    """Return what the sensors should show of an estimate: r [rad/s] and a_y [m/s²], (2,)."""
     F = axle_force(tire, p, known, estimate, v_x, u)
     return ca.vertcat(estimate[1], (F[0] + F[1]) / p.m)
 

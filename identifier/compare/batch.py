@@ -36,8 +36,6 @@ class BatchRun:
 
     Parameters
     ----------
-    vehicle : the car the method was told of.
-    design : the method that ran.
     online : error of the forces that were identified online [N], not a number where the law
         diverged to none; None without true forces.
     diverged_at : time [s] from which a force is not finite or a hundred times the weight, or None.
@@ -87,7 +85,6 @@ def identify_batch(
     Parameters
     ----------
     recording : signals, sampled at the designs' interval; its forces only judge.
-    vehicle : the car as every method is told of it, or one car for each method.
     designs : methods, in any order; those that differ in numbers only run side by side.
     freeze_times : when carried values are kept, in the recording's own clock [s].
     min_speed : samples below this speed [m/s] do not count in the error; None takes the highest
@@ -161,8 +158,6 @@ def replay_batch(
 
     Parameters
     ----------
-    recording : with true forces.
-    models : in any order.
     counts : samples that count (n,).
     workers : threads; None takes one for each processor.
 

@@ -1,7 +1,9 @@
 """Learn on every recording, freeze at its end, replay on every recording: does it extrapolate?
 
 All methods are judged on the same samples. Shares are RMSE over the rms of the true force, both
-axles together, in percent.
+axles together, in percent. Where a recording has no true forces, all are judged by the motion: by
+mean forces over windows of 0.3 s, which the motion shows (`identifier.verdict.motion`), the white
+noise of the sensors taken off.
 """
 
 import math
@@ -23,6 +25,14 @@ from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import History, identify
 from identifier.setup import shown
 from identifier.tire_model import TireModel
+from identifier.verdict.motion import (
+    BRISK,
+    FEWEST,
+    Windows,
+    clean_rms,
+    measured_force,
+    noise_variance,
+)
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -35,14 +45,12 @@ class Course:
 
     Parameters
     ----------
-    vehicle : the car as every method is told of it.
-    recordings : with true forces, each with a name of its own.
     min_speed : samples below this speed [m/s] do not count, for any method.
 
     Raises
     ------
     ValueError
-        Where there is no recording, two have the same name, one lacks forces or has none to learn.
+        Where there is no recording, two have the same name, or one shows no force to learn.
     """
 
     vehicle: Vehicle
@@ -56,19 +64,32 @@ class Course:
         for recording in self.recordings:
             if names.count(recording.name) > 1:
                 raise ValueError(f"{recording.name} is given twice: each needs its own name")
-            if recording.axle_force is None:
-                raise ValueError(f"{recording.name}: a comparison needs the true forces Fyf, Fyr")
+            if self.by_motion and len(self._windows(recording)) < FEWEST:
+                raise ValueError(
+                    f"{recording.name}: fewer than {FEWEST} windows are driven briskly, and there "
+                    "are no true forces Fyf, Fyr to judge by"
+                )
             size = self.size(recording)
             if not min(size.front, size.rear) > 0.0:
-                raise ValueError(f"{recording.name}: the true force of an axle is always zero")
+                what = "that the motion shows of" if self.by_motion else "of"
+                raise ValueError(f"{recording.name}: the force {what} an axle is always zero")
+
+    @property
+    def by_motion(self) -> bool:
+        """Whether forces are judged by the motion: where a recording has no true forces."""
+        return any(recording.axle_force is None for recording in self.recordings)
+
+    @property
+    def measure(self) -> str:
+        """What errors are, in words."""
+        by = ", means over 0.3 s by the motion" if self.by_motion else ""
+        return f"RMSE of the axle force{by}"
+
+    def _windows(self, recording: Recording) -> Windows:
+        return Windows.of(recording, max(self.min_speed, BRISK * self.vehicle.froude_speed))
 
     def size(self, recording: Recording) -> AxleRmse:
-        """Return the rms of the true forces over the samples that count.
-
-        Parameters
-        ----------
-        recording : one of them.
-        """
+        """Return the rms over the samples that count of the forces that methods are judged by."""
         return self.error(recording, np.zeros((len(recording), 2)))
 
     def error(self, recording: Recording, force: Array) -> AxleRmse:
@@ -76,13 +97,22 @@ class Course:
 
         Parameters
         ----------
-        recording : one of them.
         force : (n, 2) [N].
         """
+        if self.by_motion:
+            return self._error_by_motion(recording, force)
         assert recording.axle_force is not None
         counted = counted_samples(recording, self.min_speed)
         found = axle_rms(force, counted, recording.axle_force)
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
+
+    def _error_by_motion(self, recording: Recording, force: Array) -> AxleRmse:
+        vehicle, windows = self.vehicle, self._windows(recording)
+        loads = np.array(vehicle.axle_loads)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
+            missed = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
+            front, rear = loads * clean_rms(missed, noise_variance(recording, vehicle, windows))
+        return AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
         """Return by recording the error of a frozen model."""
@@ -93,7 +123,6 @@ class Course:
 
         Parameters
         ----------
-        name : of a recording.
         error : over it [N].
         """
         (recording,) = (rec for rec in self.recordings if rec.name == name)
@@ -132,12 +161,7 @@ class Shares(NamedTuple):
 
 
 def shown_to(method: Method, recording: Recording) -> Recording:
-    """Return what a comparison shows a method: no lateral velocity, where it tells one.
-
-    Parameters
-    ----------
-    recording : that is learnt on.
-    """
+    """Return what a comparison shows a method: no lateral velocity, where it tells one."""
     return recording if method.needs_v_y else replace(recording, v_y=None)
 
 
@@ -199,7 +223,6 @@ def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSl
 
     Parameters
     ----------
-    history : of a method.
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """
@@ -224,12 +247,7 @@ def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSl
 
 
 def shares(trial: Trial, course: Course) -> Shares:
-    """Return the means of a trial over its recordings [%].
-
-    Parameters
-    ----------
-    trial : one method on the course.
-    """
+    """Return the means of a trial over its recordings [%]."""
     names = [recording.name for recording in course.recordings]
     if trial.diverged_at:
         frozen = None if trial.frozen is None else np.inf
@@ -357,11 +375,9 @@ def run_scored(
     Parameters
     ----------
     scan : its step reads x, u and v_x sample by sample and tells axle_force (2,) [N].
-    values : for each run, what it starts from and its constants, by port.
     recording : its forces are the truth; without them every error is that of no force.
     impossible : for each run, a force that no tire makes [N].
     counts : samples that count in the error (n,).
-    keep : samples whose values are recorded.
     rest : samples that each run rests between stretches of the recording.
     workers : threads; None takes one for each processor.
     """
@@ -419,8 +435,6 @@ def step_times(
 
     Parameters
     ----------
-    methods : by name.
-    recording : what is run over.
     repeats : turns; the shortest counts.
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}

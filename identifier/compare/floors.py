@@ -12,12 +12,12 @@ import numpy as np
 from identifier.baselines import fit_floor, structure_of
 from identifier.compare.course import Course
 from identifier.compare.work import spread
-from identifier.methods import DEFAULT, REFERENCE, REGRESSIONS, make_method
+from identifier.methods import LIVE, REFERENCE, REGRESSIONS, make_method
 from identifier.paper.design import VARIANTS
 from identifier.reproducibility import AxleRmse
 
 STRUCTURES: Mapping[str, str] = {  # name of the structure to a method that has it
-    "axle units": DEFAULT,
+    "axle units": LIVE,
     "network": REFERENCE,
     "Magic Formula": "magic_formula_ekf",
     "Dugoff": "dugoff_ekf",
@@ -25,7 +25,7 @@ STRUCTURES: Mapping[str, str] = {  # name of the structure to a method that has 
     "lagged linear tire": "stiffness_rls",
 }
 FLOOR_OF: Mapping[str, str] = {
-    DEFAULT: "axle units",
+    LIVE: "axle units",
     **dict.fromkeys((*VARIANTS, *REGRESSIONS), "network"),
     "magic_formula_ekf": "Magic Formula",
     "dugoff_ekf": "Dugoff",
@@ -39,8 +39,6 @@ def fit(course: Course, starts: int, seed: int, task: tuple[str, int]) -> dict[s
 
     Parameters
     ----------
-    starts : of the fit.
-    seed : of the starts.
     task : name of the structure, number of the recording.
     """
     name, number = task
@@ -63,9 +61,6 @@ def fit_floors(
 
     Parameters
     ----------
-    methods : whose structures are fitted.
-    starts : of each fit.
-    seed : of the starts.
     workers : processes; 1 stays in this one.
     """
     needed = {FLOOR_OF[name] for name in methods if name in FLOOR_OF}

@@ -23,13 +23,11 @@ class Comparison:
 
     Parameters
     ----------
-    seed : of initial weights and draws.
     trials : by method, its errors with the numbers that follow from the vehicle.
     floors : by structure of the network, errors of its offline fit to the true forces of one
         recording, on every recording.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them.
     sweeps : by method, its random designs; empty without a sweep.
-    left_out : by method that was asked for and is not compared, why.
     """
 
     course: Course
@@ -46,21 +44,11 @@ class Comparison:
         return [recording.name for recording in self.course.recordings]
 
     def shares(self, method: str) -> Shares:
-        """Return the mean errors of a method over the recordings [%].
-
-        Parameters
-        ----------
-        method : its name.
-        """
+        """Return the mean errors of a method over the recordings [%]."""
         return shares(self.trials[method], self.course)
 
     def time_ratio(self, method: str) -> float:
-        """Return the time of a step over that of the paper's law.
-
-        Parameters
-        ----------
-        method : its name.
-        """
+        """Return the time of a step over that of the paper's law."""
         return self.step_times[method] / self.step_times[REFERENCE]
 
 
@@ -73,15 +61,7 @@ FIT, NETWORK_FIT, DESIGN = 2.0, 60.0, 1.0  # each start of a fit, of the network
 def step_lengths(
     names: Sequence[str], recordings: int, *, designs: int, starts: int, others: int = 0
 ) -> list[float]:
-    """Return how long each step that `run_comparison` tells of takes beside the others.
-
-    Parameters
-    ----------
-    names : of methods.
-    recordings : how many.
-    designs, starts : as for `run_comparison`.
-    others : further methods.
-    """
+    """Return how long each step that `run_comparison` tells of takes beside the others."""
     lengths = [float(recordings)] * (len(names) + others)
     if starts:
         wanted = {FLOOR_OF[name] for name in names if name in FLOOR_OF}
@@ -97,13 +77,7 @@ def step_lengths(
 def cannot_learn(
     names: Sequence[str], vehicle: Vehicle, recordings: Sequence[Recording]
 ) -> dict[str, str]:
-    """Return by method why it cannot learn on all of the recordings; without those that can.
-
-    Parameters
-    ----------
-    names : of methods.
-    recordings : that are compared on.
-    """
+    """Return by method why it cannot learn on all of the recordings; without those that can."""
     lacking = [recording.name for recording in recordings if recording.a_y is None]
     why = f"left out, it learns from ay and {', '.join(lacking)} has none"
     return {name: why for name in names if lacking and make_method(name, vehicle).needs_a_y}
@@ -128,28 +102,26 @@ def run_comparison(
 
     Parameters
     ----------
-    names : of methods.
-    recordings : with true forces.
-    seed : of initial weights and of the sweep.
+    recordings : with true forces, or judged by the motion, without sweep and floors.
     designs : random designs of each method; 0 leaves the sweep out.
     starts : of each offline fit to the true forces; 0 leaves the floors out.
-    workers : processes of fits and sweep.
     progress : told of each step that is done, of `step_lengths` many.
     note : told how far a sweep has come, now and then; None tells it to `progress`.
     elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
     others : further methods by name, which have neither sweep nor floor.
-    left_out : by method that was asked for beside these, why it is not compared.
 
     Raises
     ------
     ValueError
-        Where a method is unknown or the recordings cannot be compared on; a RecordingError where
-        one cannot learn on them, as `cannot_learn` tells.
+        Where a method is unknown, a sweep or floors lack true forces, or the recordings cannot be
+        compared on; a RecordingError where one cannot learn on them, as `cannot_learn` tells.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
     methods |= others or {}
     slowest = max(method.min_speed for method in methods.values())
     course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
+    if course.by_motion and (designs or starts):
+        raise ValueError("sweeps and floors are fitted to the true forces Fyf, Fyr of every log")
     trials = {}
     for name, method in methods.items():
         trials[name] = cross_replay(method, course)
@@ -189,12 +161,7 @@ def run_comparison(
 
 
 def ranking(comparison: Comparison) -> list[str]:
-    """Return the methods, smallest frozen error elsewhere first; those that cannot freeze last.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the methods, smallest frozen error elsewhere first; those that cannot freeze last."""
 
     def key(name: str) -> tuple[bool, float]:
         found = comparison.shares(name)

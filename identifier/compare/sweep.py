@@ -29,9 +29,7 @@ class Candidate:
 
     Parameters
     ----------
-    values : of what was drawn, by name.
     shares : mean errors [%], infinite where it diverged.
-    diverged_on : recordings on which it diverged.
     """
 
     values: Mapping[str, float]
@@ -42,13 +40,7 @@ class Candidate:
 def random_values(
     ranges: Mapping[str, Range], designs: int, rng: np.random.Generator
 ) -> list[dict[str, float]]:
-    """Draw designs; the first k of a longer sweep are those of a sweep of k.
-
-    Parameters
-    ----------
-    ranges : by name.
-    designs : how many.
-    """
+    """Draw designs; the first k of a longer sweep are those of a sweep of k."""
     return [
         {
             name: span.at(float(share))
@@ -61,13 +53,7 @@ def random_values(
 def judge(
     course: Course, seed: int, task: tuple[str, Sequence[Mapping[str, float]]]
 ) -> tuple[Candidate, ...]:
-    """Run designs of one method over the course, side by side.
-
-    Parameters
-    ----------
-    seed : seed of the initial weights.
-    task : name of the method, and for each design the values of its tunables.
-    """
+    """Run designs of one method over the course, side by side."""
     name, draws = task
     methods = [tuned_method(name, course.vehicle, values, seed) for values in draws]
     return tuple(
@@ -92,11 +78,8 @@ def sweep(
 
     Parameters
     ----------
-    names : of methods.
     designs : of each method; a method without tunables runs once.
-    seed : of the initial weights, and of the draws, which are the same numbers for each method.
     workers : processes; 1 stays in this one.
-    progress : told of each method that is done.
     note : told how far one has come, now and then; None tells it to `progress`.
     elsewhere : does the work in place of processes of this machine, as a cluster's map does; its
         results may come in any order.
@@ -174,10 +157,6 @@ def pareto_front(candidates: Sequence[Candidate]) -> list[Candidate]:
 
     The frozen error is that on other recordings, or where learnt if there is only one; designs
     that diverged, and those of methods that cannot be frozen, are never on it.
-
-    Parameters
-    ----------
-    candidates : of one method.
     """
     front: list[Candidate] = []
     sane = [c for c in candidates if not c.diverged_on and frozen_share(c.shares) is not None]
@@ -193,10 +172,6 @@ def pareto_front(candidates: Sequence[Candidate]) -> list[Candidate]:
 def best_candidate(candidates: Sequence[Candidate]) -> Candidate | None:
     """Return the design with the smallest frozen error, online error where nothing is frozen.
 
-    Parameters
-    ----------
-    candidates : of one method.
-
     Returns
     -------
     None where every design diverged.
@@ -211,10 +186,5 @@ def best_candidate(candidates: Sequence[Candidate]) -> Candidate | None:
 
 
 def frozen_share(found: Shares) -> float | None:
-    """Return the frozen error on other recordings, or where learnt if there is only one [%].
-
-    Parameters
-    ----------
-    found : of a design.
-    """
+    """Return the frozen error on other recordings, or where learnt if there is only one [%]."""
     return found.in_sample if found.other is None else found.other

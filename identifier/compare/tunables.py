@@ -43,7 +43,6 @@ def tuned_design(
     ----------
     law : one of `VARIANTS`.
     values : by name, within the ranges of `TUNABLES`.
-    seed : seed of the initial weights.
     dt : sampling interval [s].
 
     Raises
@@ -99,12 +98,7 @@ def largest_loop_gain(law: str, *, a: float, lam: float, lead: float, dt: float)
 
 
 def tunables(name: str, vehicle: Vehicle) -> Mapping[str, Range]:
-    """Return what may be tuned about a method; empty where there is nothing.
-
-    Parameters
-    ----------
-    name : of the method.
-    """
+    """Return what may be tuned about a method; empty where there is nothing."""
     if name in VARIANTS:
         return TUNABLES
     return make_method(name, vehicle).tunables
@@ -115,9 +109,7 @@ def tuned_method(name: str, vehicle: Vehicle, values: Mapping[str, float], seed:
 
     Parameters
     ----------
-    name : of the method.
     values : by name; "part.number" is a number of a part. Empty leaves the method as it is.
-    seed : seed of the initial weights.
     """
     if name in VARIANTS and values:
         return tuned_design(vehicle, name, values, seed=seed)

@@ -62,12 +62,25 @@ def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> 
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=_begin_process,
-        initargs=(prepare,),
+        initializer=exec,
+        initargs=(BEGIN, {"prepare": prepare}),
     )
 
 
-def _begin_process(prepare: Callable[[], None] | None) -> None:
+# A new process knows no module yet: tireid is its first, which finds its own packages.
+BEGIN = """import tireid
+from identifier.compare.work import begin_process
+begin_process(prepare)
+"""
+
+
+def begin_process(prepare: Callable[[], None] | None) -> None:
+    """Let this process, one of a pool, end with the one that made it.
+
+    Parameters
+    ----------
+    prepare : what it does first; None for nothing.
+    """
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if prepare is not None:
         prepare()
@@ -120,8 +133,6 @@ class Store:
     Parameters
     ----------
     folder : where they are; made where it is missing.
-    name : the name of an item's result, a hash of all that the result follows from.
-    to_json : a result as plain numbers and words.
     from_json : the result that `to_json` describes; KeyError, TypeError or ValueError where it is
         none, which is then found anew.
     """
@@ -132,12 +143,7 @@ class Store:
     from_json: Callable[[Any], Any]
 
     def read(self, item: Any) -> Any:
-        """Return a result that was kept, or None.
-
-        Parameters
-        ----------
-        item : whose result.
-        """
+        """Return a result that was kept, or None."""
         try:
             return self.from_json(read_json(self._path(item), ValueError))
         except (OSError, KeyError, TypeError, ValueError):
@@ -145,11 +151,6 @@ class Store:
 
     def write(self, item: Any, result: Any) -> None:
         """Keep a result, whole or not at all.
-
-        Parameters
-        ----------
-        item : whose result.
-        result : of the work.
 
         Raises
         ------
@@ -187,7 +188,6 @@ def run_resumably(
     Parameters
     ----------
     work : from item to result, never None; picklable where other processes do it.
-    items : what to work on.
     spread_map : does the work; its results may come in any order.
     store : where results are kept as soon as they come; None keeps none.
     done : told after every item how many were found by an earlier run and how many are ready.

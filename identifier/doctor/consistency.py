@@ -135,26 +135,15 @@ def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
 
 
 def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:
-    """Return what a reading leaves unexplained: the sum of the logarithms of each equation's share.
-
-    Parameters
-    ----------
-    motion : of the log.
-    vehicle : as it was told.
-    reading : of the log and of the car.
+    """Return what a reading leaves unexplained: the sum of the logarithms of each equation's
+    share.
     """
     one = forces_and_slips(motion, vehicle, reading)
     return front_leaves(one, vehicle) + but_front_leaves(one, motion, vehicle, reading)
 
 
 def front_leaves(one: "AxleMotion", vehicle: Vehicle) -> float:
-    """Return what is left of the front axle, the only equation that the steering is in.
-
-    Parameters
-    ----------
-    one : of a reading.
-    vehicle : as it was told.
-    """
+    """Return what is left of the front axle, the only equation that the steering is in."""
     told = vehicle.cornering_stiffness_front / vehicle.axle_loads[0]
     return _curve_leaves(one.force[0], one.slip[0], told)
 
@@ -162,15 +151,7 @@ def front_leaves(one: "AxleMotion", vehicle: Vehicle) -> float:
 def but_front_leaves(
     one: "AxleMotion", motion: Motion, vehicle: Vehicle, reading: Reading
 ) -> float:
-    """Return what is left of all other equations.
-
-    Parameters
-    ----------
-    one : of the reading.
-    motion : of the log.
-    vehicle : as it was told.
-    reading : of the log and of the car.
-    """
+    """Return what is left of all other equations."""
     froude = abs(reading.v_x) * motion.speed / (math.sqrt(reading.size) * vehicle.froude_speed)
     told = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
     total = max(math.log(froude / FAST), 0.0) ** 2
@@ -189,14 +170,7 @@ class AxleMotion(NamedTuple):
 
 
 def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> AxleMotion:
-    """Return forces over loads and slip angles of the axles as a reading has them.
-
-    Parameters
-    ----------
-    motion : of the log.
-    vehicle : as it was told.
-    reading : of the log and of the car.
-    """
+    """Return forces over loads and slip angles of the axles as a reading has them."""
     k_x, k_y, k_r = reading.v_x, reading.v_y, reading.r
     l_f, l_r = reading.size * vehicle.l_f, reading.size * vehicle.l_r
     inertia = reading.inertia * reading.size**2 * vehicle.yaw_inertia / vehicle.mass  # [m^2]

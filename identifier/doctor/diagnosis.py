@@ -21,8 +21,8 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-ROUNDS, SETTLED = 3, 0.2  # deviations, to which the ratio of a steering wheel is settled
-WIDE = 0.3  # of that ratio, by which the screen may be off
+ROUNDS, SETTLED = 4, 0.02  # to which the ratio of a steering wheel is settled
+WIDE = 1.0  # of that ratio, by which the screen may be off
 ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
@@ -163,11 +163,6 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
     """Return the ratio of a steering wheel as the drive says it, no stiffness believed.
 
     None where the drive says that the steering is right.
-
-    Parameters
-    ----------
-    coarse : the finding, by which the drive is repaired.
-    drive, car : with it.
     """
     assert coarse.repair is not None
     factor, deviation = coarse.repair.factor["delta_f"], math.nan
@@ -179,7 +174,7 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
         post = search.run()  # what distorts the motion distorts the ratio
         gain, deviation = post["steering_gain"], post.sd("steering_gain")
         factor *= 1.0 + gain
-        if abs(gain) < SETTLED * deviation:
+        if abs(gain) < SETTLED:
             break
         drive, _ = Repair(factor={"delta_f": 1.0 + gain}).apply(drive, car)
     if abs(math.log(abs(factor))) < NEAR and factor > 0.0:

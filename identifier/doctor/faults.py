@@ -27,7 +27,15 @@ from identifier.doctor.suspects import NOTES, SUSPECTS, TURNING, Suspect
 from identifier.estimate.drive import SMOOTHED, Drive, box, gradient
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
-from identifier.estimate.solve import DELAYS, Problem, Residuals, descend, normal, starts
+from identifier.estimate.solve import (
+    DELAYS,
+    Problem,
+    Residuals,
+    around_beliefs,
+    descend,
+    normal,
+    starts,
+)
 from identifier.motion.model import SENSORS, true_signals
 from identifier.motion.parameters import INDEX
 from models.recordings import Recording
@@ -354,8 +362,8 @@ class Search:
         for one in self.left(of_model=True):
             priors = self.priors(self.widened(one))
             some = np.flatnonzero(priors.moves)
-            P = priors.information
-            slope = g[some] + (P @ (base.p - priors.mean))[some]
+            pull, P = around_beliefs(priors, base.p)
+            slope = g[some] + pull[some]
             inside = (H + P)[np.ix_(some, some)]
             change = priors.cost(base.p) - 0.5 * float(slope @ np.linalg.solve(inside, slope))
             gains[one.parameter] = before - change, 0.0
@@ -427,7 +435,7 @@ class Search:
 
         The balance is a parabola of the parameter there, the others moving with it.
         """
-        k, covariance = INDEX[name], post.whole_covariance
+        k, covariance = INDEX[name], post.covariance
         sd = math.sqrt(covariance[k, k])
         along = covariance[k] / covariance[k, k]
 
@@ -554,8 +562,8 @@ class Search:
         """
         problem = self.problem.under(self.priors(wide))
         at = problem.residuals(post.p)
-        P = problem.priors.information[np.ix_(problem.index, problem.index)]
-        pull = (problem.priors.information @ (post.p - problem.priors.mean))[problem.index]
+        pull, P = around_beliefs(problem.priors, post.p)
+        pull, P = pull[problem.index], P[np.ix_(problem.index, problem.index)]
         shares = np.empty(2)
         for k, (learnt, asked) in enumerate(((parts[1], parts[0]), (parts[0], parts[1]))):
             half = problem.weighted(learnt)
@@ -591,7 +599,7 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
         return Examination(unseen=(SLOW,))
     post = search.run()
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
-    worst = search.problem.missed(post.p)
+    worst = search.problem.share_missed(post.p)
     if worst.max() > RULES.unexplained:
         return Examination(unseen=(UNEXPLAINED[int(np.argmax(worst))],), taken=taken)
     return Examination(findings(search, post), unseen(search, post), taken)
@@ -724,7 +732,8 @@ def unseen(search: Search, post: Posterior) -> tuple[str, ...]:
     for one in search.left(of_model=True):
         priors = search.priors(search.widened(one))
         some = np.flatnonzero(priors.moves)
-        covariance = np.linalg.inv((H + priors.information)[np.ix_(some, some)])
+        P = around_beliefs(priors, post.p)[1]
+        covariance = np.linalg.inv((H + P)[np.ix_(some, some)])
         k = int(np.flatnonzero(some == INDEX[one.parameter])[0])
         left, wide = math.sqrt(covariance[k, k]), one.scaled(one.wide, search.vehicle)
         if left > RULES.untold * wide:

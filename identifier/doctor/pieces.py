@@ -22,12 +22,7 @@ LEAST = 2.0  # s, below which a stretch between two gaps is not looked at
 
 
 def looked_at(recording: Recording) -> tuple[Recording, ...]:
-    """Return the pieces of a drive that the screen looks at: all of a short one, some of a long.
-
-    Parameters
-    ----------
-    recording : of any length, of one stretch or several.
-    """
+    """Return the pieces of a drive that the screen looks at: all of a short one, some of a long."""
     n = max(round(PIECE / recording.dt), SHORTEST)
     places = list(recording.stretches)
     if len(recording) > PIECES * n:
@@ -42,35 +37,19 @@ def looked_at(recording: Recording) -> tuple[Recording, ...]:
 
 
 def driven_pieces(recording: Recording) -> tuple[Recording, ...]:
-    """Return the pieces that are looked at in which the car drives, all where it never does.
-
-    Parameters
-    ----------
-    recording : of any length.
-    """
+    """Return the pieces that are looked at in which the car drives, all where it never does."""
     pieces = looked_at(recording)
     fast = SLOWEST * usual_speed(pieces)
     return tuple(one for one in pieces if len(driven_windows(one, fast))) or pieces
 
 
 def usual_speed(pieces: tuple[Recording, ...]) -> float:
-    """Return the 95th percentile of the speed, forward or backward, in the unit of the log.
-
-    Parameters
-    ----------
-    pieces : that are looked at.
-    """
+    """Return the 95th percentile of the speed, forward or backward, in the unit of the log."""
     return float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
 
 
 def driven_windows(recording: Recording, fast: float) -> Windows:
-    """Return the windows in which a car is never slower than a speed, forward or backward.
-
-    Parameters
-    ----------
-    recording : a piece that is looked at.
-    fast : that speed, in the unit of the log.
-    """
+    """Return the windows in which a car is never slower than a speed, forward or backward."""
     return Windows.where(np.abs(recording.v_x) >= fast, recording, WINDOW)
 
 
@@ -81,10 +60,7 @@ def stretches_of(
 
     Parameters
     ----------
-    recording : the drive.
-    vehicle : the car.
     longest : that is looked at as a whole [s]; the stretches have it together.
-    pieces : how many stretches.
     """
     n, dt = len(recording), recording.dt
     if recording.duration <= longest:

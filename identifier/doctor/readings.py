@@ -79,32 +79,17 @@ class Change:
         return frozenset(f"{name} {kind}" for name, _ in self.factors)
 
     def shows_in(self, motion: Motion) -> bool:
-        """Return whether a log can tell it: what is hidden in noise has no unit of its own.
-
-        Parameters
-        ----------
-        motion : of the log.
-        """
+        """Return whether a log can tell it: what is hidden in noise has no unit of its own."""
         return self.code not in ("unit", "sideslip") or not motion.hidden >= {*self.channels}
 
     def on(self, reading: Reading) -> Reading:
-        """Return a reading with this change.
-
-        Parameters
-        ----------
-        reading : without it.
-        """
+        """Return a reading with this change."""
         factors = {name: getattr(reading, name) * factor for name, factor in self.factors}
         sideslip, arm = reading.sideslip or self.sideslip, reading.arm + self.arm
         return reading._replace(**factors, sideslip=sideslip, arm=arm)
 
     def is_like(self, other: "Change") -> bool:
-        """Return whether both say the same, be it by a factor that is a little another one.
-
-        Parameters
-        ----------
-        other : another change.
-        """
+        """Return whether both say the same, be it by a factor that is a little another one."""
         what = (self.code, self.channels, self.unit)
         pairs = zip(self.factors, other.factors, strict=False)
         near = all(abs(math.log(abs(a / b))) < ALIKE and a * b > 0.0 for (_, a), (_, b) in pairs)
@@ -156,8 +141,6 @@ class Explanation:
 
     Parameters
     ----------
-    changes : in the order in which they were found.
-    reading : with all of them.
     left : what it leaves unexplained, as `unexplained` returns it.
     """
 
@@ -184,7 +167,6 @@ class Read:
 
     Parameters
     ----------
-    best : the reading that is taken.
     other : the next best that means something else.
     without : the same with the velocity sensor where it should be, if elsewhere it makes a reading
         the best that nothing gross is in; None else.
@@ -205,8 +187,6 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
 
     Parameters
     ----------
-    motion : of the log.
-    vehicle : as it was told.
     possible : whether the log breaks no law with some changes; of the best readings those that do
         are left out, unless all do.
     """

@@ -51,12 +51,7 @@ def channels(recording: Recording) -> Mapping[str, Array]:
 
 
 def sample_findings(recording: Recording) -> list[Finding]:
-    """Return what is wrong with the samples of a log.
-
-    Parameters
-    ----------
-    recording : as it was read.
-    """
+    """Return what is wrong with the samples of a log."""
     pieces = driven_pieces(recording)
     listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
     first: dict[tuple[str, str], Finding] = {}
@@ -508,13 +503,7 @@ JUMP, ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two channel
 
 
 def clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
-    """Return where the clock jumped, None where it did not.
-
-    Parameters
-    ----------
-    recording : the log.
-    signals : its channels by name.
-    """
+    """Return where the clock jumped, None where it did not."""
     moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
     again = _logged_again(moving)
     if again is not None:

@@ -22,6 +22,7 @@ from identifier.doctor.pieces import (
 from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
+from identifier.measured import with_doubt
 from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction
 from models.recordings.repair import Repair
@@ -61,13 +62,7 @@ class Screened:
 
 
 def screen(recording: Recording, vehicle: Vehicle) -> Screened:
-    """Return what is grossly wrong with a log or with what is told of its car.
-
-    Parameters
-    ----------
-    recording : as it was read.
-    vehicle : as it was told.
-    """
+    """Return what is grossly wrong with a log or with what is told of its car."""
     clock = clock_findings(recording)
     if clock:
         return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
@@ -129,12 +124,7 @@ def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
 
 
 def repair_of(changes: tuple[Change, ...]) -> Repair:
-    """Return what takes changes out of a log; of the car nothing is changed.
-
-    Parameters
-    ----------
-    changes : of a reading.
-    """
+    """Return what takes changes out of a log; of the car nothing is changed."""
     repair = Repair()
     for change in changes:
         if change.code == ARM:
@@ -149,12 +139,7 @@ def repair_of(changes: tuple[Change, ...]) -> Repair:
 
 
 def combined(findings: Iterable[Finding]) -> Repair:
-    """Return the repair of several findings, gross ones before those that were asked after them.
-
-    Parameters
-    ----------
-    findings : with or without a repair.
-    """
+    """Return the repair of several findings, gross ones before those that were asked after them."""
     repair = Repair()
     for one in findings:
         repair = repair if one.repair is None else repair.merged(one.repair)
@@ -165,10 +150,6 @@ def before_sizes(findings: Iterable[Finding]) -> Repair:
     """Return what is taken out of a log before sizes are asked, sure or not.
 
     That is what is found of its samples and how it is read. Numbers of the car stay as told.
-
-    Parameters
-    ----------
-    findings : of samples and of the reading.
     """
     return replace(combined(findings), vehicle={})
 
@@ -178,7 +159,6 @@ def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Findin
 
     Parameters
     ----------
-    later : that were asked of a log and a car as the earlier ones say they are.
     earlier : all of them; those without a repair say nothing that is taken out.
     """
     firm = all(one.sure for one in earlier if one.repair is not None)
@@ -191,12 +171,7 @@ def _lasts(finding: Finding, recording: Recording, share: float) -> bool:
 
 
 def quiet_finding(recording: Recording) -> Finding | None:
-    """Return that a drive has no corners, None where it has.
-
-    Parameters
-    ----------
-    recording : as it was read.
-    """
+    """Return that a drive has no corners, None where it has."""
     pieces = looked_at(recording)
     fast, turns = max(usual_speed(pieces), 1e-9), []
     for piece in pieces:
@@ -217,12 +192,7 @@ def quiet_finding(recording: Recording) -> Finding | None:
 
 
 def clock_findings(recording: Recording) -> tuple[Finding, ...]:
-    """Return a sampling interval that is that of a clock in ms; nothing else can be asked then.
-
-    Parameters
-    ----------
-    recording : as it was read.
-    """
+    """Return a sampling interval that is that of a clock in ms; nothing else can be asked then."""
     if recording.dt < SLOW:
         return ()
     return (
@@ -236,12 +206,7 @@ def clock_findings(recording: Recording) -> tuple[Finding, ...]:
 
 
 def unlike(vehicle: Vehicle) -> list[Finding]:
-    """Return a yaw inertia that no car of that mass and those lengths has.
-
-    Parameters
-    ----------
-    vehicle : as it was told.
-    """
+    """Return a yaw inertia that no car of that mass and those lengths has."""
     similar, (least, most) = similar_inertia(vehicle), usual_inertia(vehicle)
     ratio, origin = vehicle.yaw_inertia / similar, vehicle.origin("yaw_inertia")
     if least <= ratio <= most:
@@ -259,14 +224,7 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
 
 
 def reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
-    """Return a change of the best reading as findings, of units one for each channel.
-
-    Parameters
-    ----------
-    change : of it.
-    found : with the next best.
-    vehicle : as it was told.
-    """
+    """Return a change of the best reading as findings, of units one for each channel."""
     if change.code != "unit" or len(change.channels) == 1:
         return [reading_finding(change, found, vehicle)]
     parts = [
@@ -277,12 +235,7 @@ def reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Find
 
 
 def one_steering(gross: list[Finding]) -> list[Finding]:
-    """Return findings with one of the steering angle where there were several: factors multiply.
-
-    Parameters
-    ----------
-    gross : of a reading.
-    """
+    """Return findings with one of the steering angle where there were several: factors multiply."""
     of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
     if len(of_steering) < 2:
         return gross
@@ -292,14 +245,7 @@ def one_steering(gross: list[Finding]) -> list[Finding]:
 
 
 def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
-    """Return a change of the best reading as a finding.
-
-    Parameters
-    ----------
-    change : of it.
-    found : with the next best.
-    vehicle : as it was told.
-    """
+    """Return a change of the best reading as a finding."""
     confidence = found.confidence
     if len(found.best.gross) > SEVERAL:
         confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
@@ -360,13 +306,11 @@ def steering_finding(
 
     Parameters
     ----------
-    factor : to the road-wheel angle in rad.
-    confidence : in it.
     doubt : what else it may be, in words.
     deviation : of the factor over the factor, NaN where nobody knows it.
     """
     size, turned = 1.0 / abs(factor), ", positive to the right" if factor < 0.0 else ""
-    off = "" if math.isnan(deviation) else f" ± {size * deviation:.2g}"
+    said = with_doubt(size, size * deviation)
     if abs(math.log(size)) < NEAR:
         code, text, size = "sign", f"delta_f has the wrong sign{doubt}", -1.0
         factor = -1.0
@@ -377,19 +321,18 @@ def steering_finding(
     elif WHEEL[0] < size < WHEEL[1]:
         code = "steering_ratio"
         text = (
-            f"delta_f is the angle of the steering wheel in rad, {size:.3g}{off} times that of the "
+            f"delta_f is the angle of the steering wheel in rad, {said} times that of the "
             f"road wheels{turned}{doubt}"
         )
     elif WHEEL[0] < size * DEGREE < WHEEL[1]:
         code, size = "steering_ratio", size * DEGREE
-        off = "" if math.isnan(deviation) else f" ± {size * deviation:.2g}"
         text = (
-            f"delta_f is the angle of the steering wheel in degrees, {size:.3g}{off} times that "
-            f"of the road wheels{turned}{doubt}"
+            "delta_f is the angle of the steering wheel in degrees, "
+            f"{with_doubt(size, size * deviation)} times that of the road wheels{turned}{doubt}"
         )
     else:
         code = "factor"
-        text = f"delta_f reads {size:.3g}{off} times the right value{turned}{doubt}"
+        text = f"delta_f reads {said} times the right value{turned}{doubt}"
     return Finding(
         code=code,
         channel="delta_f",

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from identifier.measured import with_doubt
 from models.recordings import Repair
 from models.vehicle import Vehicle
 
@@ -125,7 +126,7 @@ class Suspect(NamedTuple):
         text = self.text
         if size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
             size, text = -size, text.replace(said, OPPOSITES[said])
-        shown = f"{size * self.per_unit:.3g} ± {abs(deviation) * self.per_unit:.2g}{self.shown}"
+        shown = f"{with_doubt(size * self.per_unit, abs(deviation) * self.per_unit)}{self.shown}"
         return text.format(size=shown, origin=vehicle.origin(self.code))
 
 

@@ -1,4 +1,4 @@
-"""A drive as the estimate reads it: signals of at most 100 Hz, smoothed alike, and where they count.
+"""A drive as the estimate reads it: at most 100 Hz, smoothed alike, and where samples count.
 
 The balance is linear in its signals but for slip: the same zero-phase mean over all of them costs
 nothing and takes noise away.
@@ -26,6 +26,7 @@ LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is 
 MOST_ROLL = 0.08  # per g, by which a body rolls outwards
 LATE = (1, 2, 3)  # columns of v_y, r and δ_f
 EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
+ACROSS, ALONG = (0.8, 1.2), (0.8, 1.25)  # its slope on that motion; a body rolls and pitches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,6 +35,7 @@ class Drive:
 
     Parameters
     ----------
+    t : time in the recording's own clock [s], (n,).
     dt : sampling interval [s].
     signals : columns as `motion.model.SIGNALS`, (n, 9).
     rates : d/dt of v_y, r and δ_f, (n, 3).
@@ -42,6 +44,7 @@ class Drive:
     begins : first samples of its stretches, rising, (k,).
     """
 
+    t: Array
     dt: float
     signals: Array
     rates: Array
@@ -63,12 +66,11 @@ class Drive:
 
         Parameters
         ----------
-        part : samples that are read.
         replay : whether each sample is asked about, down to the lowest speed; else those that
             come faster than `fastest` are averaged, and slow ones do not count.
-        fastest : shortest interval of samples that are not averaged [s].
+        fastest : sampling interval to which they are averaged [s].
         """
-        every = 1 if replay else max(1, round(fastest / recording.dt + 1e-6))
+        every = 1 if replay else max(1, round(fastest / recording.dt))
         slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
@@ -82,9 +84,10 @@ class Drive:
             for one in within
             if one.stop - one.start >= every
         ]
-        signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        ends = np.cumsum([len(some) for some, _ in pieces])
+        t, signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        ends = np.cumsum([len(some) for _, some, _ in pieces])
         return cls(
+            t=t,
             dt=dt,
             signals=signals,
             rates=rates,
@@ -112,11 +115,22 @@ class Drive:
                     values[:] = np.interp(at + delay / self.dt, at, values)
         return replace(self, signals=signals, rates=rates)
 
+    def on(self, ln_m: Array | float) -> "Drive":
+        """Return the drive on roads of other frictions.
+
+        Parameters
+        ----------
+        ln_m : ln of each sample's friction over that of the curves, (n,) or one.
+        """
+        signals = self.signals.copy()
+        signals[:, 7] = ln_m
+        return replace(self, signals=signals)
+
 
 def _piece(
     recording: Recording, piece: slice, vehicle: Vehicle, every: int, dt: float, slowest: float
-) -> tuple[Array, Array]:
-    """Return signals and rates of a stretch; its first sample does not count."""
+) -> tuple[Array, Array, Array]:
+    """Return time, signals and rates of a stretch; its first sample does not count."""
     v_y = recording.needed("v_y")
 
     def thinned(signal: Array) -> Array:
@@ -135,6 +149,10 @@ def _piece(
     v_x = np.where(on, v_x, slowest)
     n3 = LONGITUDINAL / dt
     a_x = box(gradient(box(v_x, n3 / 2), dt), n3) - box(v_y * r, n3)
+    if recording.a_x is not None:
+        felt = box(thinned(recording.a_x), count)
+        if _slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, ALONG) is not None:
+            a_x = felt
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
     bank = np.zeros_like(v_x)
     if recording.a_y is not None:
@@ -144,17 +162,29 @@ def _piece(
         [v_x, v_y, r, delta_f, delta_r, a_x, bank, np.zeros_like(v_x), on.astype(float)]
     )
     rates = np.column_stack([gradient(signal, dt) for signal in (v_y, r, delta_f)])
-    return np.ascontiguousarray(signals), np.ascontiguousarray(rates)
+    t = thinned(recording.t)
+    return t, np.ascontiguousarray(signals), np.ascontiguousarray(rates)
 
 
 def gradient(signal: Array, dt: float) -> Array:
-    """Return d/dt by central differences, (n,)."""
+    """Return d/dt by central differences, (n,).
+
+    Parameters
+    ----------
+    signal : (n,).
+    dt : [s].
+    """
     slope: Array = np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
     return slope
 
 
 def box(signal: Array, count: float) -> Array:
-    """Return the centered mean over an odd count of samples, edges held, (n,)."""
+    """Return the centered mean over an odd count of samples, edges held, (n,).
+
+    Parameters
+    ----------
+    signal : (n,).
+    """
     width = max(1, int(count) | 1)
     if width == 1:
         return np.array(signal, dtype=np.float64)
@@ -165,24 +195,35 @@ def box(signal: Array, count: float) -> Array:
     return mean
 
 
+def _slope_on(
+    motion: Array, felt: Array, on: NDArray[np.bool_], dt: float, within: tuple[float, float]
+) -> float | None:
+    """Return the slope of what an accelerometer feels on the motion, of what is fast in both.
+
+    None where it shows no such motion: a slope out of bounds, or too much that it misses.
+    """
+    n1, n3 = BANK_MEAN / dt, LONGITUDINAL / dt
+    fast, fast_felt = ((box(one, n3) - box(one, n1))[on] for one in (motion, felt))
+    power = float(fast @ fast)
+    if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
+        return None
+    slope = float(fast @ fast_felt) / power
+    missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
+    return slope if within[0] < slope < within[1] and missed < EXPLAINED else None
+
+
 def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], dt: float) -> Array:
     """Return the side force of a banked road [m/s²], what motion shows and no accelerometer, (n,).
 
     What roll and a sensor off level show instead is taken off; a channel that does not show the
     fast motion is left out.
     """
-    nothing = np.zeros_like(v_x)
-    n1, n3 = BANK_MEAN / dt, LONGITUDINAL / dt
-    motion = gradient(box(v_y, n3 / 3), dt) + v_x * r
+    n1 = BANK_MEAN / dt
+    motion = gradient(box(v_y, LONGITUDINAL / dt / 3), dt) + v_x * r
+    gain = _slope_on(motion, a_y, on, dt, ACROSS)
+    if gain is None:
+        return np.zeros_like(v_x)
     slow, felt = box(motion, n1), box(a_y, n1)
-    fast, fast_felt = (box(motion, n3) - slow)[on], (box(a_y, n3) - felt)[on]
-    power = float(fast @ fast)
-    if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
-        return nothing
-    gain = float(fast @ fast_felt) / power
-    missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
-    if not (0.8 < gain < 1.2 and missed < EXPLAINED):
-        return nothing
     gap = slow - felt / (1.0 + min(max(gain - 1.0, 0.0), MOST_ROLL))
     off = 10.0 * LEVEL
     gap = gap - min(max(float(np.median(gap[on])), -off), off)

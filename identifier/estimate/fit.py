@@ -1,5 +1,6 @@
 """Tires from one log or several: blocks of ten minutes, their information added up."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -7,15 +8,21 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.drive import Drive
-from identifier.estimate.model import FittedModel
+from identifier.estimate.drive import FASTEST, Drive
+from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import Priors
-from identifier.estimate.solve import estimate, simulate
+from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.roads import Roads, with_roads
+from identifier.estimate.solve import ENOUGH, estimate, simulate
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
 BLOCK = 600.0  # [s] that are estimated at once
+ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
+LONG, COARSE = (
+    3600.0,
+    2.0,
+)  # [s] of logs from which samples are averaged to intervals so much longer
 REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
 MISSED = 0.06  # of the force, by which drives of one car differ from one model; of one log a belief
 
@@ -39,7 +46,6 @@ def fit(
     Parameters
     ----------
     recordings : logs of the car; a log longer than ten minutes is taken in blocks.
-    vehicle : the car.
     priors : beliefs; None takes those of the car.
     progress : called now and then with the share that is done, 0 to 1.
 
@@ -51,15 +57,19 @@ def fit(
     beliefs = Priors.of(vehicle) if priors is None else priors
     total = sum(one.duration for one in recordings)
     done, reach, found = 0.0, Reach(), None
+    segments: list[Segment] = []
     for drives in _blocks(recordings, vehicle):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
-        found = estimate(drives, vehicle, beliefs, begin)
+        enough = ENOUGH if begin is None else ENOUGH_MORE
+        found = estimate(drives, vehicle, beliefs, begin, enough=enough)
+        found, roads = with_roads(drives, vehicle, beliefs, found)
+        segments += _segments(drives, roads)
         reach = reach.and_of(drives, found, vehicle)
         information = np.zeros_like(beliefs.information)
         information[np.ix_(found.index, found.index)] = found.information
-        beliefs = replace(beliefs, mean=found.p, information=information)
+        beliefs = replace(beliefs, mean=found.p, information=information, typed=())
         done += sum(len(one.signals) * one.dt for one in drives)
         if progress is not None:
             progress(min(done / max(total, 1e-9), 1.0))
@@ -69,13 +79,30 @@ def fit(
     model = FittedModel(
         vehicle=vehicle,
         p=found.p,
-        covariance=found.whole_covariance,
+        covariance=found.covariance,
         driven=reach.slip,
         speeds=reach.speeds,
         a_x=reach.a_x,
         missed=np.full(2, MISSED),
+        segments=tuple(segments),
     )
     return Fit(model, found)
+
+
+def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
+    """Return the segments on another road than that of the curves, by the drives' clocks."""
+    listed: list[Segment] = []
+    if roads is None:
+        return listed
+    for one, labels in zip(drives, roads.labels, strict=True):
+        edges = np.flatnonzero(np.diff(labels)) + 1
+        for part in np.split(np.arange(len(labels)), edges):
+            label = int(labels[part[0]])
+            if label:
+                ratio = float(np.exp(roads.ln_m[label - 1]))
+                begin, end = float(one.t[part[0]]), float(one.t[part[-1]])
+                listed.append(Segment(begin, end, ratio, ratio * float(roads.sd[label - 1])))
+    return listed
 
 
 class Reach(NamedTuple):
@@ -105,18 +132,20 @@ def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[
     """Yield drives of at most `BLOCK` together."""
     group: list[Drive] = []
     length = 0.0
+    coarse = COARSE if sum(one.duration for one in recordings) > LONG else 1.0
+    scale = min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
     for recording in recordings:
         n = max(round(BLOCK / recording.dt), 1)
         count = -(-len(recording) // n)
         edges = np.linspace(0, len(recording), count + 1).astype(int)
-        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        for begin, end in itertools.pairwise(edges):
             seconds = (end - begin) * recording.dt
             if group and length + seconds > BLOCK:
                 yield group
                 group, length = [], 0.0
-            group.append(Drive.of(recording, vehicle, slice(int(begin), int(end))))
+            part = slice(int(begin), int(end))
+            fastest = FASTEST * (coarse if coarse * scale >= 1.0 else 1.0)
+            group.append(Drive.of(recording, vehicle, part, fastest=fastest))
             length += seconds
     if group:
         yield group
-
-

@@ -1,16 +1,31 @@
-"""The estimate as a method: tires from the whole of a log, not sample by sample."""
+"""The estimate as a method: tires from the whole of a log, and their frozen step."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from codegen.arrays import Array
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
-from identifier.method import Method
-from identifier.setup import Setup
+from identifier.method import CannotFreezeError, Method
+from identifier.motion.model import REPLAYED
+from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import Vehicle
+
+PORTS = (
+    AXLE_FORCE,
+    Port("lagged_slip", "rad", "slip angles that make the forces, paper's sign"),
+    Port("slip_size", "rad", "larger of the slip angle and its lag, without sign"),
+    Port(
+        "gate",
+        "SI",
+        "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "
+        "samples in a row",
+    ),
+    Port("motion", "SI", f"of the forward model: {', '.join(REPLAYED)}"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,13 +34,8 @@ class FitMethod(Method):
 
     Parameters
     ----------
-    dt : sampling interval of the log [s].
     min_speed : below this speed [m/s] forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
+    dt : sampling interval of the log [s].
     """
 
     judged_by = "tireid predict on another drive"
@@ -40,6 +50,11 @@ class FitMethod(Method):
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "FitMethod":
         """Return the method for a car: its size sets the lowest speed."""
         return cls(min_speed=vehicle.lowest_speed, dt=dt)
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of the step of what it learnt, axle_force first."""
+        return PORTS
 
     @property
     def whole(self) -> bool:
@@ -67,13 +82,31 @@ class FitMethod(Method):
             )
         return fit([recording], vehicle, progress=progress).model
 
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
+        """Refuse: what its step carries are no tires.
+
+        Raises
+        ------
+        CannotFreezeError
+            Always.
+        """
+        del vehicle, state
+        raise CannotFreezeError(
+            "the tires of a fit stay as they are: without --method fit the axle identifier goes on "
+            "learning from them"
+        )
+
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Refuse: there is no step.
+        """Return what the step of learnt tires needs, which stay as they are.
 
         Raises
         ------
         ValueError
-            Always.
+            Where there are none: sample by sample it does not learn.
         """
-        del vehicle, start
-        raise ValueError("the method fit learns from whole logs: in a car, the axle identifier does")
+        if not isinstance(start, FittedModel):
+            raise ValueError(
+                "the method fit learns from whole logs: sample by sample it tells the forces of "
+                "the weights.json of a fit; the method axle learns"
+            )
+        return (start if start.vehicle == vehicle else start.mounted_on(vehicle)).setup(self.dt)

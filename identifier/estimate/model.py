@@ -1,19 +1,20 @@
-"""The tires that an estimate found, frozen: curve, lag, sway, load transfer, ellipse and sensors."""
+"""The tires that an estimate found, frozen: curve, lag, sway, load, ellipse and sensors."""
 
 import math
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array, blocks, large
-from identifier.axle.band import LEVEL, normal_quantile
-from identifier.axle.curve import EDGES
+from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
+from identifier.axle.curve import EDGES, LADDER, unit_matrix
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
+from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
@@ -38,14 +39,27 @@ from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle
 
-UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256, 0.512)  # rad, of the projection
+UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
+LEAST_REACH = 0.032  # rad, up to which it follows the curves at least
 WIDEST = 0.6  # rad, as far as it is fitted
+LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
 BEYOND = 0.02  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
+SMALL = 1e-4  # rad, over which a slope is taken
+SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering that is noted
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LARGEST = 1e6  # of the numbers in a file
+
+
+class Segment(NamedTuple):
+    """A part of a drive on another road: from, to [s], its friction over that of the curves, sd."""
+
+    begin: float
+    end: float
+    ratio: float
+    sd: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -54,13 +68,14 @@ class FittedModel(TireModel):
 
     Parameters
     ----------
-    vehicle : the car.
     p : parameters, as `motion.parameters` lists them (p,).
     covariance : of them (p, p); zero of what was not estimated.
     driven : largest slip of each axle that the drives reached [rad], (2,).
     speeds : least and largest speed of them [m/s], (2,).
     a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
     missed : share of the force by which drives of a car differ from one model, (2,).
+    force_missed : share of the measured force that it misses of the drives that taught, (2,); None
+        where nobody looked.
     """
 
     kind = "fit"
@@ -72,6 +87,8 @@ class FittedModel(TireModel):
     speeds: Array
     a_x: Array
     missed: Array
+    segments: tuple[Segment, ...] = ()
+    force_missed: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(NAMES)
@@ -123,7 +140,8 @@ class FittedModel(TireModel):
         """
         phi, slope, J = [], [], []
         for i, axle in enumerate("fr"):
-            found = _curve_function()(self._curve_numbers(axle), alpha[:, i][None])
+            numbers = np.tile(self._curve_numbers(axle)[:, None], (1, len(alpha)))
+            found = _curve_function()(numbers, alpha[:, i][None])
             values = [np.array(one) for one in found]
             phi.append(values[0].ravel())
             slope.append(values[1].ravel())
@@ -131,7 +149,12 @@ class FittedModel(TireModel):
         return np.column_stack(phi), np.column_stack(slope), np.array(J)
 
     def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
         return phi * self._loads
 
@@ -141,32 +164,36 @@ class FittedModel(TireModel):
         axle: Axle | None = None,
         *,
         v_x: float | None = None,
-        a_x: float = 0.0,
+        a_x: float | None = None,
     ) -> float | Array:
         """Return the steady lateral force at slip angles, the wheels straight ahead [N].
 
         Parameters
         ----------
-        alpha, axle, v_x : as of `TireModel.force`.
         a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
-            shift load between the axles.
+            shift load between the axles. None is of tires that push nothing lengthwise, as those
+            of a car that coasts.
         """
         found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
+        if a_x is None:
+            return found if found.ndim else float(found)
         speed = self.curve_speed if v_x is None else v_x
-        ratio = self.ratio(np.array([speed]), np.array([a_x]))[0]
-        ratio = ratio / self.ratio(np.array([speed]), np.zeros(1))[0]
+        coasting = -self.vehicle.drag * speed**2
+        moving, plain = self.ratio(np.full(2, speed), np.array([a_x, coasting]))
+        ratio = moving / plain
         scaled: Array = found * (ratio if axle is None else ratio[AXLES.index(axle)])
         return float(scaled) if scaled.ndim == 0 else scaled
 
     def ratio(self, v_x: Array, a_x: Array) -> Array:
-        """Return λ G, load and ellipse: force over that at static load and a_x = 0, (k, 2).
+        """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
 
         Parameters
         ----------
         v_x : speeds [m/s], (k,).
         a_x : longitudinal accelerations [m/s²], (k,).
         """
-        car, f = self.vehicle, np.asarray(a_x) / GRAVITY
+        car = self.vehicle
+        f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
         moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
         load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
         drive = np.array([self["driving_f"], self["driving_r"]])
@@ -271,6 +298,36 @@ class FittedModel(TireModel):
         """Least and largest speed [m/s] of the drives that taught, (2,)."""
         return self.speeds
 
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
+        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
+        found = np.zeros(t.shape, dtype=bool)
+        for one in self.segments:
+            found |= (t >= one.begin) & (t <= one.end)
+        return found
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What the drives that taught showed beside the tires: code and one line of each."""
+        listed = [
+            (
+                "another_road",
+                f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
+                f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given",
+            )
+            for one in self.segments
+        ]
+        gain, k = self["steering_gain"], INDEX["steering_gain"]
+        sd = float(np.sqrt(self.covariance[k, k]))
+        if abs(gain) > max(SURELY * sd, NOTED_GAIN):
+            listed.append(
+                (
+                    "steering_gain",
+                    f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
+                    "says: check the steering ratio; the curves allow for it",
+                )
+            )
+        return tuple(listed)
+
     def at_bounds(self) -> tuple[Reached, ...]:
         """Return the numbers of the tires that rest at the bounds of what tires have."""
         priors, listed = Priors.of(self.vehicle), []
@@ -309,7 +366,12 @@ class FittedModel(TireModel):
         return sd
 
     def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        """
         both = np.column_stack([alpha, alpha])
         prior = self._curve_sd(both, _prior_covariance(self.vehicle))
         ratio: Array = self._curve_sd(both, self.covariance) / np.maximum(prior, 1e-12)
@@ -331,6 +393,32 @@ class FittedModel(TireModel):
         """Whether the model can tell how sure it is: by its covariance."""
         return True
 
+    @property
+    def band_origin(self) -> str:
+        """Where the width of the band comes from, in words."""
+        front, rear = (100.0 * float(share) for share in self.missed)
+        return (
+            f"what the drives leave open, and {front:.0f} / {rear:.0f} % of the force, by which "
+            "drives of one car differ"
+        )
+
+    @property
+    def band_calibrated(self) -> bool:
+        """Whether the width of its band is more than noise of the sensors: always."""
+        return True
+
+    def with_calibration(
+        self, calibration: BandCalibration | None, force_missed: Array | None = None
+    ) -> "FittedModel":
+        """Return the model with what it misses of the drives that taught.
+
+        Parameters
+        ----------
+        force_missed : share of the force [-], (2,).
+        """
+        del calibration
+        return replace(self, force_missed=force_missed)
+
     def half_band(
         self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
     ) -> Array:
@@ -338,6 +426,11 @@ class FittedModel(TireModel):
 
         It has the doubt of the curve and of the sensors' zeros, and the share `missed` of the force
         by which drives of a car differ.
+
+        Parameters
+        ----------
+        alpha : [rad], (k,).
+        v_x : [m/s].
 
         Raises
         ------
@@ -355,7 +448,13 @@ class FittedModel(TireModel):
         return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
 
     def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N]."""
+        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
+
+        Parameters
+        ----------
+        slip : [rad], (n, 2).
+        v_x : [m/s], (n,).
+        """
         pressed = self.vehicle.load_ratio(v_x)
         return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
 
@@ -414,7 +513,8 @@ class FittedModel(TireModel):
     def cornering_stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
         _, slope, _ = self.curve_at(np.zeros((1, 2)))
-        return slope[0] * self._loads
+        stiffness: Array = slope[0] * self._loads
+        return stiffness
 
     @property
     def relaxation_length(self) -> Array:
@@ -457,7 +557,7 @@ class FittedModel(TireModel):
             listed.append(
                 Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
             )
-        zeros = (
+        zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
             ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
             ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
         )
@@ -466,24 +566,25 @@ class FittedModel(TireModel):
             now, prior = (scale * float(np.sqrt(P[k, k])) for P in (self.covariance, before))
             listed.append(
                 Estimate(
-                    title, of, scale * self[name], now, unit, 0.0, now <= DECIDED * prior  # type: ignore[arg-type]
+                    title,
+                    of,
+                    scale * self[name],
+                    now,
+                    unit,
+                    0.0,
+                    now <= DECIDED * prior,
                 )
             )
         return tuple(listed)
 
     def _curve_slope_sd(self, covariance: Array) -> Array:
         """Return the standard deviation of the slope at zero [static loads/rad], (2,)."""
-        small = np.full((1, 2), 1e-4)
-        return self._curve_sd(small, covariance)[0] / 1e-4
+        sd: Array = self._curve_sd(np.full((1, 2), SMALL), covariance)[0] / SMALL
+        return sd
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
-        known = self.known_slip
-        lines = [
-            Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
-            Fact(RELAXATION, self.relaxation_length, "m"),
-            Fact("known up to a slip of", np.degrees(known), "deg"),
-        ]
+        """Return what `summary` says beside the estimates."""
+        lines = [Fact("identified up to a slip of", np.degrees(self.known_slip), "deg")]
         if self.vehicle.has_downforce:
             more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
             lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
@@ -498,29 +599,55 @@ class FittedModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle)
+        return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
-
-        Raises
-        ------
-        ValueError
-            Where the ratio is not positive.
-        """
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
-        return replace(self, p=p, driven=ratio * self.driven)
+        driven = ratio * self.driven
+        return replace(self, p=p, driven=driven, segments=(), force_missed=None)
 
-    def in_units(self) -> AxleModel:
-        """Return the tires in the hidden units of the axle identifier, for C, FMU and tracker.
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "FittedModel":
+        """Return the model for a road whose friction is not that of the drive that taught.
 
-        Curve, lag, sway and zeros of the sensors; without load transfer, ellipse, lever and gain.
+        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
+
+        Parameters
+        ----------
+        sd_friction : standard deviation of ln μ between the roads [-].
         """
-        reach = np.maximum(self.known_slip, UNITS[2])
-        W = np.stack([self._units_of(axle, reach[i]) for i, axle in enumerate("fr")])
-        bias = self["v_y_bias"] + self["v_y_angle"] * self.reference_speed
+        if not 0.0 <= sd_friction < math.inf:
+            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
+        covariance, k = self.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += sd_friction**2
+        return replace(self, covariance=covariance)
+
+    def beside_v_y(self) -> AxleModel:
+        """Return the model as the axle identifier goes on learning from it."""
+        return self.in_units(LADDER)
+
+    def in_units(self, ladder: tuple[float, ...] | None = None) -> AxleModel:
+        """Return the tires in the hidden units of the axle identifier.
+
+        Curve, lag, sway and zeros of the sensors, that of v_y at the speed of the drives; without
+        load transfer, ellipse, lever and gain of the steering.
+
+        Parameters
+        ----------
+        ladder : slip scales of the units [rad]; None takes `UNITS`, whose curves are within
+            0.3 % of the static load.
+        """
+        ladder = UNITS if ladder is None else ladder
+        fits = [_units_fit(ladder, float(reach)) for reach in self._reach]
+        W = np.stack(
+            [
+                pseudo @ self.curve_at(np.column_stack([slip, slip]))[0][:, i]
+                for i, (slip, pseudo) in enumerate(fits)
+            ]
+        )
+        bias = self["v_y_bias"] + self["v_y_angle"] * self.speeds.mean()
         limits = Plausibility.for_vehicle(self.vehicle)
         own = np.array(
             [
@@ -534,47 +661,38 @@ class FittedModel(TireModel):
         excitation[:, 0] = self.driven
         return AxleModel(
             vehicle=self.vehicle,
-            ladder=UNITS,
+            ladder=ladder,
             sway=self._sway,
             plausibility=limits,
             W=W,
             own=own,
-            covariance=self._units_covariance(self.covariance),
-            prior_covariance=self._units_covariance(_prior_covariance(self.vehicle)),
+            covariance=self._units_covariance(fits, self.covariance),
+            prior_covariance=self._units_covariance(fits, _prior_covariance(self.vehicle)),
             excitation=excitation,
         )
 
-    def _units_fit(self, reach: float) -> tuple[Array, Array]:
-        """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
-        m = math.exp(self["ln_road"])
-        slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
-        weight = np.where(slip <= reach, 1.0, BEYOND)
-        T = np.tanh(slip[:, None] / (m * np.array(UNITS)))
-        damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(UNITS))])
-        pseudo: Array = np.linalg.pinv(damped)[:, : slip.size] * weight
-        return slip, pseudo
+    @property
+    def _reach(self) -> Array:
+        """Slip up to which its projection follows the curves [rad], (2,)."""
+        return np.maximum(self.known_slip, LEAST_REACH)
 
-    def _units_of(self, axle: str, reach: float) -> Array:
-        slip, pseudo = self._units_fit(reach)
-        phi, _, _ = self.curve_at(np.column_stack([slip, slip]))
-        W: Array = pseudo @ phi[:, "fr".index(axle)]
-        return W
-
-    def _units_covariance(self, covariance: Array) -> Array:
+    def _units_covariance(self, fits: list[tuple[Array, Array]], covariance: Array) -> Array:
         """Return the covariance of [W, own] (2, n + 3, n + 3), never singular."""
-        n = len(UNITS)
+        n = len(fits[0][1])
         found = np.empty((2, n + 3, n + 3))
-        for i, axle in enumerate("fr"):
-            slip, pseudo = self._units_fit(max(float(self.known_slip[i]), UNITS[2]))
+        for i, (axle, (slip, pseudo)) in enumerate(zip("fr", fits, strict=True)):
             _, _, J = self.curve_at(np.column_stack([slip, slip]))
-            offset = "steering_zero" if i == 0 else "v_y_bias"
-            own = [INDEX[f"compliance_{axle}"], INDEX[f"sway_share_{axle}"], INDEX[offset]]
-            index = [*_curve_index(axle), *own]
+            zeros = {"steering_zero": 1.0}
+            if axle == "r":
+                zeros = {"v_y_bias": 1.0, "v_y_angle": float(self.speeds.mean())}
+            names = [f"compliance_{axle}", f"sway_share_{axle}", *zeros]
+            index = [*_curve_index(axle), *(INDEX[name] for name in names)]
             to = np.zeros((n + 3, len(index)))
             to[:n, :9] = pseudo @ J[i]
-            to[n:, 9:] = np.eye(3)
+            to[n, 9] = to[n + 1, 10] = 1.0
+            to[n + 2, 11:] = list(zeros.values())
             P = to @ covariance[np.ix_(index, index)] @ to.T
-            found[i] = P + np.diag(np.full(n + 3, 1e-8))
+            found[i] = P + np.diag(np.full(n + 3, LEAST_VARIANCE))
         return found
 
     def setup(self, dt: float) -> Setup:
@@ -590,7 +708,7 @@ class FittedModel(TireModel):
                 "parameters": self.p,
                 "dt": np.array(dt),
                 "car": car_numbers(self.vehicle),
-                "plausibility": limits.numbers(),
+                "plausibility": np.array(limits.numbers()),
                 "loads": self._loads,
             },
             ends_run=limits.rest(dt),
@@ -603,7 +721,7 @@ class FittedModel(TireModel):
         return {
             "format": FORMAT,
             "kind": self.kind,
-            "vehicle": vehicle_numbers(self.vehicle),
+            "vehicle": vehicle_numbers(self.vehicle.without_chassis()),
             "parameters": {
                 one.name: {"value": float(value), "unit": one.unit, "sd": float(math.sqrt(var))}
                 for one, value, var in zip(
@@ -615,6 +733,8 @@ class FittedModel(TireModel):
             "speeds_m_s": self.speeds.tolist(),
             "a_x_m_s2": self.a_x.tolist(),
             "missed": self.missed.tolist(),
+            "segments": [one._asdict() for one in self.segments],
+            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
@@ -622,13 +742,7 @@ class FittedModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "FittedModel":
-        """Return the model that `to_dict` describes.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
-        """
+        """Return the model that `to_dict` describes."""
         table = Table(data, f"{source}: ", FrozenModelError)
         parameters = table.table("parameters")
         p = np.array([parameters.table(name).number("value") for name in NAMES])
@@ -639,12 +753,18 @@ class FittedModel(TireModel):
             "a_x": "a_x_m_s2",
             "missed": "missed",
         }
+        if "force_missed" in table:
+            arrays["force_missed"] = "force_missed"
         found = {name: table.array(key) for name, key in arrays.items()}
         for name, value in (("parameters", p), *found.items()):
             if np.abs(value).max(initial=0.0) > LARGEST:
                 table.refuse(name, f"must hold numbers below {LARGEST:g}")
+        segments = tuple(
+            Segment(*(one.number(name) for name in Segment._fields))
+            for one in (table.tables("segments") if "segments" in table else [])
+        )
         try:
-            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, **found)
+            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, segments=segments, **found)
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
@@ -653,6 +773,17 @@ class FittedModel(TireModel):
 
 _CURVE = ("ln_stiffness", "ln_grip", "shape", "curvature")
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
+
+
+@cache
+def _units_fit(ladder: tuple[float, ...], reach: float) -> tuple[Array, Array]:
+    """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
+    slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
+    weight = np.where(slip <= reach, 1.0, BEYOND)
+    T = unit_matrix(slip, ladder)
+    damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(ladder))])
+    pseudo: Array = np.asarray(np.linalg.pinv(damped)[:, : slip.size] * weight, dtype=np.float64)
+    return slip, pseudo
 
 
 @cache
@@ -665,32 +796,19 @@ def _curve_index(axle: str) -> list[int]:
 
 @cache
 def _curve_function() -> ca.Function:
-    """Return (numbers (9,), slips (1, k)) -> φ (1, k), dφ/dx (1, k), ∂φ/∂numbers (9, k)."""
+    """Return (numbers (9,), slip) -> φ, dφ/dx, ∂φ/∂numbers (9,)."""
     numbers, x, phi, slope = curve_symbols()
     vector = ca.vertcat(*numbers)
     gradient = ca.densify(ca.jacobian(phi, vector)).T
-    one = ca.Function("curve", [vector, x], [phi, slope, gradient])
-    return _Mapped(one)  # type: ignore[return-value]
-
-
-class _Mapped:
-    """A function over columns of its second argument."""
-
-    def __init__(self, one: ca.Function) -> None:
-        self._one = one
-
-    def __call__(self, numbers: Array, slips: Array) -> tuple[Any, ...]:
-        k = slips.shape[1]
-        found: tuple[Any, ...] = self._one(np.tile(numbers[:, None], (1, k)), slips)
-        return found
+    return ca.Function("curve", [vector, x], [phi, slope, gradient])
 
 
 def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
     """Return φ and dφ/dx at a slip, as expressions."""
     symbols, x, phi, slope = curve_symbols()
     one = ca.Function("curve", [ca.vertcat(*symbols), x], [phi, slope])
-    found: tuple[Any, Any] = one(ca.DM(numbers), slip)
-    return found
+    phi_there, slope_there = one(ca.DM(numbers), slip)
+    return phi_there, slope_there
 
 
 def _prior_covariance(vehicle: Vehicle) -> Array:

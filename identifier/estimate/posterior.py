@@ -16,10 +16,12 @@ class Posterior:
 
     Parameters
     ----------
-    vehicle : the car.
     p : all parameters, as `motion.parameters` lists them (p,).
+    covariance : of them, zero of those that did not move (p, p).
     index : which of them moved, (n,).
-    information : inverse covariance of those (n, n), and of it what the drives told.
+    information : inverse covariance of those, other roads marginal (n, n).
+    roads : ln of the friction of other roads than that of the curves (K,).
+    road_sd : standard deviation of these (K,).
     scale : S of the residuals of both axles [-], (2,).
     memory : T, their integrated autocorrelation time [s], (2,).
     cost : J at the optimum [nats].
@@ -27,9 +29,11 @@ class Posterior:
 
     vehicle: Vehicle
     p: Array
+    covariance: Array
     index: NDArray[np.intp]
     information: Array
-    data_information: Array
+    roads: Array
+    road_sd: Array
     scale: Array
     memory: Array
     cost: float
@@ -38,20 +42,6 @@ class Posterior:
     def __getitem__(self, name: str) -> float:
         return float(self.p[INDEX[name]])
 
-    @property
-    def covariance(self) -> Array:
-        """Covariance of the parameters that moved, (n, n)."""
-        inverse: Array = np.linalg.inv(self.information)
-        return inverse
-
-    @property
-    def whole_covariance(self) -> Array:
-        """Covariance of all parameters, zero of those that did not move (p, p)."""
-        found = np.zeros((len(self.p), len(self.p)))
-        found[np.ix_(self.index, self.index)] = self.covariance
-        return found
-
     def sd(self, name: str) -> float:
         """Return the standard deviation of a parameter; 0 where it did not move."""
-        found = np.flatnonzero(self.index == INDEX[name])
-        return float(np.sqrt(self.covariance[found[0], found[0]])) if found.size else 0.0
+        return float(np.sqrt(self.covariance[INDEX[name], INDEX[name]]))

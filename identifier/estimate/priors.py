@@ -5,17 +5,22 @@ car of 1:10; a stiffness that a vehicle file gives does not enter. Chosen on ran
 plant and confirmed once on recordings.
 """
 
+import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.motion.parameters import INDEX, NAMES
+from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import Vehicle
 
+LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
+LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
+SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
+SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse where a share is told: of it; least
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
 
@@ -44,7 +49,7 @@ OF_AXLES: dict[str, Belief] = {
     "curvature": Belief(0.0, 0.6, -4.0, 0.95, "", "beyond 0.95 the curve has no peak"),
     **{
         f"residual{j}": Belief(0.0, 0.08, -INF, INF, "", "what tires of one formula differ by")
-        for j in range(4)
+        for j in range(len(SLIPS))
     },
     "compliance": Belief(0.008, 0.008, 0.0, 0.1, "L", "relaxation of about a tenth wheelbase"),
     "sway_share": Belief(0.2, 0.3, 0.0, 1.0, "", "roll center low to high"),
@@ -68,8 +73,11 @@ ALIKE = {  # standard deviation of front less rear
     "compliance": (0.003, "L"),
     "sway_share": (0.1, ""),
 }
-# At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
+# At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds differ.
 SHARED_ERROR = 0.5
+ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
+TYPED = ("steering_gain",)
+TAILS = 2.0  # degrees of freedom of their priors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +96,7 @@ class Priors:
     high: Array
     information: Array
     moves: NDArray[np.bool_]
+    typed: tuple[int, ...] = ()
 
     @classmethod
     def of(
@@ -104,7 +113,6 @@ class Priors:
         ----------
         wide : standard deviations in SI in place of those of the table, by parameter.
         apart : whether bias and angle of v_y are believed apart, without `SHARED_ERROR`.
-        fixed : parameters that do not move.
         """
         L = vehicle.wheelbase
         unit = {"": 1.0, "L": L, "v": float(np.sqrt(L / SEDAN))}
@@ -115,6 +123,8 @@ class Priors:
             k, size = INDEX[name], unit[belief.per]
             mean[k], sd[k] = size * belief.mean, size * belief.sd
             low[k], high[k] = size * belief.low, size * belief.high
+        for name, (value, doubt) in _told(vehicle).items():
+            mean[INDEX[name]], sd[INDEX[name]] = value, doubt
         for name, value in wide.items():
             sd[INDEX[name]] = value
         for name in fixed:
@@ -128,12 +138,66 @@ class Priors:
             b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
             _couple(information, each, SHARED_ERROR)
-        return cls(mean=mean, low=low, high=high, information=information, moves=moves)
+        typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
+        return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
+
+    def with_roads(self, count: int) -> "Priors":
+        """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
+        low, high = np.full(count, np.log(0.2)), np.full(count, np.log(2.2))
+        n = len(self.mean) + count
+        information = np.zeros((n, n))
+        information[: len(self.mean), : len(self.mean)] = self.information
+        extra = np.arange(len(self.mean), n)
+        information[extra, extra] = 1.0 / ANOTHER_ROAD**2
+        return replace(
+            self,
+            mean=np.concatenate([self.mean, np.zeros(count)]),
+            low=np.concatenate([self.low, low]),
+            high=np.concatenate([self.high, high]),
+            information=information,
+            moves=np.concatenate([self.moves, np.ones(count, dtype=bool)]),
+        )
 
     def cost(self, p: Array) -> float:
-        """Return -ln of the prior's density over that at its mean [nats]."""
+        """Return -ln of the prior's density over that at its mean [nats].
+
+        A number that somebody typed may be off by much more than its doubt: its prior is Student's.
+        """
         away = p - self.mean
-        return float(0.5 * away @ self.information @ away)
+        cost = 0.5 * float(away @ self.information @ away)
+        for k in self.typed:
+            z2 = float(self.information[k, k] * away[k] ** 2)
+            cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / TAILS) - z2)
+        return cost
+
+    def around(self, p: Array) -> tuple[Array, Array]:
+        """Return gradient (p,) and positive curvature (p, p) of the cost at parameters `p` (p,)."""
+        away, curvature = p - self.mean, self.information.copy()
+        for k in self.typed:
+            z2 = self.information[k, k] * away[k] ** 2
+            curvature[k, k] *= (TAILS + 1.0) / (TAILS + z2)
+        gradient: Array = curvature @ away
+        return gradient, curvature
+
+
+def _told(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of what follows from numbers that a car tells, by name.
+
+    An axle of share s that pushes f weights uses s W f/μ of its grip, W weights per static load.
+    """
+    L, grip = vehicle.wheelbase, np.exp(OF_AXLES["ln_grip"].mean)
+    told: dict[str, tuple[float, float]] = {}
+    if (height := vehicle.lengthwise("cg_height")) is not None:
+        told["load_transfer"] = LESS_LOAD * height / L, SURE_HEIGHT
+    for name, share in (("driving", "drive_front_share"), ("braking", "brake_front_share")):
+        if (front := vehicle.lengthwise(share)) is not None:
+            for axle, part, W in (
+                ("f", front, L / vehicle.l_r),
+                ("r", 1.0 - front, L / vehicle.l_f),
+            ):
+                use = float(LESS_USE * part * W / grip)
+                told[f"{name}_{axle}"] = use, max(SURE_SHARE * use, LEAST_USE)
+    return told
 
 
 def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:

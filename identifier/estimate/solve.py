@@ -9,16 +9,18 @@ Gauss-Newton with Levenberg's damping and active bounds.
 
 from collections.abc import Sequence
 from copy import copy
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from codegen import Scan
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_CAR, SEDAN, Priors
 from identifier.motion.model import CARRIED, CarNumbers, motion_scan
-from identifier.motion.parameters import INDEX, NAMES
+from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
 
 STRIDE = 0.05  # [s] between residuals
@@ -26,9 +28,13 @@ ERROR, RELATIVE = 0.02, 0.04  # b: of a static load, and of the lateral accelera
 NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far off
 LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 SHORTEST_MEMORY, LONGEST_MEMORY = 0.25, 8.0  # T [s]
+LEAST_STIFF, STIFF_SD = 0.25, 0.1  # of C: slope at zero, and how firmly it is believed
 ITERATIONS = 25
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
+
+
+Labels: TypeAlias = Sequence[NDArray[np.intp]]
 
 
 class Residuals(NamedTuple):
@@ -43,9 +49,7 @@ class Problem:
 
     Parameters
     ----------
-    drives : of one car, with the same sensors.
-    vehicle : the car.
-    priors : which parameters move.
+    labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     every : whether slopes over all parameters are at hand, for `under` other priors.
     """
 
@@ -54,14 +58,19 @@ class Problem:
         drives: Sequence[Drive],
         vehicle: Vehicle,
         priors: Priors,
+        labels: Labels | None = None,
         *,
         every: bool = False,
     ) -> None:
-        self.drives, self.vehicle, self.priors = drives, vehicle, priors
-        self.index = np.flatnonzero(priors.moves)
-        columns = np.arange(len(NAMES)) if every else self.index
-        self._columns = np.searchsorted(columns, self.index)
-        self._scan = motion_scan(tuple(NAMES[k] for k in columns))
+        self.drives, self.vehicle, self.labels = drives, vehicle, labels
+        self.roads = 0 if labels is None else max(int(one.max()) for one in labels)
+        self.priors = priors.with_roads(self.roads) if self.roads else priors
+        self.index = np.flatnonzero(self.priors.moves)
+        moving = self.index[self.index < len(NAMES)]
+        self.tires = len(moving)  # columns of slopes that are not of roads
+        self._columns = moving if every else np.arange(self.tires)
+        told = NAMES[:-1] if every else [NAMES[k] for k in moving]
+        self._scan = motion_scan((*told, "ln_road"))
         self._car = car_numbers(vehicle)
         self._strides = [max(1, round(STRIDE / one.dt)) for one in drives]
         self._kept = [
@@ -83,7 +92,7 @@ class Problem:
         """Return the same under other priors, of a problem with slopes over `every` parameter."""
         other = copy(self)
         other.priors, other.index = priors, np.flatnonzero(priors.moves)
-        other._columns = other.index
+        other.tires, other._columns = other.index.size, other.index
         return other
 
     def weighted(self, some: Array) -> "Problem":
@@ -98,24 +107,57 @@ class Problem:
         first = (so_far <= 0.5 * so_far[-1]).astype(float)
         return first, 1.0 - first
 
-    def missed(self, p: Array) -> Array:
+    def share_missed(self, p: Array) -> Array:
         """Return the share of the force that the balance misses at each axle, (2,)."""
         e = self.residuals(p).e * self.size[:, None]
         share: Array = np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
         return share
 
+    def places(self, k: int) -> NDArray[np.intp]:
+        """Return which samples of a drive its residuals are at."""
+        found: NDArray[np.intp] = self._kept[k] * self._strides[k]
+        return found
+
+    def missed(self, p: Array, road: float) -> Array:
+        """Return what the balance misses over its size where the friction is another, (m, 2)."""
+        scan = motion_scan()
+        e = []
+        for k, one in enumerate(self.drives):
+            driven = one.on(road)
+            given = arguments(driven, p, self._car, scan)
+            out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
+            e.append(out["missed"][self._kept[k]])
+        whole: Array = np.concatenate(e) / self.size[:, None]
+        found: Array = np.nan_to_num(whole, nan=1e3, posinf=1e3)
+        return found
+
     def residuals(self, p: Array) -> Residuals:
-        """Return what the balance misses, and its slopes."""
+        """Return what the balance misses, and its slopes.
+
+        Parameters
+        ----------
+        p : parameters, and behind them ln of the friction of other roads.
+        """
         e, slopes = [], []
-        for one, stride, kept in zip(self.drives, self._strides, self._kept, strict=True):
+        ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
+        for k, one in enumerate(self.drives):
+            stride, kept = self._strides[k], self._kept[k]
+            roads = None if self.labels is None else self.labels[k]
+            driven = one if roads is None else one.on(ln_m[roads])
             out = self._scan(
-                len(one.signals),
-                _arguments(one, p, self._car, self._scan.step.numel_in("tangent")),
+                len(driven.signals),
+                arguments(driven, p[: len(NAMES)], self._car, self._scan),
                 every=stride,
                 ports=("missed", "missed_slopes"),
             )
             e.append(out["missed"][kept])
-            slopes.append(out["missed_slopes"][kept][..., self._columns])
+            J = out["missed_slopes"][kept]
+            of_road = J[:, :, -1:]
+            J = J[:, :, self._columns]
+            if self.roads and roads is not None:
+                on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
+                J = np.concatenate([J, of_road * on[:, None, :]], axis=2)
+            slopes.append(J)
         size = self.size[:, None]
         with np.errstate(invalid="ignore", over="ignore"):
             return Residuals(
@@ -124,7 +166,12 @@ class Problem:
             )
 
     def memory(self, e: Array) -> Array:
-        """Return T of both axles [s], (2,), from the correlation of residuals (m, 2)."""
+        """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        """
         found = np.empty(2)
         step = self.weight[0]
         lags = int(LONGEST_MEMORY / step) + 1
@@ -150,7 +197,12 @@ class Problem:
         return np.maximum(found, SHORTEST_MEMORY)
 
     def scale(self, e: Array) -> Array:
-        """Return S² of both axles, (2,), by expectation maximization."""
+        """Return S² of both axles, (2,), by expectation maximization.
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        """
         S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, LEAST_SCALE) ** 2
         total = self.weight.sum()
         for _ in range(8):
@@ -158,26 +210,57 @@ class Problem:
             S2 = np.maximum(self.weight @ (w * e**2) / total, LEAST_SCALE**2)
         return S2
 
+    def cost(self, e: Array, p: Array, T: Array) -> float:
+        """Return J of residuals at parameters when a second of them counts 1/T times [nats].
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        p : (p,).
+        T : [s], (2,).
+        """
+        S2 = self.scale(e)
+        scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
+        return self.misfit(e, S2, T) + _beliefs(self.priors, p) + scales
+
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
-        """Return Σ w/T ρ(e) [nats]."""
+        """Return Σ w/T ρ(e) [nats].
+
+        Parameters
+        ----------
+        e : over b [-], (m, 2).
+        S2 : [-], (2,).
+        T : [s], (2,).
+        """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
 
 
 def car_numbers(vehicle: Vehicle) -> Array:
-    """Return the numbers of `CarNumbers`, (6,)."""
+    """Return the numbers of `CarNumbers`, (7,)."""
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
     omega = min(5.0 * np.sqrt(GRAVITY / vehicle.wheelbase), 60.0)
-    return np.array(CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce))
+    return np.array(
+        CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce, vehicle.drag)
+    )
 
 
-def _arguments(one: Drive, p: Array, car: Array, tangent: int = 0) -> dict[str, Array]:
-    """Return the ports of the model; late signals are read on time, the rest of a delay is 0."""
+def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
+    """Return the inputs of a compiled motion over a drive.
+
+    Late signals are read on time; the rest of a delay is 0.
+
+    Parameters
+    ----------
+    car : of `car_numbers`, (7,).
+    """
     late = p[DELAYS]
     if late.any():
         one, p = one.on_time(late), p.copy()
         p[DELAYS] = 0.0
-    more = {"tangent": np.zeros(tangent)} if tangent else {}
+    more = {}
+    if "tangent" in scan.carry:
+        more = {"tangent": np.zeros(scan.step.numel_in("tangent"))}
     return {
         "state": np.zeros(len(CARRIED)),
         "was_on": np.zeros(1),
@@ -195,7 +278,7 @@ def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
     scan = motion_scan()
     return scan(
         len(one.signals),
-        _arguments(one, p, car_numbers(vehicle)),
+        arguments(one, p, car_numbers(vehicle), scan),
         ports=("force", "missed", "slip"),
     )
 
@@ -205,27 +288,32 @@ def estimate(
     vehicle: Vehicle,
     priors: Priors | None = None,
     begin: Array | None = None,
+    *,
+    labels: Labels | None = None,
+    enough: float = ENOUGH,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
 
     Parameters
     ----------
-    drives : of one car with the same sensors, in which it drives.
     vehicle : the car; its stiffnesses are not looked at.
     priors : beliefs; None takes those of the car.
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights
         show v_y or steering off zero, also from there.
+    labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
+    enough : improvement of the cost, below which it ends [nats].
     """
     priors = Priors.of(vehicle) if priors is None else priors
-    problem = Problem(drives, vehicle, priors)
+    problem = Problem(drives, vehicle, priors, labels)
     begins = starts(problem) if begin is None else [begin]
-    found = [descend(problem, start) for start in begins]
+    begins = [np.concatenate([one[: len(NAMES)], np.zeros(problem.roads)]) for one in begins]
+    found = [descend(problem, one, enough=enough) for one in begins]
     return min(found, key=lambda one: one.cost)
 
 
 def starts(problem: Problem) -> list[Array]:
     """Return the parameters to begin with: the prior's mean, and offsets that straights show."""
-    mean = problem.priors.mean
+    mean = problem.priors.mean[: len(NAMES)]
     signals = np.concatenate([one.signals[one.counts] for one in problem.drives])
     v_x, v_y, r, delta = signals[:, :4].T
     straight = np.abs(v_x * r) < 0.03 * GRAVITY
@@ -241,7 +329,8 @@ def starts(problem: Problem) -> list[Array]:
             one[INDEX["steering_zero"]] = -zero
             one[INDEX["v_y_bias"]], one[INDEX["v_y_angle"]] = bias, angle
             begins.append(one)
-    return [np.clip(one, problem.priors.low, problem.priors.high) for one in begins]
+    low, high = (bound[: len(NAMES)] for bound in (problem.priors.low, problem.priors.high))
+    return [np.clip(one, low, high) for one in begins]
 
 
 def descend(
@@ -257,29 +346,28 @@ def descend(
     ----------
     start : parameters to begin with (p,).
     memory : T [s], (2,), where it is held, so that costs can be compared; None estimates it.
-    iterations : at most.
     enough : improvement below which it ends [nats].
     """
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
-    P = priors.information[np.ix_(index, index)]
     p, damping = start.copy(), 1e-3
     now = problem.residuals(p)
     T, count = problem.memory(now.e) if memory is None else memory, 0
     for count in range(1, iterations + 1):
         S2 = problem.scale(now.e)
         T = np.sqrt(T * problem.memory(now.e)) if count > 1 and memory is None else T
-        cost = problem.misfit(now.e, S2, T) + priors.cost(p)
+        cost = problem.misfit(now.e, S2, T) + _beliefs(priors, p)
         H, gradient = normal(problem, now, S2, T)
-        H = H + P
-        gradient = gradient + (priors.information @ (p - priors.mean))[index]
+        of_beliefs, curvature = around_beliefs(priors, p)
+        H = H + curvature[np.ix_(index, index)]
+        gradient = gradient + of_beliefs[index]
         better = None
         for _ in range(8):
             step = _bounded(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
             trial = p.copy()
             trial[index] = np.clip(p[index] + step, low, high)
             then = problem.residuals(trial)
-            reached = problem.misfit(then.e, S2, T) + priors.cost(trial)
+            reached = problem.misfit(then.e, S2, T) + _beliefs(priors, trial)
             if reached < cost:
                 better = trial, then, cost - reached
                 break
@@ -288,18 +376,23 @@ def descend(
             break
         p, now, gained = better
         damping = max(damping / 5.0, 1e-6)
-        if gained < enough and (count > 3 or memory is not None):
+        if gained < enough and (count > 3 or memory is not None or enough > ENOUGH):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
-    data, _ = normal(problem, now, S2, T)
-    cost = problem.misfit(now.e, S2, T) + priors.cost(p)
-    cost += float((0.5 * np.log(S2) * problem.weight.sum() / T).sum())
+    H = normal(problem, now, S2, T)[0] + around_beliefs(priors, p)[1][np.ix_(index, index)]
+    cost = problem.cost(now.e, p, T)
+    whole = np.zeros((len(p), len(p)))
+    whole[np.ix_(index, index)] = np.linalg.inv(H)
+    n, tires = len(NAMES), problem.tires
+    told = np.asarray(np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]), np.float64)
     return Posterior(
         vehicle=problem.vehicle,
-        p=p,
-        index=index,
-        information=data + P,
-        data_information=data,
+        p=p[:n],
+        covariance=whole[:n, :n],
+        index=index[:tires],
+        information=told,
+        roads=p[n:],
+        road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
         memory=T,
         cost=cost,
@@ -307,17 +400,52 @@ def descend(
     )
 
 
+def _beliefs(priors: Priors, p: Array) -> float:
+    """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
+    soft, _ = softness(p)
+    return priors.cost(p) + 0.5 * float(soft @ soft)
+
+
+def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
+    """Return gradient (p,) and positive curvature (p, p) of `_beliefs`."""
+    gradient, curvature = priors.around(p)
+    soft, slopes = softness(p)
+    return gradient + soft @ slopes, curvature + slopes.T @ slopes
+
+
+def softness(p: Array) -> tuple[Array, Array]:
+    """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
+
+    No tire has less than a quarter of C there: play in the steering looks so.
+
+    Parameters
+    ----------
+    p : (p,).
+
+    Returns
+    -------
+    (2,), in standard deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
+    """
+    found, slopes = np.zeros(2), np.zeros((2, p.size))
+    for i, axle in enumerate("fr"):
+        k = INDEX[f"ln_stiffness_{axle}"]
+        q = [INDEX[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
+        C = float(np.exp(p[k]))
+        added = float(np.sum(p[q] / np.array(SLIPS)))
+        lacks = (LEAST_STIFF - 1.0 - added / C) / STIFF_SD
+        if lacks > 0.0:
+            found[i] = lacks
+            slopes[i, k] = added / C / STIFF_SD
+            slopes[i, q] = -1.0 / (np.array(SLIPS) * C * STIFF_SD)
+    return found, slopes
+
+
 def normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
-    n = at.slopes.shape[2]
-    H, gradient = np.zeros((n, n)), np.zeros(n)
-    for axle in range(2):
-        e, J = at.e[:, axle], at.slopes[:, axle, :]
-        w = problem.weight / T[axle] * (NU + 1.0) / (NU * S2[axle] + e**2)
-        weighted = J * w[:, None]
-        H += weighted.T @ J
-        gradient += weighted.T @ e
-    return H, gradient
+    w = problem.weight[:, None] / T * (NU + 1.0) / (NU * S2 + at.e**2)
+    J = at.slopes.reshape(-1, at.slopes.shape[2])
+    weighted = J * w.reshape(-1, 1)
+    return weighted.T @ J, weighted.T @ at.e.ravel()
 
 
 def _bounded(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:

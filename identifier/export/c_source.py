@@ -61,7 +61,6 @@ def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> d
     Parameters
     ----------
     single : whether float is the default precision.
-    about : title, method, version and hash.
 
     Raises
     ------

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import shown
 from codegen.package import NAME, c_files, one_file
 from identifier.export.c_source import ORDER, PREFIX, C
@@ -35,11 +36,11 @@ class Status(IntEnum):
     STALE = 6
 
 
-class NoCompilerError(RuntimeError):
+class NoCompilerError(TireidError, RuntimeError):
     """There is no C compiler to build the package with."""
 
 
-class PackageFileError(ValueError):
+class PackageFileError(TireidError, ValueError):
     """A folder does not hold a package."""
 
 
@@ -57,7 +58,6 @@ class CompiledPackage:
     Parameters
     ----------
     manifest : content of <name>.json.
-    files : headers and sources by path.
     single : whether to compute in float; None takes the package's default.
 
     Raises
@@ -195,10 +195,6 @@ class CompiledPackage:
 
         Between stretches of it samples are missing, as they are on a car.
 
-        Parameters
-        ----------
-        recording : sampled at the package's interval.
-
         Raises
         ------
         ValueError
@@ -297,13 +293,7 @@ EVERY_STEP = tuple(port.name for port in INPUTS)  # has these inputs
 
 
 def samples_of(recording: Recording, inputs: Iterable[str] = EVERY_STEP) -> Array:
-    """Return a recording as samples (n, k) in the order of the inputs; NaN where it lacks one.
-
-    Parameters
-    ----------
-    recording : n samples.
-    inputs : names of the inputs.
-    """
+    """Return a recording as samples (n, k) in the order of the inputs; NaN where it lacks one."""
     absent, logged = np.full(len(recording), np.nan), recording.as_logged()
     signals = (getattr(logged, name) for name in inputs)
     return np.column_stack([absent if signal is None else signal for signal in signals])

@@ -19,6 +19,7 @@ from codegen import CompilationError, find_compiler
 from codegen.compiler import KEEP_GUARDS
 from codegen.escape import visible
 from codegen.package import c_files, header
+from codegen.writing import write_file
 from identifier.export.c_source import PREFIX, c_sources
 from identifier.export.package import ingredients, summary
 from identifier.export.specialize import SpecializedStep
@@ -68,11 +69,8 @@ def build_binary(
 
     Parameters
     ----------
-    target : the platform.
-    name : model identifier, name of the library.
     model : content by name of C files and headers that need no other: compiled once for both
         versions of FMI, since the equations take longest.
-    around : of those that need them.
 
     Raises
     ------
@@ -107,7 +105,7 @@ def _folder_of(files: Mapping[str, bytes]) -> Iterator[Path]:
     """A folder that holds the files until the block ends."""
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
         for file, content in files.items():
-            (Path(scratch) / file).write_bytes(content)
+            write_file(Path(scratch) / file, content)
         yield Path(scratch)
 
 
@@ -289,9 +287,7 @@ def element(tag: str, attributes: Mapping[str, object], *children: Element) -> E
 
     Parameters
     ----------
-    tag : its name.
     attributes : by name; True and False become true and false.
-    children : elements inside.
     """
     words = {name: _text(value) for name, value in attributes.items() if value != ""}
     made = Element(tag, words)
@@ -300,12 +296,7 @@ def element(tag: str, attributes: Mapping[str, object], *children: Element) -> E
 
 
 def document(root: Element) -> str:
-    """Return a whole XML file, indented.
-
-    Parameters
-    ----------
-    root : the outermost element.
-    """
+    """Return a whole XML file, indented."""
     indent(root)
     return f"{DECLARATION}{tostring(root, encoding='unicode')}\n"
 
@@ -324,7 +315,6 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
 
     Parameters
     ----------
-    token : the GUID.
     sources : names of the C files.
     """
     table = variables(specialized)
@@ -368,12 +358,7 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
 
 
 def description_3(specialized: SpecializedStep, token: str) -> str:
-    """Return modelDescription.xml of FMI 3.0.
-
-    Parameters
-    ----------
-    token : the instantiation token.
-    """
+    """Return modelDescription.xml of FMI 3.0."""
     table = variables(specialized)
     outputs = [variable for variable in table if variable.causality == "output"]
     time = element(
@@ -526,7 +511,6 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     Parameters
     ----------
     specialized : the step; its name is the model identifier.
-    path : the file, usually ending in .fmu.
     version : of FMI, 2 or 3.
 
     Raises

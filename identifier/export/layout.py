@@ -35,12 +35,7 @@ class Member(NamedTuple):
         return f"{'weights' if self.learnt else 'signals'}.{self.signal.name}"
 
     def declaration(self, real: str) -> str:
-        """Return what declares it, with a comment.
-
-        Parameters
-        ----------
-        real : type of a number.
-        """
+        """Return what declares it, with a comment."""
         sizes = "".join(f"[{size}]" for size in self.dimensions)
         unit, description = self.signal.unit, self.signal.description
         code, words = f"    {real} {self.signal.name}{sizes};", f"/* {description} [{unit}] */"
@@ -81,7 +76,6 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
     Parameters
     ----------
     port : number of the input.
-    entry : counted by columns.
     """
     name = specialized.function.name_in(port)
     if name in SAMPLED:
@@ -97,7 +91,6 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
     Parameters
     ----------
     port : number of the output.
-    entry : counted by columns.
     """
     state = carried_members(specialized)
     if port < len(state):
@@ -114,7 +107,6 @@ def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
     ----------
     value : the numbers (of any shape).
     dimensions : of the C array.
-    prefix : of the macro of literals.
     """
     if not dimensions:
         return literal(float(value.ravel()[0]), prefix)
@@ -152,12 +144,7 @@ def rules(members: Sequence[Member]) -> list[Rule]:
 
 
 def covariance_order(members: Sequence[Member]) -> int:
-    """Return the rows of the covariances among weights, 0 where there is none.
-
-    Parameters
-    ----------
-    members : of the weights.
-    """
+    """Return the rows of the covariances among weights, 0 where there is none."""
     orders = {rule.order for rule in rules(members) if rule.kind in ("MATRIX", "TRIANGLE")}
     if len(orders) > 1:
         raise ValueError(f"covariances among weights must have one size, they have {orders}")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import visible
 from identifier.axle.band import (
     AT_SPEEDS,
@@ -22,10 +24,12 @@ from identifier.axle.band import (
 )
 from identifier.axle.band_step import LEAST_BEFORE, hinges
 from identifier.axle.model import AxleModel
+from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
+from models.extras import needs
 from models.files import write_atomically
 
 # An ONNX graph, node by node: every value is a name, every operation returns that of its result.
@@ -37,8 +41,8 @@ OPSET = 13
 IR_VERSION = 7  # of the file format that came with opset 13
 
 
-class MissingOnnxError(ImportError):
-    """The package onnx is not installed; `pip install tireid[onnx]` brings it."""
+class MissingOnnxError(TireidError, ImportError):
+    """The package onnx is not installed; the message says how to install it."""
 
 
 def onnx_package() -> Any:
@@ -52,9 +56,7 @@ def onnx_package() -> Any:
     try:
         import onnx
     except ImportError as error:
-        raise MissingOnnxError(
-            "writing ONNX needs the package onnx: pip install tireid[onnx]"
-        ) from error
+        raise MissingOnnxError(needs("writing ONNX", "the package onnx", "onnx")) from error
     return onnx
 
 
@@ -76,7 +78,6 @@ class Graph:
 
         Parameters
         ----------
-        name : name of the constant.
         value : its numbers (of any shape).
         """
         number = np.float32 if self.single else np.float64
@@ -90,9 +91,6 @@ class Graph:
         Parameters
         ----------
         operator : of ONNX, such as "MatMul".
-        inputs : names of its inputs.
-        result : name of its result.
-        attributes : of the operator.
         """
         node = onnx_package().helper.make_node(
             operator, list(inputs), [result], name=result, **attributes
@@ -112,11 +110,7 @@ class Graph:
 
         Parameters
         ----------
-        name : name of the graph.
-        inputs : what it reads.
         outputs : what it gives; results of nodes have their names.
-        doc : what it computes, for people.
-        metadata : facts for programs.
         """
         onnx = onnx_package()
         helper = onnx.helper
@@ -229,7 +223,10 @@ HALF_BANDS = (
 )
 
 
-def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = False) -> bytes:
+AddBand = Callable[[Graph, int, str, str], None]  # axle, names of the units and of the force
+
+
+def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | None = None) -> bytes:
     """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
 
     Of a car with downforce those of the static loads.
@@ -237,8 +234,7 @@ def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = Fals
     Parameters
     ----------
     single : whether numbers are float32; else they are float64.
-    with_band : whether half the width of their bands is told, too, at the speed of the drive that
-        taught the model.
+    add_band : adds half the width of their bands, at the speed of the drive that taught the model.
     """
     graph = Graph(single)
     scales = graph.constant("inverse_scales", 1.0 / np.array(model.ladder)[None])
@@ -249,8 +245,8 @@ def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = Fals
         units = graph.apply("Tanh", [bent], f"{slip.name}_units")
         share = graph.constant(f"{force.name}_weights", load * weights[:, None])
         graph.apply("MatMul", [units, share], force.name)
-        if with_band:
-            _half_band(graph, model, axle, units, force.name)
+        if add_band is not None:
+            add_band(graph, axle, units, force.name)
     car, loads, more = model.vehicle, "", {}
     if car.has_downforce:
         loads = " under static loads, at v_x times 1 + downforce v_x^2"
@@ -259,13 +255,66 @@ def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = Fals
     return graph.model_bytes(
         "axle_force_curves",
         FROZEN_INPUTS,
-        (*OUTPUTS, *(HALF_BANDS if with_band else ())),
+        (*OUTPUTS, *(HALF_BANDS if add_band is not None else ())),
         f"Static axle force over slip angle of {visible(car.name)}{loads}; {SLIP_SIGN}",
         {"vehicle": visible(car.name), **more},
     )
 
 
-def _half_band(graph: Graph, model: AxleModel, axle: int, units: str, force: str) -> None:
+class _Nodes:
+    """Nodes of half the width of the band of an axle."""
+
+    def __init__(self, graph: Graph, port: str) -> None:
+        self._graph, self._port = graph, port
+
+    def node(self, operator: str, *inputs: str, **attributes: Any) -> str:
+        name = f"{self._port}_{len(self._graph.nodes)}"
+        return self._graph.apply(operator, inputs, name, **attributes)
+
+    def number(self, value: ArrayLike) -> str:
+        matrix = np.atleast_2d(np.asarray(value, dtype=np.float64))
+        return self._graph.constant(f"{self._port}_number_{len(self._graph.constants)}", matrix)
+
+    def square(self, row: str) -> str:
+        return self.node("Mul", row, row)
+
+    def variance(self, h: str, P: Array) -> str:
+        """Return h P h' of rows h."""
+        by = root(P)
+        product = self.node("MatMul", h, self.number(by))
+        return self.node("MatMul", self.square(product), self.number(np.ones((by.shape[1], 1))))
+
+    def sensitivity(self, model: AxleModel, axle: int, units: str, speed: float) -> str:
+        """Return h: the force over its weights and the zero of its slip, (batch, n + 1)."""
+        by_offset = (1.0, 1.0 / speed)[axle]
+        bent = self.node("Sub", self.number(1.0), self.square(units))
+        by = (by_offset * model.W[axle] / model.ladder)[:, None]
+        slope = self.node("MatMul", bent, self.number(by))
+        return self.node("Concat", units, slope, axis=1)
+
+    def finish(self, variance: str, size: float) -> None:
+        self._graph.apply("Mul", [self.node("Sqrt", variance), self.number(size)], self._port)
+
+
+def _of_curve(model: AxleModel, P: Array, axle: int) -> Array:
+    """Return the covariance of weights and the zero of the slip of an axle."""
+    n = len(model.ladder)
+    learnt = [*range(n), n + 2]
+    found: Array = P[axle][np.ix_(learnt, learnt)]
+    return found
+
+
+def _band_of_fit(source: FittedModel, graph: Graph, axle: int, units: str, force: str) -> None:
+    """Add half the width of the band of an axle, as of a fit; arguments as of `_band_of_axle`."""
+    nodes, model = _Nodes(graph, HALF_BANDS[axle].name), source.in_units()
+    load = model.vehicle.axle_loads[axle]
+    h = nodes.sensitivity(model, axle, units, float(source.speeds.mean()))
+    left = nodes.variance(h, _of_curve(model, model.covariance, axle))
+    missed = nodes.node("Mul", force, nodes.number(source.missed[axle] / load))
+    nodes.finish(nodes.node("Add", left, nodes.square(missed)), load * normal_quantile(LEVEL))
+
+
+def _band_of_axle(model: AxleModel, graph: Graph, axle: int, units: str, force: str) -> None:
     """Add half the width of the band of an axle; the formula of `identifier.axle.band`.
 
     Parameters
@@ -273,29 +322,13 @@ def _half_band(graph: Graph, model: AxleModel, axle: int, units: str, force: str
     axle : 0 in front, 1 at the rear.
     units, force : names of t (batch, n) and of the force [N] (batch, 1).
     """
-    port, n = HALF_BANDS[axle], len(model.ladder)
+    nodes = _Nodes(graph, HALF_BANDS[axle].name)
+    node, number = nodes.node, nodes.number
     load, calibration = model.vehicle.axle_loads[axle], model.effective_calibration
     speed = calibration.speed
-
-    def node(operator: str, *inputs: str, result: str = "") -> str:
-        name = result or f"{port.name}_{len(graph.nodes)}"
-        return graph.apply(operator, inputs, name)
-
-    def number(value: ArrayLike) -> str:
-        matrix = np.atleast_2d(np.asarray(value, dtype=np.float64))
-        return graph.constant(f"{port.name}_number_{len(graph.constants)}", matrix)
-
-    def squares(row: str, by: Array) -> str:
-        product = node("MatMul", row, number(by))
-        return node("MatMul", node("Mul", product, product), number(np.ones((by.shape[1], 1))))
-
-    by_offset = (1.0, 1.0 / speed)[axle]
-    bent = node("Sub", number(1.0), node("Mul", units, units))
-    slope = node("MatMul", bent, number((by_offset * model.W[axle] / model.ladder)[:, None]))
-    h = graph.apply("Concat", [units, slope], f"{port.name}_h", axis=1)
-    learnt = [*range(n), n + 2]  # weights and the zero of the slip
+    h = nodes.sensitivity(model, axle, units, speed)
     left, before = (
-        squares(h, root(P[axle][np.ix_(learnt, learnt)]))
+        nodes.variance(h, _of_curve(model, P, axle))
         for P in (model.covariance, model.prior_covariance)
     )
     before = node("Max", before, number(LEAST_BEFORE))
@@ -305,7 +338,7 @@ def _half_band(graph: Graph, model: AxleModel, axle: int, units: str, force: str
     colored = node("Div", node("Mul", node("Mul", before, share), number(c)), told)
     left = node("Max", colored, left)
     relative = node("Mul", force, number(RELATIVE / load))
-    total = node("Add", node("Add", node("Mul", relative, relative), number(FLOOR**2)), left)
+    total = node("Add", node("Add", nodes.square(relative), number(FLOOR**2)), left)
     ratio = node("Div", left, node("Mul", before, number(UNKNOWN**2)))
     unknown = node("Min", ratio, number(1.0))
     slips = hinges(calibration.factors, CENTERS)[axle]
@@ -315,24 +348,30 @@ def _half_band(graph: Graph, model: AxleModel, axle: int, units: str, force: str
     at = speed / model.vehicle.froude_speed
     factor = node("Mul", by_slip, number(np.interp(at, AT_SPEEDS, calibration.speeds[axle])))
     wide = node("Max", factor, number(1.0))
-    narrow, wide = (node("Mul", one, one) for one in (factor, wide))
+    narrow, wide = nodes.square(factor), nodes.square(wide)
     opened = node("Mul", unknown, node("Sub", wide, narrow))
     variance = node("Mul", total, node("Add", narrow, opened))
-    node("Mul", node("Sqrt", variance), number(load * normal_quantile(LEVEL)), result=port.name)
+    nodes.finish(variance, load * normal_quantile(LEVEL))
 
 
 # By kind of model: the content of its file, from the model and whether numbers are float32.
 GRAPHS: Mapping[str, Callable[[Any, bool], bytes]] = {
     NetworkModel.kind: lambda model, single: network_graph(model, single=single),
     AxleModel.kind: lambda model, single: axle_graph(model, single=single),
+    FittedModel.kind: lambda model, single: axle_graph(model.in_units(), single=single),
     OnnxModel.kind: lambda model, _: model.content,
 }
 BANDED: Mapping[str, Callable[[Any, bool], bytes]] = {  # likewise with the band
-    AxleModel.kind: lambda model, single: axle_graph(model, single=single, with_band=True),
+    AxleModel.kind: lambda model, single: axle_graph(
+        model, single=single, add_band=partial(_band_of_axle, model)
+    ),
+    FittedModel.kind: lambda model, single: axle_graph(
+        model.in_units(), single=single, add_band=partial(_band_of_fit, model)
+    ),
 }
 
 
-class NoOnnxError(ValueError):
+class NoOnnxError(TireidError, ValueError):
     """A frozen model of a kind that has no ONNX form."""
 
 
@@ -341,10 +380,11 @@ def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = Fals
 
     Parameters
     ----------
-    model : the whole model for a network, the static force curves for an axle model, and the
-        network itself for one that came from an ONNX file.
+    model : the whole model for a network, the static force curves for an axle model and, in hidden
+        units, for a fit, the network itself for one that came from an ONNX file.
     single : whether numbers are float32; else they are float64.
-    with_band : whether half the width of the band is told, too, which axle models have.
+    with_band : whether half the width of the band is told, too, which axle models and
+        fits have.
 
     Raises
     ------
@@ -355,7 +395,7 @@ def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = Fals
     """
     if model.kind not in GRAPHS:
         raise NoOnnxError(
-            f"{type(model).__name__} has no ONNX form, only networks and axle curves have"
+            f"{type(model).__name__} has no ONNX form, only networks and axle curves do"
         )
     if not with_band:
         return GRAPHS[model.kind](model, single)
@@ -371,9 +411,7 @@ def export_onnx(
 
     Parameters
     ----------
-    model : see `onnx_bytes`.
     single : whether numbers are float32; else they are float64.
-    with_band : see `onnx_bytes`.
 
     Raises
     ------

@@ -81,12 +81,7 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
 
 
 def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
-    """Return what is proven of a method, as the manifest says it.
-
-    Parameters
-    ----------
-    method : what was exported.
-    """
+    """Return what is proven of a method, as the manifest says it."""
     if method.judged_by:
         verdict = f"judged by {method.judged_by}"
         return {"verdict": verdict, "properties": {}, "held_by_construction": {}}
@@ -171,7 +166,6 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
 
     Parameters
     ----------
-    specialized : its lowest speed sets the scale.
     n : number of samples.
     """
     k = np.arange(n, dtype=np.float64)
@@ -315,9 +309,7 @@ def build_package(
 
     Parameters
     ----------
-    method : the method with its numbers.
     start : weights to begin with; None begins with those of the method.
-    name : beginning of every symbol and file name.
     single : whether float is the default precision.
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.
@@ -360,7 +352,6 @@ def readme(package: Package, about_figures: str) -> str:
 
     Parameters
     ----------
-    package : what it describes.
     about_figures : flash, RAM, stack and instructions, as Markdown.
     """
     specialized = package.specialized

@@ -16,7 +16,9 @@ import numpy as np
 
 from codegen import CompilationError
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.package import manifest_with_figures, renamed
+from codegen.writing import write_file
 from identifier.export.c_source import PREFIX
 from identifier.export.package import Package, synthetic_samples
 
@@ -71,7 +73,7 @@ class Replay(NamedTuple):
     most_instructions: int
 
 
-class ReplayError(RuntimeError):
+class ReplayError(TireidError, RuntimeError):
     """A machine did not come to the end of a recording."""
 
 
@@ -107,8 +109,6 @@ def replay_on(
     Parameters
     ----------
     processor : one of `PROCESSORS`.
-    name : of the package.
-    files : its texts by path.
     samples : (n, k) in the order of the inputs, SI.
     single : whether to compute in float.
     corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
@@ -156,11 +156,8 @@ def replay_here(
 
     Parameters
     ----------
-    name : of the package.
-    files : its texts by path.
     samples : (n, k) in the order of the inputs, SI.
     single : whether to compute in float.
-    flags : of the compiler.
 
     Raises
     ------
@@ -190,10 +187,7 @@ def size_on(
     Parameters
     ----------
     processor : one of `PROCESSORS`.
-    name : of the package.
-    files : its texts by path.
     single : whether to compute in float.
-    level : of optimization.
 
     Raises
     ------
@@ -218,12 +212,7 @@ def size_on(
 
 @cache
 def compiler_version(command: str) -> str:
-    """Return the first line of what a compiler says about itself.
-
-    Parameters
-    ----------
-    command : of the compiler.
-    """
+    """Return the first line of what a compiler says about itself."""
     answer = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
     return answer.stdout.splitlines()[0]
 
@@ -235,7 +224,7 @@ def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
     }
     for path, text in wanted.items():
         (folder / path).parent.mkdir(exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
+        write_file(folder / path, text)
     return sorted(path for path in wanted if path.endswith(".c"))
 
 
@@ -251,8 +240,8 @@ def _build(
     sources = _write(folder, files)
     for path in TARGET.iterdir():
         text = renamed(path.read_text(encoding="utf-8"), {PREFIX: name})
-        (folder / path.name).write_text(text, encoding="utf-8")
-    (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
+        write_file(folder / path.name, text)
+    write_file(folder / "samples.bin", np.ascontiguousarray(samples, dtype="<f8").tobytes())
     own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
     compiler, *words = command
     files_and_words = [*sources, "replay.c", "samples.S", *words]
@@ -261,11 +250,6 @@ def _build(
 
 def compile_in(folder: Path, command: Sequence[str]) -> None:
     """Compile files of a package.
-
-    Parameters
-    ----------
-    folder : where they lie.
-    command : of the compiler.
 
     Raises
     ------
@@ -284,12 +268,6 @@ def _result(command: Sequence[str], folder: Path) -> Replay:
 
 def printed(command: Sequence[str], folder: Path, wanted: Sequence[str]) -> dict[str, Any]:
     """Run a replay; return its hash and the numbers that it prints by name.
-
-    Parameters
-    ----------
-    command : of the program.
-    folder : where it lies.
-    wanted : names of what it prints, the hash among them.
 
     Raises
     ------
@@ -324,11 +302,13 @@ def printed(command: Sequence[str], folder: Path, wanted: Sequence[str]) -> dict
 class Cost(NamedTuple):
     """What a package costs on a processor.
 
-    flash : code and constants [bytes].   replay : what a replay tells.
+    compiler : what it says of itself.   flash : code and constants [bytes].
+    replay : what a replay tells.
     static_ram : data that may change and is not the caller's [bytes].
     """
 
     processor: str
+    compiler: str
     single: bool
     flash: int
     replay: Replay
@@ -350,12 +330,13 @@ def measure(package: Package, progress: Callable[[float], None] | None = None) -
     if missing_tools():
         return []
     name, samples = package.specialized.name, synthetic_samples(package.specialized)
-    costs = []
+    compiler, costs = compiler_version(CROSS_COMPILER), []
     for processor in PROCESSORS:
         for single in (True, False):
             size = size_on(processor, name, package.files, single=single)
             replay = replay_on(processor, name, package.files, samples, single=single)
-            costs.append(Cost(processor.name, single, size.flash, replay, size.static_ram))
+            cost = Cost(processor.name, compiler, single, size.flash, replay, size.static_ram)
+            costs.append(cost)
             if progress is not None:
                 progress(len(costs) / (2 * len(PROCESSORS)))
     return costs
@@ -382,7 +363,7 @@ def figures_text(costs: list[Cost]) -> str:
         for cost in costs
     )
     return (
-        f"{head}{rows}\n{compiler_version(CROSS_COMPILER)}, -O2; instructions\nand stack by "
+        f"{head}{rows}\n{costs[0].compiler}, -O2; instructions\nand stack by "
         f"{EMULATOR} over the samples of the self-test. Each instance has a state of its\nown; "
         "parameters may be shared, or lie in flash."
     )
@@ -400,7 +381,7 @@ def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
         {
             "processor": cost.processor,
             "precision": "float" if cost.single else "double",
-            "compiler": compiler_version(CROSS_COMPILER),
+            "compiler": cost.compiler,
             "flash_B": cost.flash,
             "ram_B": cost.ram,
             "static_ram_B": cost.static_ram,

@@ -127,7 +127,6 @@ def specialize(
 
     Parameters
     ----------
-    method : the method, with its numbers.
     start : weights to begin with; None begins with those of the method.
     name : C identifier.
     with_a_y : whether a_y is an input of a method that goes without it as well.

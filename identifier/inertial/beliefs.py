@@ -32,12 +32,7 @@ class Body(NamedTuple):
 
     @classmethod
     def of_chassis(cls, vehicle: Vehicle) -> Self | None:
-        """Return the body of a car as its chassis tells it; None where it tells none.
-
-        Parameters
-        ----------
-        vehicle : with or without chassis.
-        """
+        """Return the body of a car as its chassis tells it; None where it tells none."""
         if vehicle.chassis is None:
             return None
         leans = vehicle.weight * vehicle.roll_arm  # N m per g, and per rad of roll
@@ -51,7 +46,6 @@ class Body(NamedTuple):
 
         Parameters
         ----------
-        rolls : before.
         level : acceleration in the plane of the road [m/s²].
         dt : sampling interval [s].
         """
@@ -75,11 +69,6 @@ class Beliefs:
     steering : of the zero of the front steering [rad].
     gyro : bias of the yaw rate, in a car with a wheelbase of 2.7 m [rad/s].
     inertia : of 1/I_z [-].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     bias: float = 0.015
@@ -141,11 +130,6 @@ class Trust:
     step, step_time : change of ln μ that may happen in that time then [-], [s].
     surge : largest acceleration [m/s²].
     observable : largest standard deviation of side slip that is told for observed [rad].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     v_y: float = 0.017
@@ -177,8 +161,8 @@ class Trust:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def numbers(self, dt: float, wheelbase: float, froude_time: float, sd_v_y: float) -> Array:
-        """Return the numbers of `TrustNumbers`, (26,).
+    def at(self, dt: float, wheelbase: float, froude_time: float, sd_v_y: float) -> "TrustNumbers":
+        """Return the numbers of a step.
 
         Parameters
         ----------
@@ -190,35 +174,33 @@ class Trust:
         scale = math.sqrt(wheelbase / 2.7)
         speed = wheelbase / froude_time
         kept = math.exp(-dt / self.correlation_time)
-        return np.array(
-            [
-                (self.v_y * speed) ** 2,
-                (self.r / scale) ** 2,
-                self.error,
-                self.relative_error,
-                1.0 - kept**2,
-                self.bank**2,
-                (self.bank / self.bank_time) ** 2,
-                4.0 * self.bank**2 * dt / self.bank_time**3,
-                (self.jerk / froude_time**1.5) ** 2 * dt,
-                (self.r_error / scale) ** 2,
-                self.a_y_error**2,
-                self.a_y_share**2,
-                1.0 / self.noise_samples,
-                self.lateness,
-                self.clip,
-                1.0 / self.alarm,
-                min(dt / self.alarm_time, 1.0),
-                dt * self.step**2 / self.step_time,
-                self.surge,
-                self.observable**2,
-                (self.v_y_error * speed) ** 2,
-                sd_v_y**2,
-                sd_v_y**2 * dt / self.v_y_time,
-                (self.r_noise / scale) ** 2,
-                self.a_y_noise**2,
-                (self.v_y_noise * speed) ** 2,
-            ]
+        return TrustNumbers(
+            v_y=(self.v_y * speed) ** 2,
+            r=(self.r / scale) ** 2,
+            error=self.error,
+            relative_error=self.relative_error,
+            renewed=1.0 - kept**2,
+            bank=self.bank**2,
+            bank_rate=(self.bank / self.bank_time) ** 2,
+            bank_walk=4.0 * self.bank**2 * dt / self.bank_time**3,
+            r_walk=(self.jerk / froude_time**1.5) ** 2 * dt,
+            r_error=(self.r_error / scale) ** 2,
+            a_y_error=self.a_y_error**2,
+            a_y_share=self.a_y_share**2,
+            noise_gain=1.0 / self.noise_samples,
+            lateness=self.lateness,
+            clip=self.clip,
+            per_alarm=1.0 / self.alarm,
+            alarm_gain=min(dt / self.alarm_time, 1.0),
+            inflation=dt * self.step**2 / self.step_time,
+            surge=self.surge,
+            observable=self.observable**2,
+            v_y_error=(self.v_y_error * speed) ** 2,
+            v_y_bias=sd_v_y**2,
+            v_y_walk=sd_v_y**2 * dt / self.v_y_time,
+            r_noise=(self.r_noise / scale) ** 2,
+            a_y_noise=self.a_y_noise**2,
+            v_y_noise=(self.v_y_noise * speed) ** 2,
         )
 
 

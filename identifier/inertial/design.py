@@ -22,12 +22,12 @@ from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.inertial.beliefs import Beliefs, Body, Trust, TrustNumbers
-from identifier.inertial.motion import MOVING, SENSORS, of_axles, size
-from identifier.inertial.step import CARRY, OVER, PORTS, build_step, heard_size
-from identifier.method import OTHER_STRUCTURE, Method, Reached, Track, fits, resumed
+from identifier.inertial.beliefs import Beliefs, Body, Trust
+from identifier.inertial.motion import MOVING, SENSORS, Laws, of_axles, size
+from identifier.inertial.step import CARRY, OVER, PORTS, LearntLimits, build_step, heard_size
+from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
@@ -76,11 +76,6 @@ class InertialIdentifier(Method):
 
     Parameters
     ----------
-    prior : of curves and compliance, as of the axle identifier.
-    plausibility : which samples are believed, and the lowest speeds.
-    bounds : limits of curves and compliance.
-    beliefs : of sensors and inertia before the first sample.
-    trust : how far motion, road and sensors are trusted.
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
     reads_v_y : whether a measured v_y is looked at, where there is one.
@@ -164,13 +159,8 @@ class InertialIdentifier(Method):
         return "" if self.reads_v_y else "without v_y, which it tells"
 
     def resumes(self, model: TireModel) -> bool:
-        """Return whether a run can begin with a stored model.
-
-        Parameters
-        ----------
-        model : its weights.
-        """
-        return fits(model, AxleModel, ladder=self.ladder)
+        """Return whether a run can begin with a stored model."""
+        return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
 
     def possible_tires(self) -> HalfSpaces:
         """Return the weights that the curve of a tire can have, within the bounds."""
@@ -183,17 +173,11 @@ class InertialIdentifier(Method):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
+        """Outputs and state of its step, axle_force trust."""
         return PORTS
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: the boxes of what is learnt hold after every sample.
-
-        Parameters
-        ----------
-        vehicle : not looked at: the boxes are in static axle loads.
-        driving : not looked at: the boxes hold whatever is measured.
-        """
+        """Return what is proven of it: the boxes of what is learnt hold after every sample."""
         del vehicle, driving
         b = self.bounds
         return Certificate(
@@ -216,7 +200,6 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -231,21 +214,20 @@ class InertialIdentifier(Method):
         sensors = np.zeros(len(SENSORS))
         sensors[SENSORS.index("roll")] = self.beliefs.roll
         if start is not None:
-            stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+            stored = resumed(
+                start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
+            )
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
             sensors[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]] = own[:, 2]
         size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
-        trust = self.trust.numbers(
-            self.dt, vehicle.wheelbase, vehicle.froude_time, self.prior.sd_v_y
-        )
+        trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time, self.prior.sd_v_y)
         known = self.beliefs.covariance(n, size_ratio)
         for one, rows in zip(P, of_axles(n), strict=True):
             known[np.ix_(rows, rows)] = one[_learnt_of_axle(n)]
         if self._delay is None:
             known[-1, :-1] = known[:-1, -1] = 0.0
-        first = TrustNumbers(*trust)
         heard_v_y = np.zeros(heard_size(self._delay))
-        heard_v_y[2] = first.v_y_noise
+        heard_v_y[2] = trust.v_y_noise
         rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
         return Setup(
             scan=_scan(doublings(self.ladder), self._delay, pressed=vehicle.has_downforce),
@@ -259,7 +241,7 @@ class InertialIdentifier(Method):
                 "gate": np.zeros(len(GateState._fields)),
                 "body": np.zeros(2),
                 "heard": np.concatenate(
-                    [np.zeros(4), [first.r_noise, first.a_y_noise], np.zeros(4)]
+                    [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
                 "heard_v_y": heard_v_y,
                 "running": np.zeros(2),
@@ -269,12 +251,12 @@ class InertialIdentifier(Method):
                 "dt": np.array(self.dt),
                 "car": car_numbers(vehicle),
                 "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": self.plausibility.numbers(),
-                "laws": self._laws(vehicle),
-                "trust": trust,
+                "plausibility": np.array(self.plausibility.numbers()),
+                "laws": np.array(self._laws(vehicle)),
+                "trust": np.array(trust),
                 "learning_speed": np.array(self.plausibility.learning_speed),
-                "limits": self._limits(),
-                "bounds": self.bounds.of_ladder(self.ladder, RISING_UNTIL),
+                "limits": np.array(self._limits()),
+                "bounds": np.array(self.bounds.of_ladder(self.ladder, RISING_UNTIL)),
                 "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 "rising": rising_shares(self.ladder, RISING_UNTIL),
                 **downforce_numbers(vehicle),
@@ -283,30 +265,24 @@ class InertialIdentifier(Method):
         )
 
     def believed_body(self, vehicle: Vehicle) -> Body:
-        """Return how the body rolls: as a chassis tells it, or else as is believed of any.
-
-        Parameters
-        ----------
-        vehicle : with or without chassis.
-        """
+        """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
         frequency = self.roll_frequency / vehicle.froude_time
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
 
-    def _laws(self, vehicle: Vehicle) -> Array:
-        """Return the numbers of `Laws`."""
+    def _laws(self, vehicle: Vehicle) -> Laws:
         omega = self._sway(vehicle).frequency
         time = self.trust.bank_time
-        return np.array(
-            [
-                math.exp(-self.dt / self.trust.correlation_time),
-                time**-2,
-                2.0 / time,
-                omega**2,
-                2.0 * self.roll_damping * omega,
-                self.prior.sway_share * omega**-2,
-                *self.sensor_position,
-            ]
+        ahead, aside = self.sensor_position
+        return Laws(
+            forgets=math.exp(-self.dt / self.trust.correlation_time),
+            bank_stiffness=time**-2,
+            bank_damping=2.0 / time,
+            roll_stiffness=omega**2,
+            roll_damping=2.0 * self.roll_damping * omega,
+            sway=self.prior.sway_share * omega**-2,
+            ahead=ahead,
+            aside=aside,
         )
 
     def _sway(self, vehicle: Vehicle) -> Sway:
@@ -319,11 +295,11 @@ class InertialIdentifier(Method):
         """Samples by which a measured v_y is late; None where it is not looked at."""
         return round(self.v_y_delay / self.dt) if self.reads_v_y else None
 
-    def _limits(self) -> Array:
-        """Return the numbers of `LearntLimits`."""
-        most = MOST | {"steering": self.bounds.steering, "v_y_bias": self.bounds.v_y}
-        limits = [self.bounds.compliance, *(most[name] for name in SENSORS)]
-        return np.array([inward(limit) for limit in limits])
+    def _limits(self) -> LearntLimits:
+        b = self.bounds
+        of_sensors = {"steering": b.steering, "v_y_bias": b.v_y, **MOST}
+        most = {"compliance": b.compliance, **of_sensors}
+        return LearntLimits(**{name: inward(limit) for name, limit in most.items()})
 
     def _prior_covariance(self, vehicle: Vehicle) -> Array:
         """Return the covariance of both axles before the first sample, (2, n + 3, n + 3)."""
@@ -352,7 +328,6 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : not looked at: the bounds are in static axle loads.
         state : W (2, n), own (2,) and sensors (5,).
         """
         del vehicle

@@ -96,7 +96,6 @@ def measured(
     Parameters
     ----------
     z : before, q entries.
-    factors : of its covariance.
     h : gradient of what is measured, (1, q), sparse.
     innovation : ν, measured less expected.
     R : variance of the measurement, positive.

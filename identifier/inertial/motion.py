@@ -118,11 +118,8 @@ Load = Callable[[Any], Any]  # v_x [m/s] -> λ, loads of the axles over the stat
 
 
 def static_load(v_x: Any) -> Any:
-    """Return the loads of a car without downforce, 1 (2,): factors of which CasADi makes nothing.
-
-    Parameters
-    ----------
-    v_x : not looked at.
+    """Return the loads of a car without downforce, 1 (2,): factors of which CasADi makes
+    nothing.
     """
     del v_x
     return ca.SX.ones(2)
@@ -164,24 +161,14 @@ class Way:
         self._on_the_way: list[tuple[Any, Any]] = []
 
     def held(self, value: Any) -> Any:
-        """Return a number of which the gradient is left out, as a symbol.
-
-        Parameters
-        ----------
-        value : expression of any shape.
-        """
+        """Return a number of which the gradient is left out, as a symbol."""
         symbol = ca.SX.sym("held", *value.shape)
         self._symbols.append(symbol)
         self._values.append(value)
         return symbol
 
     def by(self, value: Any) -> Any:
-        """Return a number that others go on from, as a symbol.
-
-        Parameters
-        ----------
-        value : expression of any shape.
-        """
+        """Return a number that others go on from, as a symbol."""
         symbol = self.held(value)
         self._on_the_way.append((symbol, value))
         return symbol
@@ -192,17 +179,11 @@ class Way:
         Parameters
         ----------
         value, slope : f(x) and f'(x), of any shape.
-        x : likewise.
         """
         return self.held(value) + self.held(slope) * (x - self.held(x))
 
     def valued(self, expressions: list[Any]) -> list[Any]:
-        """Return expressions with the numbers on the way put in.
-
-        Parameters
-        ----------
-        expressions : of z and symbols.
-        """
+        """Return expressions with the numbers on the way put in."""
         for symbol, value in zip(reversed(self._symbols), reversed(self._values), strict=True):
             expressions = ca.substitute(expressions, [symbol], [value])
         return expressions
@@ -284,16 +265,10 @@ def predicted(
 
     Parameters
     ----------
-    car : in units of its loads.
-    laws : of the rest.
     dt : sampling interval [s].
     z : before the step.
-    tilt : ä and its rate, before the step.
-    before : the sample before.
-    now : the sample to which the step leads.
     scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
-    load : of the axles at a speed.
     """
     way = Way()
     v_x = (before.v_x + now.v_x) / 2
@@ -343,7 +318,6 @@ def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curv
 
     Parameters
     ----------
-    way : to which their units belong.
     z : slip and weights.
     scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
@@ -367,11 +341,7 @@ def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) 
 
     Parameters
     ----------
-    car : in units of its loads.
-    laws : of which the place of the accelerometer is read.
-    z : at the sample.
     tilt : ä of the rolling body [m/s²].
-    now : the sample.
     at : curves at the lagged slip.
     """
     force = at.force * cosine(now.delta) + z.error

@@ -9,7 +9,6 @@ identifier; body (2,), heard (10,), running (2,), excitation (2, 9).
 Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
 """
 
-from dataclasses import fields
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -18,9 +17,8 @@ import casadi as ca
 from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
 from identifier.axle.curve import EDGES, curve, excited
-from identifier.axle.gate import Gate, GateState, Plausibility, gate
+from identifier.axle.gate import Gate, GateNumbers, GateState, gate
 from identifier.axle.learning import BoundNumbers, bounded
-from identifier.axle.step import PLAUSIBILITY
 from identifier.inertial.beliefs import TrustNumbers
 from identifier.inertial.gaussian import as_factor, measured, propagated
 from identifier.inertial.motion import (
@@ -164,7 +162,6 @@ class Noise(NamedTuple):
 
         Parameters
         ----------
-        h, innovation, R : as of `Reading`, of r and a_y.
         lateral : of v_y, None where there is none.
         """
         of_r, of_a_y = zip(innovation, R, [self.counts] * 2, strict=True)
@@ -221,7 +218,7 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
     ports["dt"] = dt = ca.SX.sym("dt")
     ports["car"], car = axle_port(Car, "car")
     ports["scales"] = scales = ca.SX.sym("scales", 1, n)
-    ports["plausibility"] = ca.SX.sym("plausibility", PLAUSIBILITY)
+    ports["plausibility"], possible = named_port(GateNumbers, "plausibility")
     ports["laws"], laws = named_port(Laws, "laws")
     ports["trust"], trust = named_port(TrustNumbers, "trust")
     ports["learning_speed"] = slowest = ca.SX.sym("learning_speed")
@@ -235,7 +232,7 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
         load = partial(load_ratio, ports["downforce"])
 
     seen = ca.vertcat(0, ports["x"][1])  # a missing v_y speaks against no sample
-    gated = gate(ports["plausibility"], dt, last, seen, ports["u"], ports["v_x"])
+    gated = gate(possible, dt, last, seen, ports["u"], ports["v_x"])
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
     goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
     z = ca.vertcat(
@@ -268,7 +265,9 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
     if delay is not None:
         difference = ahead.moving[0] - z[0]
         change = Change(difference, ca.jacobian(difference, z))
-        lateral, heard_v_y = _lateral(ports, trust, delay, ahead_z, gated, goes_on, change)
+        lateral, heard_v_y = _lateral(
+            ports, (trust, possible), delay, ahead_z, gated, goes_on, change
+        )
         factors = _unsure_of_v_y(factors, trust, ca.logic_and(goes_on, _is_good(gated)))
     noise = _noise(ports, trust, gated, goes_on, ca.SX(0) if lateral is None else lateral.counts)
     corrected, factors, heard = _corrected(
@@ -441,12 +440,7 @@ def _corrected(
 
 
 def heard_size(delay: int | None) -> int:
-    """Return how many numbers are carried of a measured v_y.
-
-    Parameters
-    ----------
-    delay : as of `build_step`.
-    """
+    """Return how many numbers are carried of a measured v_y."""
     return FIRST_CHANGE + max((delay or 0) - 1, 0)
 
 
@@ -455,16 +449,9 @@ def _is_good(gated: Gate) -> Any:
     return gated.state[GateState._fields.index("bad")] == 0
 
 
-def _plausible(ports: dict[str, Any], gated: Gate, v_y: Any) -> Any:
-    """Return whether a number is a lateral velocity that a car may have, which NaN is not."""
-    names = (field.name for field in fields(Plausibility))
-    at = dict(zip(names, ca.vertsplit(ports["plausibility"]), strict=True))
-    return ca.fabs(v_y) < at["max_sideslip"] * larger(gated.v_x, at["slow"])
-
-
 def _lateral(
     ports: dict[str, Any],
-    trust: TrustNumbers,
+    told: tuple[TrustNumbers, GateNumbers],
     late: int,
     z: Any,
     gated: Gate,
@@ -478,10 +465,11 @@ def _lateral(
     show the noise, from one number to the next. One that follows another at once is not taken: it
     is the turn of r and a_y.
     """
+    trust, possible = told
     last, newest, old, age, count, took, waits, left, *changes = ca.vertsplit(ports["heard_v_y"])
     changes = [ca.if_else(goes_on, change.v_y, 0), *changes]
     y, learns = ports["x"][0], ca.logic_and(goes_on, _is_good(gated))
-    y = ca.if_else(ca.logic_and(_is_good(gated), _plausible(ports, gated, y)), y, last)
+    y = ca.if_else(ca.logic_and(_is_good(gated), possible.possible_v_y(gated.v_x, y)), y, last)
     fresh = ca.logic_and(learns, ca.logic_and(y != last, age + 1 >= late))
     waiting = goes_on * ca.logic_or(fresh, waits > TAKEN)
     taken = ca.logic_and(ca.logic_and(learns, waiting), took < TAKEN)

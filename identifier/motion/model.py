@@ -10,7 +10,7 @@ exactly for α linear over a step.
 Curve on a road of m times the friction:   φ(x) = m φ_0(x/m),
 φ_0 = μ sin(c atan u) + Σ q_j tanh(x/a_j),   u = B x - E (B x - atan B x),   B = C/(c μ)
 (Pacejka, Tyre and Vehicle Dynamics, 4.3, and what it misses).
-Load and ellipse, f = a_x/g:   λ_i = max(1 ∓ (h L/l_o) f + κ_i v_x², 0.2),
+Load and ellipse, f = (a_x + d v_x²)/g, d of the drag:   λ_i = max(1 ∓ (h L/l_o) f + κ_i v_x², 0.2),
 G_i = sqrt(max(1 - (c_i f)², 0.05)).
 Force over the static load:   F_i = λ_i G_i φ_i(x_i) cos δ_i.
 Balance of an axle (`axle.car`):   ξ_i' + v_x r/g - F_i - bank = 0. Missed, through a filter of
@@ -28,7 +28,8 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
-from identifier.axle.gate import GateState, gate
+from identifier.axle.car import named_port
+from identifier.axle.gate import GateNumbers, GateState, gate
 from identifier.axle.slip import SHORTEST
 from identifier.motion.parameters import NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
@@ -57,7 +58,9 @@ CARRIED = (
 
 
 class CarNumbers(NamedTuple):
-    """l_f, l_r [m], I_z/(m g) [s²], ω of the sway [rad/s], κ of the downforce (2) [s²/m²]."""
+    """l_f, l_r [m], I_z/(m g) [s²], ω of the sway [rad/s], κ of the downforce (2) [s²/m²], d of
+    the drag [1/m].
+    """
 
     l_f: Any
     l_r: Any
@@ -65,6 +68,7 @@ class CarNumbers(NamedTuple):
     omega: Any
     press_f: Any
     press_r: Any
+    drag: Any
 
 
 class Dual(NamedTuple):
@@ -79,7 +83,6 @@ class Stage:
 
     Parameters
     ----------
-    inputs : symbols, of names that no other symbol of the outputs has.
     outputs : expressions of them, and of symbols without slopes.
     """
 
@@ -101,7 +104,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     """Return the model as a compiled loop.
 
     Its ports: `state` (16,) and `tangent` are carried, `signals` (9,) and `rates` (3,) have a row
-    a sample, `parameters` (p,), `car` (6,) and `dt` are constant; `force` (2,) [static loads],
+    a sample, `parameters` (p,), `car` (7,) and `dt` are constant; `force` (2,) [static loads],
     `missed` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
     `missed_slopes` (2, n) come out.
 
@@ -114,7 +117,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     signal_port, signals = _symbols(SIGNALS)
     rate_port, rates = _symbols(RATES)
     parameter_port, parameters = _symbols(NAMES)
-    car_port = ca.SX.sym("car", len(CarNumbers._fields))
+    car_port, car = named_port(CarNumbers, "car")
     dt = ca.SX.sym("dt")
     was_on = ca.SX.sym("was_on")
     duals = {name: Dual(parameters[name], _unit(name, columns)) for name in NAMES}
@@ -125,7 +128,6 @@ def motion_scan(columns: Columns = ()) -> Scan:
     while True:  # which parameters each state can depend on
         tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
         before = {name: Dual(old[name], tangents[name]) for name in CARRIED}
-        car = CarNumbers(*ca.vertsplit(car_port))
         after, out = _step(before, fixed, duals, car, dt, first)
         grown = {
             name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
@@ -350,9 +352,10 @@ def _axle(
     curve = Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
     value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
     # Load and ellipse.
-    phi0, height, brake, drive, cg, down, f, speed = (
-        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "down", "f", "v")
+    phi0, height, brake, drive, cg, down, felt, speed = (
+        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "down", "a_x", "v")
     )
+    f = (felt + car.drag * speed**2) / GRAVITY
     other = (car.l_r + cg) if front else (car.l_f - cg)
     shifted = (-height if front else height) * L / other * f
     press = car.press_f if front else car.press_r
@@ -360,8 +363,7 @@ def _axle(
     load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
     use = ca.if_else(f > 0, drive, brake) * f
     left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
-    a_x = Dual(signals["a_x"].value / GRAVITY, signals["a_x"].slopes)
-    (force,) = Stage([phi0, height, brake, drive, cg, down, f, speed], [phi0 * load * left])(
+    (force,) = Stage([phi0, height, brake, drive, cg, down, felt, speed], [phi0 * load * left])(
         [
             value,
             p["load_transfer"],
@@ -369,7 +371,7 @@ def _axle(
             p[f"driving_{axle}"],
             p["cg_shift"],
             p[f"downforce_{axle}"],
-            a_x,
+            signals["a_x"],
             v_x,
         ]
     )
@@ -420,12 +422,13 @@ REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
 def replay_step() -> ca.Function:
     """Return the model as a step: axle_force [N], lagged slip and the larger slip [rad], (2,)."""
     state_port, old = _symbols(REPLAYED)
-    gate_port = ca.SX.sym("gate", len(GateState._fields))
+    gate_port, last = named_port(GateState, "gate")
     x, u, v_x, dt = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x"), ca.SX.sym("dt")
     parameter_port, parameters = _symbols(NAMES)
-    car_port, limits = ca.SX.sym("car", len(CarNumbers._fields)), ca.SX.sym("plausibility", 15)
+    car_port, car = named_port(CarNumbers, "car")
+    limit_port, limits = named_port(GateNumbers, "plausibility")
     loads = ca.SX.sym("loads", 2)
-    g = gate(limits, dt, GateState(*ca.vertsplit(gate_port)), x, u, v_x)
+    g = gate(limits, dt, last, x, u, v_x)
     slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
     a_x = (g.v_x - slow) / LAG_OF_A_X - g.v_y * g.r
     following = g.v_x + (slow - g.v_x) * ca.exp(-dt / LAG_OF_A_X)
@@ -437,7 +440,6 @@ def replay_step() -> ca.Function:
     }
     duals = {name: Dual(parameters[name], nothing) for name in NAMES}
     before = {name: Dual(old.get(name, 0), nothing) for name in CARRIED}
-    car = CarNumbers(*ca.vertsplit(car_port))
     after, out = _step(before, fixed, duals, car, dt, g.first)
     slip = ca.vertcat(*(axis.value for axis in out["x"]))
     alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
@@ -445,7 +447,7 @@ def replay_step() -> ca.Function:
     force = ca.if_else(g.on, loads * ca.vertcat(*(axis.value for axis in out["F"])), 0)
     return ca.Function(
         "motion_replay",
-        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limits, loads],
+        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limit_port, loads],
         [
             g.state,
             ca.vertcat(*motion, following),

@@ -17,6 +17,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
 from identifier.method import Method
@@ -338,7 +339,6 @@ def design_for(
     input_source : "measured" or "estimated".
     integrator : "euler" or "rk4".
     dt : sampling interval [s].
-    seed : seed of the initial weights.
 
     Raises
     ------
@@ -447,7 +447,7 @@ COMMENTS = {
 }
 
 
-class DesignFileError(ValueError):
+class DesignFileError(TireidError, ValueError):
     """A file does not hold a design; the message names file, key and rule."""
 
 

@@ -21,6 +21,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.rules import require_within
 
 Direction = Callable[[Any, Any], Any]
@@ -69,7 +70,6 @@ class DrivingError(NamedTuple):
         Parameters
         ----------
         z : filtered error.
-        xi_tilde : error.
         """
         return self.z * z + self.xi_tilde * xi_tilde
 
@@ -80,7 +80,6 @@ class Law:
 
     Parameters
     ----------
-    name : in files and commands.
     z : share of the filtered error.
     xi : share of the error.
     lead : share of the lead time τ of the gains in what multiplies the error.
@@ -132,7 +131,6 @@ def unbounded(weights: Any, radius: Any) -> Any:
 
     Parameters
     ----------
-    weights : matrix.
     radius : ignored.
     """
     del radius
@@ -144,7 +142,6 @@ def ball(weights: Any, radius: Any) -> Any:
 
     Parameters
     ----------
-    weights : matrix.
     radius : Frobenius norm that is kept, positive.
     """
     return weights * ca.fmin(1, radius / ca.fmax(ca.norm_fro(weights), 1e-300))
@@ -155,7 +152,6 @@ def whole(weights: Any, radius: Any) -> Any:
 
     Parameters
     ----------
-    weights : matrix.
     radius : ignored.
     """
     del radius
@@ -167,7 +163,6 @@ def beyond_ball(weights: Any, radius: Any) -> Any:
 
     Parameters
     ----------
-    weights : matrix.
     radius : Frobenius norm within which nothing leaks, not negative.
     """
     return weights - ball(weights, radius)
@@ -302,12 +297,7 @@ def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
 
 
 def free(state: list[Any]) -> list[Any]:
-    """Return the state as it is: nothing bounds it.
-
-    Parameters
-    ----------
-    state : parts of the state.
-    """
+    """Return the state as it is: nothing bounds it."""
     return state
 
 
@@ -319,7 +309,6 @@ def euler(
     Parameters
     ----------
     derivative : time derivative of each part of the state.
-    state : parts of the state, matrices of any shape.
     dt : step [s].
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
     """
@@ -336,9 +325,7 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
     Parameters
     ----------
     derivative : time derivative of each part of the state.
-    state : parts of the state, matrices of any shape.
     dt : step [s].
-    project : puts a state back within its bounds.
     """
     k1 = derivative(state)
     k2 = derivative(project(_ahead(state, k1, dt / 2)))
@@ -358,7 +345,7 @@ LEAST, LARGEST = 1e-15, 1e12  # of a gain that is not 0, in its unit, whatever U
 # With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
 
 
-class NotHurwitzError(ValueError):
+class NotHurwitzError(TireidError, ValueError):
     """A_d has an eigenvalue whose real part is not negative."""
 
 

@@ -122,7 +122,6 @@ def natural_network(
     ----------
     vehicle : its wheelbase sets the scales of speeds and yaw rate.
     hidden : number of hidden units.
-    inputs : signals that the network reads.
     """
     ratio = np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
     froude = {"v_y": ratio, "v_x": ratio, "r": 1 / ratio}
@@ -174,10 +173,6 @@ def build_frozen(network: Network) -> ca.Function:
     Ports: W (2, n_h) and V (n_h, n_in); x = [v_y, r], u = [δ_f, δ_r], v_x, SI; vehicle (6,) = m,
     I_z, l_f, l_r, C_f, C_r; force_unit [N]. Results: f_hat (2,) in the force unit and axle_force
     (2,) [N].
-
-    Parameters
-    ----------
-    network : structure of the network.
     """
     n_h, n_in = network.hidden, len(network.inputs)
     W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
@@ -196,12 +191,7 @@ def build_frozen(network: Network) -> ca.Function:
 
 
 def build_replay(network: Network) -> ca.Function:
-    """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port.
-
-    Parameters
-    ----------
-    network : structure of the network.
-    """
+    """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port."""
     frozen = build_frozen(network)
     ports = {name: ca.SX.sym(name, *frozen.size_in(name)) for name in frozen.name_in()}
     min_speed, v_x = ca.SX.sym("min_speed"), ports["v_x"]
@@ -232,8 +222,6 @@ class NetworkModel(TireModel):
 
     Parameters
     ----------
-    vehicle : the car, whose linear tire the network corrects.
-    network : structure of the network.
     weights : W (2, n_h) in the force unit and V (n_h, n_in).
     force_unit : U [N].
     min_speed : below this speed [m/s] the forces read zero.
@@ -310,7 +298,6 @@ class NetworkModel(TireModel):
         x : [v_y, r] (2,).
         delta : angle of the front wheels [rad].
         v_x : longitudinal speed [m/s], positive.
-        least_lag : not looked at.
         """
         del slip, least_lag
         return self._static_force(x, delta, v_x), ca.MX(0, 1)
@@ -341,13 +328,7 @@ class NetworkModel(TireModel):
 
         Parameters
         ----------
-        data : as from `to_dict`.
         source : name of the file, for errors.
-
-        Raises
-        ------
-        FrozenModelError
-            Where a key is missing or a value impossible.
         """
         try:
             table = Table(data, "", FrozenModelError)
@@ -369,9 +350,7 @@ def first_weights(
 
     Parameters
     ----------
-    network : structure of the network.
     start : stored weights to begin with; None draws them.
-    seed : of the weights that are drawn.
     force_unit : U of what learns [N].
 
     Raises

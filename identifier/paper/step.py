@@ -64,11 +64,7 @@ class Structure:
 
     Parameters
     ----------
-    network : structure of the network.
-    law : name of the law.
     input_source : where the network reads the state.
-    integrator : name of the integrator.
-    projects : whether a projection bounds the weights.
     rests : whether the leakage has a dead zone.
     """
 
@@ -100,12 +96,7 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 
 
 def build_step(structure: Structure) -> ca.Function:
-    """Return the step; vehicle, gains and sampling stay inputs of it.
-
-    Parameters
-    ----------
-    structure : network, law, input source and integrator.
-    """
+    """Return the step; vehicle, gains and sampling stay inputs of it."""
     network = structure.network
     n_h, n_in = network.hidden, len(network.inputs)
     xi_hat, z = ca.SX.sym("xi_hat", 2), ca.SX.sym("z", 2)

@@ -29,7 +29,6 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     Parameters
     ----------
     tires : k pairs of axles; their covariance is that before.
-    motion : of m steerings on them.
     v_x : speed [m/s].
     """
     ladder, numbers = np.array(tires.method.ladder), tires.method.regression
@@ -69,7 +68,6 @@ def asked(tires: PlausibleTires, v_x: float) -> Doubt:
 
     Parameters
     ----------
-    tires : k pairs of axles.
     v_x : speed [m/s].
     """
     ladder = np.array(tires.method.ladder)
@@ -84,7 +82,6 @@ def deviation(doubt: Doubt, P: Array) -> Array:
 
     Parameters
     ----------
-    doubt : where.
     P : covariances (..., 2, q, q).
     """
     n = doubt.units.shape[-1]
@@ -98,7 +95,6 @@ def expected_error(tires: PlausibleTires, doubt: Doubt, P: Array) -> Array:
 
     Parameters
     ----------
-    doubt : where the curves are asked.
     P : covariances (..., 2, q, q).
     """
     relative = deviation(doubt, P) / tires.grip[0][:, None]

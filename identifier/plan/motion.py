@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.slip import SHORTEST, SwayNumbers
+from identifier.axle.slip import SHORTEST
 from identifier.plan.tires import PlausibleTires
 from models.vehicle import GRAVITY
 
@@ -65,7 +65,6 @@ def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
 
     Parameters
     ----------
-    tires : k pairs of axles.
     v_x : speed [m/s].
     """
     car, omega = tires.vehicle, HOLD / tires.vehicle.froude_time
@@ -124,11 +123,8 @@ def simulate(
 
     Parameters
     ----------
-    tires : k pairs of axles.
     planned : angles asked of the front wheels at steps of `time_step` [rad], (n, m).
     v_x : speed [m/s].
-    entry : of each steering.
-    hold : how the course of the first car is held.
     guide : what is planned follows it; None plans the angles as they are.
     """
     car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)
@@ -140,7 +136,7 @@ def simulate(
     loads = np.array(car.axle_loads)
     to_v, to_r = loads / car.mass, np.array([car.l_f, -car.l_r]) * loads / car.yaw_inertia
     arm = np.array([car.l_f, -car.l_r])[:, None, None]
-    stiffness, damping, soft, *_ = SwayNumbers(*tires.method.sway.numbers())
+    stiffness, damping, soft, *_ = tires.method.sway.numbers()
     shortest = SHORTEST * car.wheelbase
     lanes, axles = np.zeros((m, k)), np.zeros((2, m, k))
     v_y = r = rho = rho_dot = asked = delta = lanes

@@ -71,15 +71,7 @@ class Rehearsal(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What to drive, and what it is expected to teach.
-
-    Parameters
-    ----------
-    tires : what the car may have, as known before.
-    space : where and how.
-    passes : in the order in which they are driven.
-    rivals : slalom and random steering, of the same length.
-    """
+    """What to drive, and what it is expected to teach."""
 
     tires: PlausibleTires
     space: Space
@@ -119,10 +111,6 @@ class Plan:
     def rehearsed(self, plant: Plant) -> tuple[Rehearsal, ...]:
         """Return how another car drives each pass: one whose tires need not be as planned.
 
-        Parameters
-        ----------
-        plant : the car.
-
         Raises
         ------
         PlantError
@@ -151,13 +139,7 @@ class Plan:
 
 
 def longest_pass(tires: PlausibleTires, space: Space) -> float:
-    """Return how long a pass may last [s]: inf where the car can turn inside the area.
-
-    Parameters
-    ----------
-    tires : that the car may have.
-    space : where and how.
-    """
+    """Return how long a pass may last [s]: inf where the car can turn inside the area."""
     body = body_of(tires)
     slippery = float(tires.grip.min(axis=1).min())
     radius = space.speed**2 / (TURNS * space.share * slippery * GRAVITY)
@@ -181,9 +163,7 @@ def make_plan(
     ----------
     tires : that the car may have, under static loads; the plan's are those under the loads of its
         speed.
-    space : where and how.
     time : of all passes together [s].
-    rng : source of randomness of the search.
     progress : called with the share that is done.
 
     Raises
@@ -209,7 +189,12 @@ def make_plan(
     longest = longest_pass(tires, space)
     needed = FEWEST * swing_time(tires, space)
     if min(longest, time) < needed:
-        raise PlanError(_too_small(tires, space, min(longest, time), needed))
+        if longest >= needed:
+            raise PlanError(
+                f"{needed:.2g} s are needed to steer three times at {space.speed:g} m/s, "
+                f"the time is {time:g}"
+            )
+        raise PlanError(_too_small(tires, space, longest, needed))
     count = max(1, math.ceil(time / longest))
     if count > MOST_PASSES:
         raise PlanError(
@@ -251,7 +236,6 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
 
     Parameters
     ----------
-    tires : that the car may have.
     space : speed and share; its sides are not looked at.
     of : the maneuver by its amplitude.
     """
@@ -288,7 +272,6 @@ def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
     Parameters
     ----------
     duration : [s].
-    seed : of the swings.
     """
     f = 1.5 * SLALOM / vehicle.froude_time
     return lambda amplitude: RandomSteer(
@@ -334,7 +317,6 @@ def free_motion(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
 
     Parameters
     ----------
-    tires : k pairs of axles.
     delta : angles of the front wheels at steps of the simulation [rad], (n, m).
     v_x : speed [m/s].
     """

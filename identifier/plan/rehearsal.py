@@ -25,11 +25,7 @@ def rehearse(
 
     Parameters
     ----------
-    plant : the car.
-    steering : as planned.
-    course : of the maneuver, as planned.
     speed : [m/s].
-    hold : how the course is held.
 
     Returns
     -------

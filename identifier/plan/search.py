@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.plan.information import asked, covariance_after, expected_error
 from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, hold_of, simulate, steps_of
 from identifier.plan.tires import PlausibleTires
@@ -42,7 +43,7 @@ LARGEST_HEADING = math.radians(60.0)  # at the entry
 FEWEST, MOST = 3, 14  # changes of the angle; where a pass has more, they are driven mirrored
 
 
-class PlanError(ValueError):
+class PlanError(TireidError, ValueError):
     """No maneuver is possible as asked; the message says what would be."""
 
 
@@ -109,8 +110,6 @@ def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> A
 
     Parameters
     ----------
-    space : the area.
-    body : the car.
     X, Y, psi : center of gravity [m] and heading [rad] over time, (n, ...).
     """
     c, s = np.cos(psi), np.sin(psi)
@@ -128,11 +127,6 @@ def swing_time(tires: PlausibleTires, space: Space) -> float:
 
     Soft tires need large angles: as long as a half cosine takes, at the limit of the steering rate,
     from the slip of the wanted share of the grip to the same slip on the other side.
-
-    Parameters
-    ----------
-    tires : that the car may have.
-    space : where and how hard.
     """
     across = math.pi * float(tires.slip_at(space.share)[0, 0]) / space.rate_limit
     return max(SWING * tires.vehicle.froude_time, across)
@@ -192,8 +186,6 @@ class Search:
 
     Parameters
     ----------
-    tires : that the car may have.
-    space : where and how.
     duration : of the pass [s].
     guided : along the middle of the area; else the way is free, as where a car can turn inside.
     """
@@ -255,12 +247,7 @@ class Search:
         return Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
 
     def costs(self, numbers: Array) -> Array:
-        """Return the expected error of steerings, more than 1 where they are not possible, (m,).
-
-        Parameters
-        ----------
-        numbers : as of `steerings`, (m, N + 2).
-        """
+        """Return the expected error of steerings, more than 1 where they are not possible, (m,)."""
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
         cost = 1.0 + self.violation(motion)
@@ -303,11 +290,8 @@ class Search:
         return self.space.margin - 1e-6 - edge_distance(self.space, body_of(self.tires), *way)
 
     def beginnings(self, rng: np.random.Generator) -> Array:
-        """Return numbers to begin with, swings to the left and the right of all sizes, (m, N + 2).
-
-        Parameters
-        ----------
-        rng : source of randomness.
+        """Return numbers to begin with, swings to the left and the right of all sizes, (m, N +
+        2).
         """
         N = self.swings
         size = np.exp(rng.uniform(math.log(0.05), 0.0, (POPULATION, 1)))
@@ -324,7 +308,6 @@ class Search:
 
         Parameters
         ----------
-        rng : source of randomness.
         progress : called with the share of the generations.
 
         Raises
@@ -368,12 +351,7 @@ class Search:
         return self.as_pass(np.array([found.x]))
 
     def as_pass(self, numbers: Array) -> Pass:
-        """Return the pass that numbers stand for.
-
-        Parameters
-        ----------
-        numbers : as of `steerings`, (1, N + 2).
-        """
+        """Return the pass that numbers stand for."""
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
         P = covariance_after(self.tires, motion, self.space.speed)

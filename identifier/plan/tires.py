@@ -33,7 +33,6 @@ def steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
 
     Parameters
     ----------
-    vehicle : the car.
     told : of the steering that drives it; None takes that of its chassis, or else 0.04.
     """
     if told is not None:
@@ -47,8 +46,6 @@ class PlausibleTires:
 
     Parameters
     ----------
-    vehicle : the car, as it is told.
-    method : that is to learn.
     W : weights [static axle loads], (k, 2, n).
     steering_lag : of the front wheels behind what is asked of them [s], (k,).
     own : compliance [m per load], sway share [-], offset (2, 3), of all.
@@ -71,7 +68,6 @@ class PlausibleTires:
         Parameters
         ----------
         friction : believed of tires and road [-].
-        steering_lag : see `steering_lag_of`.
         """
         method = AxleIdentifier.for_vehicle(vehicle)
         method = replace(method, prior=replace(method.prior, friction=friction))
@@ -109,14 +105,7 @@ class PlausibleTires:
     def learnt(
         cls, model: AxleModel, rng: np.random.Generator, *, steering_lag: float | None = None
     ) -> Self:
-        """Return the tires that a car may have of which a model was learnt.
-
-        Parameters
-        ----------
-        model : the car's.
-        rng : source of the curves that are drawn.
-        steering_lag : see `steering_lag_of`.
-        """
+        """Return the tires that a car may have of which a model was learnt."""
         drawn = model.samples(DRAWN, rng)
         late = 1.0 + SPREAD * np.array([0.0, *np.resize([-1.0, 1.0], DRAWN)])
         return cls(

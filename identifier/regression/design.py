@@ -42,11 +42,9 @@ class RegressionIdentifier(Method):
     W_max : radius of the projection of W, Frobenius norm [U].
     law : one of `LAWS`.
     memory : number of pairs that concurrent learning keeps.
-    network : structure of the network.
     dt : sampling interval T_s [s].
     force_unit : the unit U of forces inside the identifier [N].
     min_speed : below this speed [m/s] learning rests and forces read zero.
-    seed : seed of the hidden layer.
 
     Raises
     ------
@@ -101,7 +99,6 @@ class RegressionIdentifier(Method):
         network : structure; None takes `natural_network`.
         memory : number of pairs that concurrent learning keeps, twice the hidden units or so.
         dt : sampling interval [s].
-        seed : seed of the hidden layer.
         """
         time = vehicle.froude_time
         unit = natural_force_unit(vehicle.mass)
@@ -149,7 +146,6 @@ class RegressionIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : weights to begin with, hidden layer and all; None begins at the linear tire.
 
         Raises

@@ -22,9 +22,7 @@ def exponential(P: Any, s: Any, keep: Any, bound: Any) -> Any:
     Parameters
     ----------
     P : after the pair (n_h, n_h).
-    s : not read.
     keep : exp(-λ T).
-    bound : not read.
     """
     del s, bound
     return P / keep
@@ -36,7 +34,6 @@ def bounded_trace(P: Any, s: Any, keep: Any, bound: Any) -> Any:
     Parameters
     ----------
     P : after the pair (n_h, n_h).
-    s : not read.
     keep : exp(-λ T).
     bound : largest trace [1/s].
     """
@@ -136,7 +133,6 @@ def filtered_pair(
 
     Parameters
     ----------
-    lags : carried from the sample before.
     fresh : not zero where nothing was carried: the filters then begin here, at y = 0 and s = 0.
     xi : axle impulse (2,) [U s].
     b : rate of ξ that is known, A_ξ ξ + B_ξ u (2,) [U].
@@ -197,7 +193,6 @@ def remember(memory: Memory, pair: Pair, *, weight: Any, ridge: Any, allowed: An
     Parameters
     ----------
     memory : S and Z.
-    pair : s and y.
     weight : what one pair counts for, ω [s].
     ridge : δ [s].
     allowed : zero where nothing may be stored.
@@ -269,7 +264,6 @@ def start_squares(n_h: int, memory: int, ridge: float) -> dict[str, Array]:
     Parameters
     ----------
     n_h : number of hidden units.
-    memory : not read.
     ridge : δ [s].
     """
     del memory
@@ -285,10 +279,8 @@ def update_squares(
     ----------
     state : P.
     weights : W now; what W was at the start is in it already.
-    pair : s and y.
     numbers : of the law; the learning rate is not read.
     ahead : T_s [s], or 0 where learning rests.
-    forget : the way of forgetting.
     """
     P, W, (s, y) = state["P"], weights.now, pair
     gain = ahead * P @ s / (1 + ahead * s.T @ P @ s)
@@ -299,12 +291,7 @@ def update_squares(
 
 
 def least_squares(forget: Forgetting) -> Law:
-    """Return the law.
-
-    Parameters
-    ----------
-    forget : the way of forgetting.
-    """
+    """Return the law."""
     return Law(start=start_squares, update=partial(update_squares, forget=forget))
 
 
@@ -343,7 +330,6 @@ def newton(weights: Weights, Omega: Any, Y: Any, ridge: Any, share: Any) -> Any:
     Omega : information (n_h, n_h).
     Y : (2, n_h).
     ridge : δ, positive: Ω + δ I is then positive definite.
-    share : of the way to the minimum.
     """
     W, W_0 = weights
     minimum = solve_definite(Omega + ridge * ca.SX.eye(Omega.shape[0]), (Y + ridge * W_0).T).T
@@ -364,8 +350,6 @@ def start_averages(n_h: int, memory: int, ridge: float) -> dict[str, Array]:
     Parameters
     ----------
     n_h : number of hidden units.
-    memory : not read.
-    ridge : not read.
     """
     del memory, ridge
     return {"Omega": np.zeros((n_h, n_h)), "Y": np.zeros((2, n_h))}
@@ -380,10 +364,7 @@ def update_averages(
     ----------
     state : Omega and Y.
     weights : W now and at the start.
-    pair : s and y.
-    numbers : of the law.
     ahead : T_s [s], or 0 where learning rests.
-    descent : the way down the cost.
     """
     keep, share = ca.exp(-numbers.forgetting * ahead), 1 - ca.exp(-numbers.learning_rate * ahead)
     Omega = symmetric(keep * state["Omega"] + ahead * pair.s @ pair.s.T)
@@ -415,7 +396,6 @@ def start_memory(n_h: int, memory: int, ridge: float) -> dict[str, Array]:
     ----------
     n_h : number of hidden units.
     memory : number of places M.
-    ridge : not read.
     """
     del ridge
     return {"S": np.zeros((n_h, memory)), "Z": np.zeros((2, memory))}
@@ -430,10 +410,8 @@ def update_memory(
     ----------
     state : S and Z.
     weights : W now and at the start.
-    pair : s and y.
     numbers : of the law; the forgetting is the rate at which the weight of a stored pair fades.
     ahead : T_s [s], or 0 where learning rests.
-    descent : the way down the cost.
     """
     weight, fade = 1 / numbers.filter_rate, ca.exp(-numbers.forgetting * ahead / 2)
     S, Z = fade * state["S"], fade * state["Z"]

@@ -43,8 +43,6 @@ class Structure:
 
     Parameters
     ----------
-    network : structure of the network.
-    law : name of the law.
     memory : number of pairs that concurrent learning keeps.
     """
 
@@ -59,12 +57,7 @@ class Structure:
 
 
 def build_step(structure: Structure) -> ca.Function:
-    """Return the step; vehicle, numbers and sampling stay inputs of it.
-
-    Parameters
-    ----------
-    structure : network, law and size of the memory.
-    """
+    """Return the step; vehicle, numbers and sampling stay inputs of it."""
     network, law = structure.network, LAWS[structure.law]
     n_h, n_in = network.hidden, len(network.inputs)
     W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)

@@ -32,7 +32,6 @@ class LoopAlongRun:
     gain : largest eigenvalue of the loop gain (n,).
     radius : spectral radius of the sampled loop without leakage (n,); above one it is unstable,
         one where nothing is learnt.
-    strongest : index of the sample with the largest gain.
     margin : sampled gain margin there [-].
     """
 
@@ -47,11 +46,6 @@ def loop_along(history: History, design: PaperIdentifier) -> LoopAlongRun:
     """Evaluate the loop at the regressors and weights of a run.
 
     The network's input is taken from the measured state, which the estimate follows closely.
-
-    Parameters
-    ----------
-    history : a run that did not diverge.
-    design : the design that ran.
     """
     recording = history.recording
     moving = recording.v_x >= design.min_speed
@@ -84,7 +78,6 @@ def network_inputs(history: History, design: PaperIdentifier) -> Array:
     Parameters
     ----------
     history : a run; samples below the minimum speed count as driven at it.
-    design : the design that ran.
     """
     recording, network = history.recording, design.network
     x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")

@@ -87,12 +87,7 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
 
 
 def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
-    """Gain margin in continuous time and sampled, phase margin, damping.
-
-    Parameters
-    ----------
-    loop : the loop at the worst regressor.
-    """
+    """Gain margin in continuous time and sampled, phase margin, damping."""
     phase = phase_margin(loop, operation.step, operation.dt)
     damping = worst_damping(loop)
     return [

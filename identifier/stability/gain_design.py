@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from codegen.errors import TireidError
 from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
 from identifier.stability.loop import root
@@ -35,7 +36,7 @@ LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag thro
 FASTEST = 0.2  # largest a dt
 
 
-class DesignError(ValueError):
+class DesignError(TireidError, ValueError):
     """What is asked of the gains cannot be had at this sampling interval."""
 
 
@@ -46,7 +47,6 @@ class GainDesign:
     Parameters
     ----------
     gains : of (8) to (12).
-    loop_gain : g at the worst regressor.
     bounds : proven bounds of |ξ̃| and |W_hat|.
     V_max : bound on |V_hat|, kept by ρ_V.
     """
@@ -137,7 +137,6 @@ def design_gains(
     bandwidth : highest frequency of steering that matters [Hz].
     dt : sampling interval T_s [s].
     n_h : hidden units.
-    x_bar_max : bound on |x_bar|.
     disturbance : what acts on the error, for the proven bounds.
     needed_force : that the network is expected to hold [U].
     V_max : wanted bound on |V_hat|, at least its initial norm.
@@ -245,7 +244,6 @@ def leakage(gains: Gains, known: Operation) -> Gains:
     Parameters
     ----------
     gains : of `design_gains`.
-    known : where the design runs.
     """
     del known
     return gains
@@ -257,7 +255,6 @@ def dead_zone(gains: Gains, known: Operation) -> Gains:
     Parameters
     ----------
     gains : of `design_gains`.
-    known : where the design runs.
     """
     return replace(gains, W_free=known.W_large, V_free=known.V_start)
 
@@ -268,7 +265,6 @@ def projection(gains: Gains, known: Operation) -> Gains:
     Parameters
     ----------
     gains : of `design_gains`.
-    known : where the design runs.
     """
     return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)
 

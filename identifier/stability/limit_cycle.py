@@ -23,12 +23,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from codegen.errors import TireidError
 from identifier.stability.limits import integral_euler_limit, integral_limit
 from identifier.stability.loop import root
 from models.rules import require_positive
 
 
-class NoLimitCycleError(ValueError):
+class NoLimitCycleError(TireidError, ValueError):
     """The gain is within its limit, or no leakage can hold it."""
 
 

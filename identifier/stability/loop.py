@@ -221,7 +221,6 @@ def worst_gain(
     eta_W : learning rate of (11).
     eta_V : learning rate of (12).
     n_h : hidden units; |s|² <= n_h.
-    x_bar_max : bound on |x_bar|.
     W_max : bound on |W| (Frobenius) [U]; needed where V learns.
 
     Raises
@@ -301,7 +300,6 @@ def root(
     Parameters
     ----------
     f : continuous, of other sign at either end.
-    low, high : ends.
     xtol, rtol : how near it must be, absolute and over its size.
 
     Raises

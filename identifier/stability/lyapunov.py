@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.paper.laws import NotHurwitzError
 
 
-class LyapunovError(ValueError):
+class LyapunovError(TireidError, ValueError):
     """P does not solve the Lyapunov equation, or Q or P is not positive definite."""
 
 

@@ -126,8 +126,6 @@ def within(vehicle: Vehicle, drives: Drives, driving: Driving, dt: float) -> NDA
 
     Parameters
     ----------
-    drives : what it drove.
-    driving : what was declared.
     dt : sampling interval [s].
     """
     most, rates = declared_signals(vehicle, driving), largest_steering_rate(vehicle, driving)
@@ -148,11 +146,6 @@ def measured(drives: Drives, driving: Driving, rng: np.random.Generator) -> Driv
 
     On each drive their errors are white, or as large as declared with a sign that stays, that
     turns at every sample, or that turns at random.
-
-    Parameters
-    ----------
-    drives : the true signals.
-    driving : what was declared.
     """
     count, n = drives.v_x.shape
     kind = np.asarray(rng.integers(0, 4, count))[:, None, None]
@@ -174,7 +167,6 @@ def residuals(vehicle: Vehicle, drives: Drives, dt: float) -> Array:
 
     Parameters
     ----------
-    vehicle : the car, whose linear tire is taken off.
     dt : sampling interval [s].
     """
     model = bicycle(vehicle.bicycle, 1.0)
@@ -292,8 +284,6 @@ def monte_carlo(
 
     Parameters
     ----------
-    vehicle : the car as the identifier is told of it, and as it drives.
-    driving : the declared conditions.
     count : number of drives N.
     beginning : largest first weights; every second drive resumes with some W.
     rng : source of roads, steering, noise and initial weights.
@@ -339,7 +329,6 @@ def first_weights(
     Parameters
     ----------
     count : number of drives N.
-    beginning : largest weights.
     """
     V = np.stack([design.network.initial_weights(rng).V for _ in range(count)])
     W = rng.standard_normal((count, 2, design.network.hidden))
@@ -357,7 +346,6 @@ def largest_norms(
     Parameters
     ----------
     drives : as measured; the observer begins at the first sample.
-    weights : of each drive to begin with.
     """
     count, n = drives.v_x.shape
     K_inv = np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv)) / design.force_unit

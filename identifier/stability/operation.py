@@ -133,7 +133,6 @@ class Proven:
     V : bound on |V_hat| [-].
     leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no
         bound is proven.
-    leakage_step_V : the same of V.
     """
 
     leakage: SampledBounds | None
@@ -372,12 +371,7 @@ def largest_signals(
 
 
 def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
-    """Bound of every signal over the whole range of speeds, SI.
-
-    Parameters
-    ----------
-    driving : how hard it is driven.
-    """
+    """Bound of every signal over the whole range of speeds, SI."""
     at = {"slip": driving.slip, "friction": driving.friction}
     speeds = [(1.0 + share) * driving.v_x for share in (-SPEED_SPREAD, SPEED_SPREAD)]
     slow, fast = (largest_signals(vehicle, v_x=v_x, **at) for v_x in speeds)
@@ -385,12 +379,7 @@ def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
 
 
 def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, float]:
-    """Bound of |δ_f'| and |δ_r'|: 2 π bandwidth times the largest angle [rad/s].
-
-    Parameters
-    ----------
-    driving : how hard it is driven.
-    """
+    """Bound of |δ_f'| and |δ_r'|: 2 π bandwidth times the largest angle [rad/s]."""
     signals, omega = declared_signals(vehicle, driving), 2.0 * math.pi * driving.bandwidth
     return omega * signals["delta_f"], omega * signals["delta_r"]
 
@@ -429,7 +418,6 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
 
     Parameters
     ----------
-    driving : how hard it is driven.
     dt : sampling interval [s].
     unit : force unit U [N].
     """
@@ -465,13 +453,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
 
 
 def largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
-    """Bound on |x_bar| [-], noise of the sensors in it.
-
-    Parameters
-    ----------
-    design : its network.
-    driving : how hard it is driven.
-    """
+    """Bound on |x_bar| [-], noise of the sensors in it."""
     signals, slow = declared_signals(vehicle, driving), (1.0 - SPEED_SPREAD) * driving.v_x
     sideways = driving.noise_v_y + vehicle.wheelbase * driving.noise_r
     speed = driving.noise_v_x * (signals["v_y"] + vehicle.wheelbase * signals["r"]) / slow
@@ -495,7 +477,6 @@ def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> floa
 
     Parameters
     ----------
-    design : its network.
     driving : how hard it is driven; the slowest speed counts.
     """
     slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x
@@ -513,11 +494,6 @@ def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
     (14) is given what holds for sure: the ideal weights W = 0, that leave all of f as w_bar. The V
     layer is judged up to twice the smallest weights that hold the expected residual with every
     unit saturated: units half open.
-
-    Parameters
-    ----------
-    design : network, step and input source.
-    driving : how hard it is driven.
     """
     found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
     expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)

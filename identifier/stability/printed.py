@@ -104,7 +104,6 @@ def k_b_with_V(
     A_d : (2, 2) error dynamics [1/s].
     W_M : bound on the ideal W (Frobenius) [U].
     V_M : bound on the ideal V (Frobenius) [-].
-    x_bar_max : bound on |x_bar|.
     eta_V : learning rate of (12).
     rho_V : leakage gain of (12) [1/(U s²)].
     weight : c > 0.

@@ -247,7 +247,6 @@ def by_leakage(
     error : of `error_gains`.
     learning : of `output_layer`.
     A_d : (2, 2) error dynamics [1/s].
-    acting : what acts from outside.
     n_h : hidden units.
     """
 
@@ -286,7 +285,6 @@ def by_projection(
     ----------
     error : of `error_gains`.
     A_d : (2, 2) error dynamics [1/s].
-    acting : what acts from outside.
     n_h : hidden units.
     W_max : radius of the projection (Frobenius) [U].
     """

@@ -5,7 +5,7 @@ from identifier.verdict.friction import Road, RoadFriction, road_friction
 from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
 from identifier.verdict.judging import judge, judge_prediction
 from identifier.verdict.online_bound import OnlineBound
-from identifier.verdict.verdict import Number, Objection, Verdict
+from identifier.verdict.verdict import Number, Objection, Verdict, WindowForces
 
 __all__ = [
     "BoundViolatedError",
@@ -15,6 +15,7 @@ __all__ = [
     "Road",
     "RoadFriction",
     "Verdict",
+    "WindowForces",
     "calibrated",
     "contradictions",
     "guaranteed",

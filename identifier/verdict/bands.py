@@ -30,6 +30,7 @@ from identifier.axle.band import (
 from identifier.axle.learning import Regression
 from identifier.run import History
 from identifier.tire_model import TireModel
+from identifier.verdict.judging import judge
 from identifier.verdict.motion import Evidence, Windows, evidence, modelled_force
 from identifier.verdict.parts import asked_run, taught_elsewhere
 from models.recordings import Recording
@@ -47,12 +48,6 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
 
     White noise of the sensors is added to the band. None where the model has none, or too little
     is driven.
-
-    Parameters
-    ----------
-    model : that is asked.
-    recording : the drive.
-    level : of the band.
     """
     recording = portion(recording).recording
     half = model.half_band_of_curves(recording, level)
@@ -91,7 +86,6 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
 
     Parameters
     ----------
-    history : the run.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -103,6 +97,9 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     ValueError
         Where the recording begins after that time.
     """
+    if history.design.whole:
+        share = judge(history, t).force_missed
+        return history.freeze(t).with_calibration(None, None if share is None else np.array(share))
     run = asked_run(history, t)
     model, recording = run.model, run.portion.recording
     if not model.has_band:
@@ -128,7 +125,10 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
         for into, values in zip(missed[:-1], asked_of, strict=True):
             into[..., mine, :] = values[..., mine, :]
     told = replace(told, noise=sensor_noise(recording, model.vehicle))
-    return model.with_calibration(calibration(missed, found.noise, found.windows, told))
+    judged, _ = found.but_a_stretch()
+    return model.with_calibration(
+        calibration(missed, found.noise, found.windows, told), judged.missed
+    )
 
 
 def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
@@ -144,9 +144,7 @@ def calibration(
 
     Parameters
     ----------
-    missed : the errors.
     noise : variance of the sensors' white noise in them (2,).
-    windows : where they are.
     told : what else is kept of the drive, and factors of an axle that has too few windows.
     """
     factors, speeds = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
@@ -207,7 +205,6 @@ def color_of(error: Array, windows: Windows) -> float:
     Parameters
     ----------
     error : of the windows, nan where nothing was asked (m,).
-    windows : where they are.
     """
     step = max(1, windows.n // 2)
     place = np.round(windows.starts / step).astype(np.intp)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.band import LEVEL, normal_quantile
+from identifier.measured import with_doubt
 from identifier.tire_model import GRIP, TireModel
 from identifier.verdict.motion import evidence, modelled_force
 from models.recordings import Recording
@@ -60,8 +61,8 @@ class Road(NamedTuple):
     def text(self) -> str:
         """The stretch in words."""
         return (
-            f"from {self.first:.4g} to {self.last:.4g} s the road has {self.ratio:.2f} ± "
-            f"{self.sd:.2f} of the friction of the drive that taught"
+            f"from {self.first:.4g} to {self.last:.4g} s the road has "
+            f"{with_doubt(self.ratio, self.sd)} of the friction of the drive that taught"
         )
 
 
@@ -112,20 +113,18 @@ def road_friction(
 ) -> RoadFriction | None:
     """Return the friction of a drive's road; None where nobody can tell.
 
-    Nobody can of a model without a band, and of a drive of fewer than eight brisk windows. More
-    friction is told of a model alone that learnt its grip. Of a long drive those parts are asked
-    that the verdict asks.
+    Nobody can of a model without a calibrated band, and of a drive of fewer than eight brisk
+    windows. More friction is told of a model alone that learnt its grip. Of a long drive those
+    parts are asked that the verdict asks.
 
     Parameters
     ----------
-    model : frozen, of another drive.
-    recording : the drive.
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """
     asked = portion(recording)
     band = model.half_band_of_curves(asked.recording)
-    if band is None:
+    if band is None or not model.band_calibrated:
         return None
     found = evidence(model, asked.recording, road)
     if found is None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.axle.guarantee import (
     ForceBound,
     Guarantee,
@@ -31,10 +32,11 @@ from models.recordings import Recording
 OVERLAPPING = 4  # moments that begin within the length of one
 RESERVE = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
 OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
+SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
 OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
-class BoundViolatedError(ValueError):
+class BoundViolatedError(TireidError, ValueError):
     """No tire's curve keeps the bound that was told: the drive contradicts it."""
 
 
@@ -47,7 +49,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     Parameters
     ----------
     model : frozen; its lag, sway and offsets make the slip.
-    recording : the drive.
     road : what a banked road pushes to the left at each sample [weights], (n,); None unknown.
     """
     if recording.logged_v_y is None:
@@ -80,12 +81,7 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
 
 
 def least_speed(model: TireModel) -> float:
-    """Return the speed [m/s] from which a moment counts.
-
-    Parameters
-    ----------
-    model : of the car.
-    """
+    """Return the speed [m/s] from which a moment counts."""
     return max(model.min_speed, BRISK * model.vehicle.froude_speed)
 
 
@@ -116,7 +112,6 @@ def guaranteed(
 
     Parameters
     ----------
-    history : the run.
     bound : of the errors: their size [static axle loads] of both axles, or a `ForceBound`; None
         estimates it from the drive.
     t : time of the freeze in the recording's own clock [s]; None is the end.
@@ -155,18 +150,21 @@ def guaranteed(
         told=told is not None,
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
+        fastest=fastest(strips),
     )
     return carries.with_guarantee(guarantee)
 
 
-def estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:
-    """Return the bound that a drive tells: the least that any curve keeps, with a reserve.
-
-    Parameters
-    ----------
-    strips : of the drive.
-    box : what any tire keeps.
+def fastest(strips: Strips) -> tuple[float, float]:
+    """Return the largest rate of the force that a drive shows, of both axles [static axle
+    loads/s].
     """
+    front, rear = np.maximum(strips.rate.max(axis=0), SLOWEST)
+    return float(front), float(rear)
+
+
+def estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:
+    """Return the bound that a drive tells: the least that any curve keeps, with a reserve."""
     (e_f, tau_f), (e_r, tau_r) = (least_bound(strips, axle, box) for axle in range(2))
     return ForceBound(
         error=(RESERVE * (e_f + OVER_ERROR), RESERVE * (e_r + OVER_ERROR)),
@@ -198,12 +196,6 @@ def contradictions(
 
     Times [s], (m,), and (m, 2). One is enough: other tires, another road, or a sensor that is
     wrong. None where the model has no guarantee, or too little is driven.
-
-    Parameters
-    ----------
-    model : with a guaranteed band.
-    recording : the drive, with a lateral velocity.
-    road : as of `strips_of`.
     """
     if model.guarantee is None:
         return None

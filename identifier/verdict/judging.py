@@ -4,7 +4,6 @@ A drive that did not teach the model is the judge proper. Of its own drive the s
 that it counts there together with what the drive left undecided.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -15,15 +14,23 @@ from codegen.arrays import Array
 from identifier.estimate.drive import Drive
 from identifier.reproducibility import beyond_known, motion_error
 from identifier.run import History, state_index
-from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Reached, TireModel
+from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.verdict.friction import RoadFriction, road_friction
 from identifier.verdict.motion import FEWEST, WINDOW, Evidence, evidence, lateral_noise
-from identifier.verdict.verdict import WITHOUT_V_Y, Number, Objection, Verdict
+from identifier.verdict.verdict import (
+    MOST_MISSED,
+    PERCENT,
+    WITHOUT_V_Y,
+    Number,
+    Objection,
+    Verdict,
+    WindowForces,
+)
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
 from models.vehicle import GRAVITY, Vehicle
 
-PERCENT = 100.0
+SECANT = 0.01  # rad, to which the slope of a curve is taken: play makes none at zero
 ROADS = 3  # segments of another friction that are listed one by one
 
 
@@ -33,9 +40,7 @@ class Rules:
 
     Parameters
     ----------
-    missed : share of the force, rms, that a model may miss at an axle of a drive that it is asked
-        about [-].
-    missed_own : the same of the drive that taught it [-].
+    missed : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
     doubt : standard deviation of the curve over the prior's, where the force is [-].
     stiffness : that tires have, over the static load [1/rad].
@@ -43,8 +48,7 @@ class Rules:
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
-    missed: float = 0.12
-    missed_own: float = 0.12
+    missed: float = MOST_MISSED
     force: float = 0.1
     doubt: float = 0.5
     stiffness: tuple[float, float] = (2.0, 100.0)
@@ -56,12 +60,17 @@ RULES = Rules()
 
 
 class Asked(NamedTuple):
-    """A model and a drive: what of it is asked, what the model explains, whether it learnt there."""
+    """A model and a drive.
+
+    portion : what of the drive is asked.   found : what the model explains of it.   own : whether
+    the drive taught the model.   left_out : a segment that is not judged, from and to [s].
+    """
 
     model: TireModel
     portion: Portion
     found: Evidence
     own: bool
+    left_out: tuple[float, float] | None
 
     @property
     def recording(self) -> Recording:
@@ -79,7 +88,6 @@ def judge(history: History, t: float | None = None) -> Verdict:
 
     Parameters
     ----------
-    history : the run.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -96,7 +104,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
         return _too_short(model)
     state = {} if history.design.whole else history.state_at(end)
     reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
-    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached)], whole)
+    notes = [Objection(code, None, text, False) for code, text in model.notes]
+    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *notes], whole)
 
 
 def judge_prediction(
@@ -106,8 +115,6 @@ def judge_prediction(
 
     Parameters
     ----------
-    model : that learns nothing from it.
-    recording : the drive.
     another_road : whether the road may be another one than that which taught, and its friction is
         reported; of a drive that taught the model it is not.
     """
@@ -126,7 +133,17 @@ def _asked(
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model.vehicle))
-    return None if found is None else Asked(model, part, found, own)
+    if own and found is not None:
+        other = model.road_differs(recording.t[part.samples])
+        found = found.where(~other[found.windows.starts])
+    if found is None or len(found.windows) < FEWEST:
+        return None
+    judged, some = found.but_a_stretch()
+    left_out = None
+    if some is not None:
+        t, starts = recording.t[part.samples], found.windows.starts
+        left_out = float(t[starts[some[0]]]), float(t[starts[some[1] - 1] + found.windows.n])
+    return Asked(model, part, judged, own, left_out)
 
 
 def _road(recording: Recording, vehicle: Vehicle) -> Array | None:
@@ -138,7 +155,7 @@ def _road(recording: Recording, vehicle: Vehicle) -> Array | None:
 
 
 def _findings(asked: Asked) -> list[Objection]:
-    rules = (_v_y_stuck, _no_force, _missed, _unsure, _no_tire, _beyond, _turning)
+    rules = (_v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning)
     return [finding for rule in rules for finding in rule(asked)]
 
 
@@ -175,7 +192,7 @@ def _no_force(asked: Asked) -> Iterator[Objection]:
 
 
 def _missed(asked: Asked) -> Iterator[Objection]:
-    limit = RULES.missed_own if asked.own else RULES.missed
+    limit = RULES.missed
     for axle, missed, none in zip(AXLES, asked.found.missed, asked.forceless, strict=True):
         if not (missed <= limit or none):
             yield Objection(
@@ -185,6 +202,17 @@ def _missed(asked: Asked) -> Iterator[Objection]:
                 f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause",
                 True,
             )
+
+
+def _left_out(asked: Asked) -> Iterator[Objection]:
+    if asked.left_out is not None:
+        begin, end = asked.left_out
+        text = (
+            f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere it is (model "
+            f"error {PERCENT * float(asked.found.missed.max()):.0f} % of the force): a sensor that "
+            "had not settled, or a banked or slippery segment"
+        )
+        yield Objection("stretch", None, text, False)
 
 
 def _unsure(asked: Asked) -> Iterator[Objection]:
@@ -209,7 +237,8 @@ def _unsure(asked: Asked) -> Iterator[Objection]:
 
 
 def _no_tire(asked: Asked) -> Iterator[Objection]:
-    loads, stiffness = np.array(asked.model.vehicle.axle_loads), asked.model.stiffness
+    loads = np.array(asked.model.vehicle.axle_loads)
+    stiffness = asked.model.force_at(np.array([SECANT]))[0] / SECANT
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
@@ -297,18 +326,21 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
     missed = dict(zip(AXLES, found.missed, strict=True))
     numbers = tuple(
         Number(
-            *one._replace(sd=_doubt(one, float(missed[one.axle]))),
+            *one.with_missed(float(missed[one.axle])),
             valid=one.learnt and not refused & {None, one.axle},
         )
         for one in model.estimates()
     )
     blind = WITHOUT_V_Y if recording.logged_v_y is None else ()
+    clock, starts, n = whole.t[asked.portion.samples], found.windows.starts, found.windows.n
+    middle = 0.5 * (clock[starts] + clock[starts + n])
     return Verdict(
         findings=tuple(listed),
         numbers=numbers,
         measures=measures,
         reach=_reach(model, recording),
         blind=blind,
+        shown=WindowForces(middle, found.measured, found.modelled),
     )
 
 
@@ -323,13 +355,6 @@ def _reach(model: TireModel, recording: Recording) -> str:
     front, rear = np.degrees(known)
     slip = f"slip up to {front:.1f} / {rear:.1f} deg (front / rear)"
     return f"{speeds[0]:.3g} to {speeds[1]:.3g} m/s, {slip}"
-
-
-def _doubt(one: Estimate, missed: float) -> float | None:
-    """Return the standard deviation of a number: of a force, with the share that is missed of it."""
-    if one.sd is None or one.title not in (STIFFNESS, GRIP):
-        return one.sd
-    return math.hypot(one.sd, missed * one.value)
 
 
 def _pair(values: Array | None) -> tuple[float, ...] | None:

@@ -21,6 +21,9 @@ from models.vehicle import GRAVITY, Vehicle
 WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
+STRETCH = 0.3  # share of the windows that may be missed in one piece
+REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
+CONFINED = 0.6  # and of what is missed with the piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,9 +64,7 @@ class Windows:
         Parameters
         ----------
         counts : which samples do (n,).
-        recording : whose windows they are.
         length : of a window [s].
-        overlapping : windows that begin within a length.
         """
         n = max(2, round(length / recording.dt))
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
@@ -107,8 +108,6 @@ def measured_force(
     Parameters
     ----------
     recording : v_x, v_y and r; where no v_y was logged, a_y and r.
-    vehicle : mass, inertia and geometry.
-    windows : of the recording.
     road : what a banked road pushes to the left at each sample, taken off [weights], (n,); without
         v_y what the accelerometer shows beside forces; None where nobody knows of it.
     """
@@ -120,12 +119,7 @@ def measured_force(
 def impulse_signals(
     recording: Recording, vehicle: Vehicle, road: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return ξ (n, 2) [s] and v_x r/g without the road (n,): φ cos δ = dξ/dt + v_x r/g.
-
-    Parameters
-    ----------
-    recording, vehicle, road : as of `measured_force`.
-    """
+    """Return ξ (n, 2) [s] and v_x r/g without the road (n,): φ cos δ = dξ/dt + v_x r/g."""
     car = Car(*car_numbers(vehicle).T)
     v_y = recording.logged_v_y
     still = np.zeros(len(recording)) if v_y is None else v_y
@@ -135,27 +129,13 @@ def impulse_signals(
 
 
 def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:
-    """Return mean axle forces of a model over the same windows [static axle loads], (m, 2).
-
-    Parameters
-    ----------
-    model : frozen.
-    recording : its signals are the input.
-    windows : of the recording.
-    """
+    """Return mean axle forces of a model over the same windows [static axle loads], (m, 2)."""
     loads = np.array(model.vehicle.axle_loads)
     return windows.mean(model.axle_force(recording) / loads)
 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
-    """Return the variance that white noise of v_y and r leaves in `measured_force`, (2,).
-
-    Parameters
-    ----------
-    recording : with the noise.
-    vehicle : mass, inertia and geometry.
-    windows : of the recording.
-    """
+    """Return the variance that white noise of v_y and r leaves in `measured_force`, (2,)."""
     inertia = car_numbers(vehicle)[:, 2]
     v_y, turning = recording.logged_v_y, (inertia * white_noise(recording.r)) ** 2
     if v_y is None:
@@ -168,13 +148,7 @@ def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> 
 
 
 def lateral_noise(recording: Recording, windows: Windows) -> tuple[float, float]:
-    """Return the variance that white noise leaves in means of v̇_y + v_x r, and of a_y [m²/s⁴].
-
-    Parameters
-    ----------
-    recording : with v_y and a_y.
-    windows : of the recording.
-    """
+    """Return the variance that white noise leaves in means of v̇_y + v_x r, and of a_y [m²/s⁴]."""
     v_y, a_y = (white_noise(recording.needed(name)) for name in ("v_y", "a_y"))
     turning = float(np.mean(recording.v_x**2)) * white_noise(recording.r) ** 2 / windows.n
     return 2.0 * (v_y / windows.duration) ** 2 + turning, a_y**2 / windows.n
@@ -186,7 +160,6 @@ class Evidence:
 
     Parameters
     ----------
-    windows : where.
     measured, modelled : [static axle loads], (m, 2).
     noise : variance of white sensor noise in `measured` (2,).
     """
@@ -213,14 +186,8 @@ class Evidence:
         """Share of the measured force that is not explained, noise taken off, (2,)."""
         return clean_share(self.measured - self.modelled, self.measured, self.noise)
 
-    def without(self, first: int, last: int) -> "Evidence":
-        """Return the evidence without the windows from first to before last.
-
-        Parameters
-        ----------
-        first, last : among the windows.
-        """
-        kept = np.r_[0:first, last : len(self.windows)]
+    def where(self, kept: NDArray[np.bool_]) -> "Evidence":
+        """Return the evidence of some of the windows (m,)."""
         return replace(
             self,
             windows=replace(self.windows, starts=self.windows.starts[kept]),
@@ -228,12 +195,25 @@ class Evidence:
             modelled=self.modelled[kept],
         )
 
-    def worst_stretch(self, share: float) -> tuple[int, int]:
-        """Return the stretch of a share of the windows in which most is missed: first, past last.
+    def but_a_stretch(self) -> "tuple[Evidence, tuple[int, int] | None]":
+        """Return what a model is judged by, and which windows are left out of it: first, past last.
 
-        Parameters
-        ----------
-        share : of the windows.
+        One stretch may be missed, as before a sensor has settled, where all the rest is explained:
+        it is left out. None is where all is explained, or more than one stretch is missed.
+        """
+        if (self.missed <= REST_MISSED).all():
+            return self, None
+        first, last = self.worst_stretch(STRETCH)
+        place = np.arange(len(self.windows))
+        rest = self.where((place < first) | (place >= last))
+        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * self.missed.max())).all()
+        if len(rest.windows) >= FEWEST and confined:
+            return rest, (first, last)
+        return self, None
+
+    def worst_stretch(self, share: float) -> tuple[int, int]:
+        """Return the stretch of a share of the windows in which most is missed: first, past
+        last.
         """
         n = max(1, int(share * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
@@ -269,14 +249,7 @@ def clean_share(missed: Array, force: Array, noise: Array) -> Array:
 
 
 def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
-    """Return what a model explains of a drive; None where too little of it is driven.
-
-    Parameters
-    ----------
-    model : frozen.
-    recording : the drive.
-    road : as in `measured_force`.
-    """
+    """Return what a model explains of a drive; None where too little of it is driven."""
     vehicle = model.vehicle
     windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
     if len(windows) < FEWEST:

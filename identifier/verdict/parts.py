@@ -36,13 +36,7 @@ class AskedRun(NamedTuple):
     road: Array | None
 
     def taught(self, recording: Recording, vehicle: Vehicle) -> TireModel:
-        """Return what the run's method learns of another drive until the freeze.
-
-        Parameters
-        ----------
-        recording : of the portion's samples.
-        vehicle : the car, as the method knows it.
-        """
+        """Return what the run's method learns of another drive until the freeze."""
         return learn(recording, vehicle, self.history.design, self.history.start, self.until)
 
 
@@ -51,7 +45,6 @@ def asked_run(history: History, t: float | None = None) -> AskedRun:
 
     Parameters
     ----------
-    history : the run.
     t : time of the freeze in the recording's own clock [s]; None is the end.
 
     Raises
@@ -78,13 +71,7 @@ _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 
 def road_felt(history: History, asked: Portion) -> Array | None:
-    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown.
-
-    Parameters
-    ----------
-    history : the run.
-    asked : of its recording.
-    """
+    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
     pushes = []
     for block in history.blocks(asked.samples):
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
@@ -98,12 +85,7 @@ def road_felt(history: History, asked: Portion) -> Array | None:
 
 
 def without_v_y(asked: Portion) -> bool:
-    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows.
-
-    Parameters
-    ----------
-    asked : portion of a recording.
-    """
+    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows."""
     return asked.recording.logged_v_y is None
 
 
@@ -115,12 +97,6 @@ def taught_elsewhere(
     The parts follow one another and hold equal shares of the force (squared); in the one that is
     left out the car is made to stand, so that learning rests. There is none where there is no
     force.
-
-    Parameters
-    ----------
-    teach : returns the model that a drive teaches.
-    recording : the drive.
-    found : evidence of it.
     """
     windows = found.windows
     power = np.cumsum(np.sum(found.measured**2, axis=1))

@@ -4,8 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from codegen.arrays import Array
+from identifier.measured import NOT_IDENTIFIABLE, printed_value
 from identifier.tire_model import Axle
 from identifier.verdict.friction import RoadFriction
+
+MOST_MISSED = 0.12  # share of the force, rms, that the frozen model may miss at an axle
+PERCENT = 100.0
 
 UNSEEN = (
     "a wrong mass, which scales all forces alike: weigh the car",
@@ -57,11 +62,28 @@ class Number(NamedTuple):
     valid: bool
 
     @property
+    def words(self) -> str:
+        """Value and standard deviation in three digits, in the unit that is printed."""
+        return printed_value(self.value, self.sd, self.unit)
+
+    @property
     def state(self) -> str:
-        """What it is: "valid", "not valid", or "told, not learnt"."""
+        """What it is: "valid", "not valid", or "not identifiable from this drive"."""
         if not self.learnt:
-            return "told, not learnt"
+            return NOT_IDENTIFIABLE
         return "valid" if self.valid else "not valid"
+
+
+class WindowForces(NamedTuple):
+    """Forces over the windows that an answer is judged by [static axle loads].
+
+    t : middle of each window (m,) [s].   measured : mean force that the motion shows (m, 2).
+    modelled : that of the model (m, 2).
+    """
+
+    t: Array
+    measured: Array
+    modelled: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -77,6 +99,8 @@ class Verdict:
     blind : what more nobody can see of this drive.
     friction : of the drive's road over that of the drive that taught a stored model, window by
         window; None of a run, and where nobody can tell.
+    shown : what the motion shows and what the model says, window by window; None where too little
+        is driven.
     """
 
     findings: tuple[Objection, ...]
@@ -85,6 +109,7 @@ class Verdict:
     reach: str = ""
     blind: tuple[str, ...] = ()
     friction: RoadFriction | None = field(default=None, compare=False, repr=False)
+    shown: WindowForces | None = field(default=None, compare=False, repr=False)
 
     @property
     def valid(self) -> bool:
@@ -105,14 +130,35 @@ class Verdict:
         return f"verdict: NOT VALID, {self.against}"
 
     @property
+    def force_missed(self) -> tuple[float, ...] | None:
+        """Share [-] of the force that the motion shows which the model misses, front and rear.
+
+        None where too little is driven.
+        """
+        found = self.measures.get("force_missed")
+        return found if isinstance(found, tuple) else None
+
+    @property
+    def missed_line(self) -> str:
+        """The same in one line; empty where too little is driven."""
+        if self.force_missed is None:
+            return ""
+        front, rear = (f"{PERCENT * share:.1f}" for share in self.force_missed)
+        return (
+            f"missed of the force that the motion shows: {front} / {rear} % (front / rear, limit "
+            f"{PERCENT * MOST_MISSED:.0f} %)"
+        )
+
+    @property
     def unseen(self) -> tuple[str, ...]:
         """What nobody can see, a line each."""
         return tuple(f"not seen: {text}" for text in (*UNSEEN, *self.blind))
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Headline, a line for each finding, and what nobody can see."""
-        return (self.headline, *(finding.line for finding in self.findings), *self.unseen)
+        """Headline, what is missed, a line for each finding, and what nobody can see."""
+        missed = (self.missed_line,) if self.missed_line else ()
+        return (self.headline, *missed, *(one.line for one in self.findings), *self.unseen)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain numbers and words, ready for JSON."""

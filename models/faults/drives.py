@@ -164,12 +164,7 @@ class Bank:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Together:
-    """Several faults at once, one after the other in their order.
-
-    Parameters
-    ----------
-    faults : the first is nearest to the drive, the last to the log.
-    """
+    """Several faults at once, one after the other in their order."""
 
     faults: tuple[Fault, ...]
 
@@ -190,7 +185,6 @@ class Passing:
 
     Parameters
     ----------
-    fault : that does not change how long the recording is.
     until : time until which it is there in full [s], on the recording's clock.
     fade : how long it then takes to vanish, in a straight line [s].
 
@@ -240,7 +234,6 @@ class WrongNumber:
     Parameters
     ----------
     field : name of the number in `Vehicle`.
-    factor : told over true.
 
     Raises
     ------
@@ -311,12 +304,7 @@ class ShiftedCenter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnotherCar:
-    """Another car told than the one that drove: the file of a 1:10 car for one of two tons.
-
-    Parameters
-    ----------
-    told : that other car.
-    """
+    """Another car told than the one that drove: the file of a 1:10 car for one of two tons."""
 
     told: Vehicle
 

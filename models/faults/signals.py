@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
 from models.rules import require_positive
@@ -26,7 +27,7 @@ SPIKE_EVERY = 0.13  # s
 SPIKE_LASTS = 0.0098  # s: one sample at 100 Hz
 
 
-class FaultError(ValueError):
+class FaultError(TireidError, ValueError):
     """A fault breaks a rule; the message names the field, the rule and the value."""
 
 
@@ -34,12 +35,7 @@ class Fault(Protocol):
     """What is asked of a fault of a recording."""
 
     def apply(self, recording: Recording) -> Recording:
-        """Return what the log of the same drive holds with the fault.
-
-        Parameters
-        ----------
-        recording : the drive without it.
-        """
+        """Return what the log of the same drive holds with the fault."""
 
 
 def require_finite(fault: Any) -> None:
@@ -80,7 +76,6 @@ class SensorFault:
 
     Parameters
     ----------
-    channel : name of the signal.
     kind : one of `KINDS`: holds its value; shows 0; shows no number (NaN); has the other sign; is
         multiplied by the size; is off by the size; runs away by the size each second; has white
         noise of the size; shows the size beside the truth for one sample in `SPIKE_EVERY`.
@@ -136,8 +131,6 @@ class SensorFault:
         ----------
         t : time [s], a number or (n,).
         value : what a good sensor would show, like t.
-        stuck_at : what it showed when the fault began.
-        noise : standard normal numbers, like t.
         """
         since = t - self.start
         match self.kind:
@@ -187,7 +180,6 @@ class WrongUnit:
 
     Parameters
     ----------
-    channel : name of the signal.
     unit : one of `UNITS`.
 
     Raises
@@ -345,7 +337,6 @@ class Jitter:
     ----------
     size : longest time that a sample is old [s]; uniform from zero.
     channels : concerned; empty for all, which then are late together.
-    seed : of the times.
 
     Raises
     ------
@@ -399,10 +390,6 @@ class ClockJump:
     def apply(self, recording: Recording) -> Recording:
         """Return the recording with the jump; it ends where the drive does, forces jump with it.
 
-        Parameters
-        ----------
-        recording : the drive without it.
-
         Raises
         ------
         FaultError
@@ -421,7 +408,7 @@ class ClockJump:
         stamps, taken = stamps[keep], taken[keep]
         logged = {
             name: np.interp(taken, t, getattr(recording, name))
-            for name in CHANNELS
+            for name in (*CHANNELS, "a_x")
             if getattr(recording, name) is not None
         }
         force = recording.axle_force

@@ -35,13 +35,20 @@ def is_installed() -> bool:
 
 
 def is_used(path: Path) -> bool:
-    """Whether pyarrow is imported already, or a text is long enough to import it.
-
-    Parameters
-    ----------
-    path : of the file.
-    """
+    """Whether pyarrow is imported already, or a text is long enough to import it."""
     return "pyarrow" in sys.modules or path.stat().st_size > WORTH
+
+
+def _of_arrow(block: bytes) -> Any:
+    """Return bytes in memory of pyarrow's own.
+
+    Its threads may drop them last, while Python ends: of what is Python's that aborts the program.
+    """
+    import pyarrow
+
+    held = pyarrow.allocate_buffer(len(block))
+    np.frombuffer(held, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
+    return held
 
 
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
@@ -50,7 +57,6 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
     Parameters
     ----------
     block : whole lines in UTF-8.
-    layout : of the table.
     wanted : column from 0 -> how its cells are read.
     """
     import pyarrow
@@ -64,7 +70,7 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
     }
     try:
         table = pyarrow.csv.read_csv(
-            pyarrow.BufferReader(block),
+            pyarrow.BufferReader(_of_arrow(block)),
             pyarrow.csv.ReadOptions(
                 column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
             ),
@@ -99,7 +105,9 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
 
 
 def words(cells: Any) -> Words:
-    """Return cells of any type as words, "" where one is missing.
+    """Return cells of any type as the distinct words of them, "" where one is missing.
+
+    What a dictionary keeps once is never written out row by row.
 
     Parameters
     ----------
@@ -107,11 +115,13 @@ def words(cells: Any) -> Words:
     """
     import pyarrow
 
-    if pyarrow.types.is_dictionary(cells.type):
-        cells = cells.dictionary_decode()
-    coded = cells.dictionary_encode(null_encoding="encode")
-    names = ["" if one is None else str(one) for one in coded.dictionary.to_pylist()]
-    return Words(names, whole_numbers(coded.indices, 0))
+    if not pyarrow.types.is_dictionary(cells.type):
+        cells = cells.dictionary_encode()
+    codes = whole_numbers(cells.indices, -1)
+    used, first, where = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # a dictionary may hold words in another order, and more of them
+    found = [None if k < 0 else cells.dictionary[int(k)].as_py() for k in used[order]]
+    return Words(["" if one is None else str(one) for one in found], np.argsort(order)[where])
 
 
 def doubles(cells: Any) -> NDArray[np.float64]:
@@ -135,7 +145,6 @@ def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
     Parameters
     ----------
     cells : array of pyarrow, (n,).
-    missing : stands where one is missing.
 
     Raises
     ------

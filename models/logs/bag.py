@@ -37,7 +37,7 @@ from models.schema import require_few
 NS = 1e9  # in a second
 OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
 PROBED = 20  # messages that a rate is taken from
-TOGETHER = 2048  # messages that are read at a time
+TOGETHER, BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
 STAMPS = ("header.stamp.", "stamp.")
 TIME = ("sec", "nanosec")
 
@@ -106,10 +106,6 @@ _Place = tuple[_Topic, Field]  # where a channel is
 
 def open_(path: Path) -> GroupedLog[_Place]:
     """List the channels of a bag.
-
-    Parameters
-    ----------
-    path : of the file or folder.
 
     Raises
     ------
@@ -300,15 +296,7 @@ def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, by
 
 
 class _Reading:
-    """Numbers of a topic as its messages come, some of them at a time.
-
-    Parameters
-    ----------
-    path : of the bag.
-    definitions : by name of a type.
-    topic : that is read.
-    fields : of its messages that are kept, by the names of their channels.
-    """
+    """Numbers of a topic as its messages come, some of them at a time."""
 
     def __init__(
         self, path: Path, definitions: Definitions, topic: _Topic, fields: Mapping[str, Field]
@@ -316,6 +304,7 @@ class _Reading:
         self.path, self.definitions, self.topic, self.fields = path, definitions, topic, fields
         self.times: list[int] = []
         self.raws: list[bytes] = []
+        self.bytes = 0
         self.layouts: dict[int, list[Layout]] = {}
         self.clock = Growing(np.int64)
         self.parts = {name: Growing() for name in fields}
@@ -324,7 +313,8 @@ class _Reading:
         """Take the next message."""
         self.times.append(time)
         self.raws.append(raw)
-        if len(self.raws) == TOGETHER:
+        self.bytes += len(raw)
+        if len(self.raws) == TOGETHER or self.bytes > BYTES:
             self._read()
 
     def _read(self) -> None:
@@ -343,7 +333,7 @@ class _Reading:
         require_few(
             RecordingError, str(self.path), len(self.clock), "samples", "messages of a topic"
         )
-        self.times, self.raws = [], []
+        self.times, self.raws, self.bytes = [], [], 0
 
     def finish(self) -> Samples:
         """Return the times of the messages and their numbers."""

@@ -15,7 +15,7 @@ from models.limits import limits
 from models.logs.foreign import need
 from models.logs.log import RecordingError
 from models.logs.magic import BAG_METADATA
-from models.schema import CHUNK, read_text, require_few
+from models.schema import CHUNK, most_unpacked, read_text, require_dense, require_few
 
 Unpack = Callable[[bytes, int], bytes]
 DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
@@ -24,10 +24,6 @@ DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 @contextmanager
 def bounded(path: Path) -> Iterator[None]:
     """Let rosbags read with limits.
-
-    Parameters
-    ----------
-    path : of the bag.
 
     Raises
     ------
@@ -47,15 +43,18 @@ def bounded(path: Path) -> Iterator[None]:
             _require_small(one, zstd)
 
     def of_zstd(data: bytes, size: int) -> bytes:
-        _require(path, size)
+        _require(path, size, len(data))
         return bytes(zstd.ZstdDecompressor().decompress(data, max_length=size + 1))
 
     def of_lz4(data: bytes, size: int) -> bytes:
-        _require(path, size)
+        _require(path, size, len(data))
         return bytes(lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
 
     def of_message(data: bytes) -> bytes:
-        return of_zstd(data, int(1e6 * limits().block))
+        most = most_unpacked(len(data))
+        message = bytes(zstd.ZstdDecompressor().decompress(data, max_length=most + 1))
+        _require(path, len(message), len(data))
+        return message
 
     table: dict[str, Unpack] = mcap.DECOMPRESSORS
     before = dict(table)
@@ -86,8 +85,9 @@ def _require_shallow(path: Path) -> None:
         raise RecordingError(f"{path}: must not hold lists in lists")
 
 
-def _require(path: Path, size: int) -> None:
+def _require(path: Path, size: int, packed: int) -> None:
     require_few(RecordingError, str(path), size / 1e6, "block", "megabytes of a chunk")
+    require_dense(RecordingError, str(path), size, packed, "chunks")
 
 
 def _require_small(path: Path, zstd: Any) -> None:
@@ -96,4 +96,5 @@ def _require_small(path: Path, zstd: Any) -> None:
     with zstd.open(path, "rb") as file:
         while size <= most and (part := file.read(CHUNK)):
             size += len(part)
+            require_dense(RecordingError, str(path), size, path.stat().st_size, "zstd data")
     require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes unpacked")

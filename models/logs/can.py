@@ -41,7 +41,6 @@ class _Group:
 
     Parameters
     ----------
-    name : of their frame.
     t : when they were sent [s], (n,).
     data : of the frames of one identifier on one bus, (m, bytes).
     sent : which of the frames hold the signals, (n,); None where all do.
@@ -53,12 +52,7 @@ class _Group:
     sent: NDArray[np.intp] | None
 
     def values(self, signal: Any) -> Array:
-        """Return a signal in its unit, (n,).
-
-        Parameters
-        ----------
-        signal : of the DBC.
-        """
+        """Return a signal in its unit, (n,)."""
         data, sent = self.data, self.sent
         return filled(
             self.t.size,
@@ -102,11 +96,6 @@ def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
 
 def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     """Read the frames of a log that a DBC knows and list their signals.
-
-    Parameters
-    ----------
-    path : of the log.
-    dbc : tells the signals of its frames.
 
     Raises
     ------
@@ -247,7 +236,6 @@ def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     Parameters
     ----------
     data : of the frames, (n, bytes).
-    signal : of the DBC.
     """
     raw = raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
@@ -268,7 +256,6 @@ def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     Parameters
     ----------
     data : of the frames, (n, bytes).
-    signal : of the DBC, that lies in them.
     """
     length, little = signal.length, signal.byte_order == "little_endian"
     first, (begin, end) = _first_bit(signal), _bytes_of(signal)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.errors import TireidError
 from models.limits import limits
 
 PREFIX = 4  # bytes
@@ -29,7 +30,7 @@ BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
 Definitions = Mapping[str, tuple[Any, list[tuple[str, Any]]]]
 
 
-class CdrError(ValueError):
+class CdrError(TireidError, ValueError):
     """A message or definition cannot be read; the message says why."""
 
 
@@ -62,13 +63,6 @@ def fields_of(
 ) -> Iterator[Field]:
     """Yield the numbers of a message, without those in arrays and sequences.
 
-    Parameters
-    ----------
-    definitions : by name of a type.
-    kind : of the message.
-    prefix : of the paths.
-    owners : of the message.
-
     Raises
     ------
     CdrError
@@ -90,12 +84,6 @@ def fields_of(
 def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
     """Return the layout of a message.
 
-    Parameters
-    ----------
-    definitions : by name of a type.
-    kind : of the message.
-    raw : the message.
-
     Raises
     ------
     CdrError
@@ -116,7 +104,6 @@ def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    layout : of a message of their size.
     messages : (n, size).
     """
     order = next(word for word, one in ORDERS.items() if one == layout.order)
@@ -132,9 +119,7 @@ def numbers(layout: Layout, messages: NDArray[np.uint8], field: Field) -> NDArra
 
     Parameters
     ----------
-    layout : of the messages.
     messages : (n, size).
-    field : of the message.
     """
     place, kind = layout.places[field.path], np.dtype(layout.order + field.kind)
     raw = np.ascontiguousarray(messages[:, place : place + kind.itemsize])

@@ -54,10 +54,6 @@ def holes(channel: Channel) -> NDArray[np.intp]:
     """Return which samples of a channel are empty cells where its sensor should have told one.
 
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
-
-    Parameters
-    ----------
-    channel : as it was logged.
     """
     empty = np.flatnonzero(np.isnan(channel.values))
     return empty if empty.size < OWN_CLOCK * channel.values.size else empty[:0]
@@ -68,7 +64,6 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
 
     Parameters
     ----------
-    channel : as it was logged.
     cut : whether `holes` are left out too; else they stay, and are refused.
     """
     kept = ~np.isnan(channel.values)
@@ -238,18 +233,7 @@ def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) 
 
 
 def require_rising(label: str, raw: Raw) -> None:
-    """Refuse time that does not rise.
-
-    Parameters
-    ----------
-    label : begins messages.
-    raw : the signal.
-
-    Raises
-    ------
-    RecordingError
-        Naming the place and both stamps.
-    """
+    """Refuse time that does not rise."""
     wrong = np.flatnonzero(~(np.diff(raw.t) > 0.0))
     if wrong.size:
         raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")

@@ -37,11 +37,6 @@ def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = Fa
     path : of a file; of a folder, where a format keeps a log in one.
     dbc : of the file that tells the signals in the frames of a CAN bus.
     mend : whether stamps that do not rise are mended, and not refused.
-
-    Raises
-    ------
-    RecordingError
-        One line: where there is no such file, no format fits, or a library is missing.
     """
     path = Path(path)
     if not path.exists():

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import shown
+from models.extras import needs
 from models.logs.log import RecordingError
 
 LONGEST_REASON = 160  # characters
@@ -30,13 +31,6 @@ LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 def need(path: Path, module: str, format: str, extra: str) -> Any:
     """Import what reads a format.
-
-    Parameters
-    ----------
-    path : of the file, for the message.
-    module : to import.
-    format : as users call it.
-    extra : of tireid that installs it.
 
     Raises
     ------
@@ -49,9 +43,7 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
             importlib.import_module(library)
             return importlib.import_module(module)
     except ImportError:
-        raise RecordingError(
-            f"{path}: reading {format} needs {library}: pip install tireid[{extra}]"
-        ) from None
+        raise RecordingError(needs(f"{path}: reading {format}", library, extra)) from None
 
 
 @contextmanager
@@ -60,16 +52,6 @@ def one_line(path: Path, format: str) -> Iterator[None]:
 
     What is no fault of the file is not told of it: a full disk is said to be full, and MemoryError
     stays what it is.
-
-    Parameters
-    ----------
-    path : of the file.
-    format : that it is read as, with its article.
-
-    Raises
-    ------
-    RecordingError
-        One line: file, format and what the library says.
     """
     with _quiet():
         try:

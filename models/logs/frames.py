@@ -50,12 +50,7 @@ class Frames(NamedTuple):
 
 
 class _Gathered:
-    """Frames of one identifier as they come, all of the same bytes.
-
-    Parameters
-    ----------
-    width : bytes that are kept of each.
-    """
+    """Frames of one identifier as they come, all of the same bytes."""
 
     def __init__(self, width: int) -> None:
         self.width = width
@@ -119,8 +114,6 @@ def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
 
     Parameters
     ----------
-    path : of the file.
-    kind : as `magic.frames_in` names it.
     known : by identifier, with `EXTENDED`, how many bytes its frames have.
 
     Raises

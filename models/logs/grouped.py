@@ -50,9 +50,6 @@ class GroupedLog(Generic[P]):
 
     Parameters
     ----------
-    path : of the file.
-    format : as users call it.
-    what : that the file is read as, with its article.
     place : what a sample is in the file: "message" or "sample".
     channels : as listed, each with where the format finds it.
     said : what is left out or taken for granted.
@@ -89,11 +86,7 @@ class GroupedLog(Generic[P]):
 
         Parameters
         ----------
-        path, format, what, place : as of the class.
-        found : channels: the group of each, it, and where it is.
-        said, samples : as of the class.
         missing : what the file does not hold where there are none, for the message.
-        remedy : ends that message.
 
         Raises
         ------
@@ -155,13 +148,7 @@ class GroupedLog(Generic[P]):
 
         Parameters
         ----------
-        names : as listed.
         run : None.
-
-        Raises
-        ------
-        RecordingError
-            One line: file, channel, rule, value, remedy.
         """
         one_run(self.path, self.runs(), run)
         asked = chosen(self.path, names, {one[0].name: one for one in self.channels})
@@ -192,11 +179,8 @@ class GroupedLog(Generic[P]):
 
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:
-    """Return names; what several share gets the name of its group before it, then a number behind.
-
-    Parameters
-    ----------
-    names : group and name of each.
+    """Return names; what several share gets the name of its group before it, then a number
+    behind.
     """
     pairs = list(names)
     count: dict[str, int] = {}
@@ -221,7 +205,6 @@ def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
 
     Parameters
     ----------
-    what : they are, with the reason.
     names : all of them; the first few are listed.
     """
     if not names:
@@ -230,13 +213,6 @@ def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def require_room(path: Path, samples: float, width: float) -> None:
-    """Refuse what is read whole where it is too large.
-
-    Parameters
-    ----------
-    path : of the file.
-    samples : of a channel.
-    width : bytes that each of them takes.
-    """
+    """Refuse what is read whole where it is too large."""
     require_few(RecordingError, str(path), samples, "samples", "samples of a channel")
     require_few(RecordingError, str(path), samples * width / 1e6, "block", "megabytes of a block")

@@ -38,7 +38,6 @@ class Growing:
 
     Parameters
     ----------
-    dtype : of its numbers.
     in_memory : how many it holds before it goes to disk; None takes `LONGEST_IN_MEMORY`.
     """
 

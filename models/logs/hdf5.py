@@ -4,6 +4,7 @@ MATLAB stores arrays transposed, texts as numbers, and cells and structs of seve
 references. Links to other files and arrays that lie in them are not followed.
 """
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +15,14 @@ from models.logs.foreign import need
 from models.logs.grouped import require_room
 from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
-from models.schema import require_few
+from models.schema import require_few, swells
 
 OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
-LONGEST_TEXT = 100_000  # characters
+LONGEST_TEXT, MOST_TEXTS = 1_000_000, 10_000  # bytes of all texts of a dataset, how many they are
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for.
-
-    Parameters
-    ----------
-    path : of the file.
 
     Raises
     ------
@@ -106,6 +103,8 @@ class _Reader:
         name, path, turned = node.name, self.path, bool(kind)
         if name is None:
             return Unread("without a name")
+        if swells(8 * max(node.size, _chunk(node)), node.id.get_storage_size()):
+            return Unread(f"{node.size} numbers in {node.id.get_storage_size()} bytes")
         shape = (*node.shape, 1, 1)[:2] if node.ndim < 2 else node.shape
         rows, columns = shape[::-1] if turned else shape
         return Leaf(
@@ -114,17 +113,23 @@ class _Reader:
 
     def text(self, node: Any, is_numbers: bool) -> Tree:
         """Return a text, or a list of them."""
-        if node.size > LONGEST_TEXT:
+        read_at_once = max(node.size, _chunk(node)) * node.dtype.itemsize
+        if read_at_once > LONGEST_TEXT or (not is_numbers and node.size > MOST_TEXTS):
             return Unread("a long text")
         if is_numbers:
             codes = np.asarray(node[()])
             rows = [codes] if codes.ndim < 2 else list(codes.T)
             words: list[Tree] = ["".join(chr(int(one)) for one in row) for row in rows]
         else:
-            words = [
-                one.decode("utf-8", errors="replace") if isinstance(one, bytes) else str(one)
-                for one in np.asarray(node[()]).reshape(-1)
-            ]
+            words, left = [], LONGEST_TEXT
+            for place in np.ndindex(node.shape):  # many may refer to one that is long
+                one = node[place]
+                words.append(
+                    one.decode("utf-8", errors="replace") if isinstance(one, bytes) else str(one)
+                )
+                left -= len(one)
+                if left < 0:
+                    return Unread("a long text")
         return words[0] if len(words) == 1 else words
 
 
@@ -135,6 +140,11 @@ def _load(path: Path, name: str, shape: tuple[int, int], turned: bool) -> Array:
     with h5py.File(path, "r") as file:
         values = np.asarray(file[name][()], dtype=np.float64)
     return values.T.reshape(shape) if turned else values.reshape(shape)
+
+
+def _chunk(node: Any) -> int:
+    """Return how many elements of a dataset are unpacked at once."""
+    return math.prod(node.chunks or ())
 
 
 def _matlab_class(node: Any) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.escape import shown, visible
 
 SOME = 12  # names in a message
@@ -22,7 +23,7 @@ LONGEST = 200  # characters of them
 T = TypeVar("T")
 
 
-class RecordingError(ValueError):
+class RecordingError(TireidError, ValueError):
     """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
 
 
@@ -55,7 +56,6 @@ class Listed:
     ----------
     name : as in the file, unique in it; a message's field has its topic before it.
     unit : as in the file, "" where it tells none.
-    samples : how many there are.
     rate : typical samples per second [Hz], NaN where it is not known without reading them.
     """
 
@@ -71,7 +71,6 @@ class Channel:
 
     Parameters
     ----------
-    name, unit : as in `Listed`.
     t : time of each sample [s], (n,), on the clock of the log; channels of one clock share it.
     values : (n,) float64 as in the file, NaN for an empty cell.
     place : what a sample is in the file, for messages: "line", "row", "message" or "sample".
@@ -127,24 +126,12 @@ class LogFile(Protocol):
 
         Parameters
         ----------
-        names : as listed.
         run : one of `runs`; None where there are none.
-
-        Raises
-        ------
-        RecordingError
-            One line: file, channel, rule, value, remedy.
         """
 
 
 def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
     """Return what is known by names.
-
-    Parameters
-    ----------
-    path : of the file.
-    names : asked for.
-    known : by name as listed.
 
     Raises
     ------
@@ -162,12 +149,6 @@ def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
 
 def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
     """Return the run that is read: the one that is asked for, or the only one; None of none.
-
-    Parameters
-    ----------
-    path : of the file.
-    runs : that it holds apart.
-    run : asked for.
 
     Raises
     ------
@@ -188,13 +169,7 @@ def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
 
 
 def some(names: Sequence[str], most: int = SOME) -> str:
-    """Return names for a message, the first of many, on one line.
-
-    Parameters
-    ----------
-    names : of channels or runs.
-    most : that are listed.
-    """
+    """Return names for a message, the first of many, on one line."""
     listing = visible(", ".join(names[:most]))
     cut = len(names) > most or len(listing) > LONGEST
     return listing[:LONGEST] + (f", ... ({len(names)})" if cut else "")

@@ -25,32 +25,17 @@ FRAMES_IN_TEXT = {
 
 
 def is_hdf5(head: bytes) -> bool:
-    """Whether a file is HDF5, as MATLAB 7.3 writes it or others do.
-
-    Parameters
-    ----------
-    head : its first bytes.
-    """
+    """Whether a file is HDF5, as MATLAB 7.3 writes it or others do."""
     return any(head[k : k + len(HDF5)] == HDF5 for k in HDF5_PLACES)
 
 
 def is_mat5(head: bytes) -> bool:
-    """Whether a file begins as one of MATLAB 5 to 7; those of 7.3 do too, and are HDF5.
-
-    Parameters
-    ----------
-    head : its first bytes.
-    """
+    """Whether a file begins as one of MATLAB 5 to 7; those of 7.3 do too, and are HDF5."""
     return head.startswith(MATLAB) and head[126:128] in MATLAB_ORDERS
 
 
 def frames_in(head: bytes) -> str:
-    """Return which log of frames a file is, "" for none; an MDF file may hold some.
-
-    Parameters
-    ----------
-    head : its first bytes.
-    """
+    """Return which log of frames a file is, "" for none; an MDF file may hold some."""
     if head.startswith(BLF):
         return "BLF"
     if head.startswith(MDF):
@@ -63,7 +48,6 @@ def format_of(path: Path, head: bytes) -> str:
 
     Parameters
     ----------
-    path : of the file or folder.
     head : its first bytes, unpacked; none of a folder.
     """
     if path.is_dir():

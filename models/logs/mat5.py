@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.limits import limits
+from codegen.errors import TireidError
+from models.logs.grouped import require_room
 from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
-from models.schema import require_few
+from models.schema import most_unpacked, require_dense, require_few, swells
 
 HEADER = 128  # bytes
 MATRIX, COMPRESSED = 14, 15  # types of an element
@@ -44,7 +45,7 @@ LARGEST_DIMENSION = 2**40
 Load = Callable[[], memoryview]
 
 
-class DamagedError(ValueError):
+class DamagedError(TireidError, ValueError):
     """The file is not what it says."""
 
 
@@ -69,10 +70,6 @@ class _Beginning(NamedTuple):
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for.
 
-    Parameters
-    ----------
-    path : of the file.
-
     Raises
     ------
     RecordingError
@@ -87,7 +84,7 @@ def read_tree(path: Path) -> dict[str, Tree]:
             raise DamagedError("its header has no byte order")
         size = path.stat().st_size
         result: dict[str, Tree] = {}
-        place = HEADER
+        place, held, packed = HEADER, 0, 0
         while place < size:
             file.seek(place)
             tag = file.read(8)
@@ -100,7 +97,9 @@ def read_tree(path: Path) -> dict[str, Tree]:
             if kind in (MATRIX, COMPRESSED):
                 variable = _Variable(path, place, length, kind == COMPRESSED, order)
                 if (found := variable.tree()) is not None:
-                    result[found[0]] = found[1]
+                    result[found.name] = found.tree
+                    held, packed = held + found.held, packed + (length if found.held else 0)
+                require_dense(RecordingError, str(path), held, packed, "structs and cells")
                 require_few(RecordingError, str(path), len(result), "columns", "variables")
             place += length + (0 if kind == COMPRESSED else -length % 8)
     return result
@@ -124,11 +123,11 @@ class _Variable(NamedTuple):
             )
         if not self.deflated:
             return memoryview(raw)
-        allowed = int(min(1e6 * limits().block, 2.0**62))
+        allowed = most_unpacked(self.length)
         inflated = zlib.decompressobj().decompress(raw, (allowed + 1) if most is None else most + 8)
-        require_few(
-            RecordingError, str(self.path), len(inflated) / 1e6, "block", "megabytes of a variable"
-        )
+        size, where = len(inflated), str(self.path)
+        require_few(RecordingError, where, size / 1e6, "block", "megabytes of a variable")
+        require_dense(RecordingError, where, size, self.length, "variables")
         if len(inflated) < 8:
             raise DamagedError(f"the variable at byte {self.place} is cut off")
         kind, length = struct.unpack(self.order + "II", inflated[:8])
@@ -136,19 +135,31 @@ class _Variable(NamedTuple):
             raise DamagedError(f"the variable at byte {self.place} is cut off")
         return memoryview(inflated)[8 : 8 + length]
 
-    def tree(self) -> tuple[str, Tree] | None:
+    def tree(self) -> "_Read | None":
         """Return its name and what it holds, None of what MATLAB keeps for itself."""
         begin = _beginning(self.data(BEGINNING), self.order)
         if not begin.name or begin.name.startswith("__"):
             return None
         if begin.kind in NUMERIC and not begin.is_complex and begin.dimensions == 2:
-            return begin.name, Leaf(shape=begin.shape, load=self._load)
+            count = math.prod(begin.shape)
+            if swells(8 * count, self.length):
+                return _Read(begin.name, Unread(f"{count} numbers in {self.length} bytes"), 0)
+            return _Read(begin.name, Leaf(shape=begin.shape, load=self._load), 0)
         if begin.kind not in (CELL, STRUCT, CHAR):
-            return begin.name, _unread(begin)
-        return begin.name, _tree(self.path, self.data(), self.order, 0)
+            return _Read(begin.name, _unread(begin), 0)
+        data = self.data()
+        return _Read(begin.name, _tree(self.path, data, self.order, 0), len(data))
 
     def _load(self) -> Array:
-        return _load(_beginning(self.data(), self.order), self.order)
+        return _load(self.path, _beginning(self.data(), self.order), self.order)
+
+
+class _Read(NamedTuple):
+    """A variable: its name, what it holds, and how many bytes stay in memory for it."""
+
+    name: str
+    tree: Tree
+    held: int
 
 
 def _elements(data: memoryview, order: str) -> Iterator[_Element]:
@@ -211,8 +222,9 @@ def _after(data: memoryview, order: str, count: int) -> int:
     return place
 
 
-def _load(begin: _Beginning, order: str) -> Array:
+def _load(path: Path, begin: _Beginning, order: str) -> Array:
     """Return the numbers of a variable, (rows, columns)."""
+    require_room(path, max(begin.shape), 8 * min(begin.shape))
     element = next(_elements(begin.rest, order), None)
     count = begin.shape[0] * begin.shape[1]
     if element is None or element.kind not in NUMBERS:
@@ -231,7 +243,7 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
     require_few(RecordingError, str(path), depth, "depth", "levels of structs and cells")
     begin = _beginning(data, order)
     if begin.kind in NUMERIC and not begin.is_complex and begin.dimensions == 2:
-        return Leaf(shape=begin.shape, load=lambda: _load(begin, order))
+        return Leaf(shape=begin.shape, load=lambda: _load(path, begin, order))
     if begin.kind == CHAR:
         return _words(begin, order)
     count = begin.shape[0] * begin.shape[1]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from codegen.arrays import Array
 from models.logs import hdf5, mat5
 from models.logs.foreign import one_line
-from models.logs.grouped import GroupedLog, Samples, noted, require_room
+from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import HEAD as HEAD_OF_FILE
 from models.logs.magic import MATLAB, is_hdf5, is_mat5
@@ -34,10 +34,6 @@ class _Time(NamedTuple):
 
 def open_(path: Path) -> GroupedLog[Signal]:
     """List the channels of a file.
-
-    Parameters
-    ----------
-    path : of the file.
 
     Raises
     ------
@@ -77,15 +73,13 @@ def open_(path: Path) -> GroupedLog[Signal]:
             for one in found.signals
         ],
         said,
-        partial(_samples, path, times),
+        partial(_samples, times),
         missing="signal with a time",
         remedy=REMEDY if said else f"there is no vector of numbers; {REMEDY}",
     )
 
 
-def _samples(
-    path: Path, times: Mapping[Clock, _Time], asked: Sequence[tuple[Listed, Signal]]
-) -> list[Samples]:
+def _samples(times: Mapping[Clock, _Time], asked: Sequence[tuple[Listed, Signal]]) -> list[Samples]:
     """Read signals; those of one matrix together, and the matrix is not kept."""
     together: dict[int, list[tuple[Listed, Signal]]] = {}
     for one in asked:
@@ -93,7 +87,6 @@ def _samples(
     found: dict[Clock, dict[str, Array]] = {}
     for some in together.values():
         leaf = some[0][1].leaf
-        require_room(path, max(leaf.shape), 8 * min(leaf.shape))
         values = leaf.load()
         for listed, signal in some:
             found.setdefault(signal.clock, {})[listed.name] = line_of(values, signal)

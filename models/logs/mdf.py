@@ -104,10 +104,6 @@ def _kept(values: Array) -> Array:
 def open_(path: Path) -> GroupedLog[_Place]:
     """List the channels of a file.
 
-    Parameters
-    ----------
-    path : of the file.
-
     Raises
     ------
     RecordingError

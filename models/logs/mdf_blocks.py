@@ -14,19 +14,14 @@ from typing import Any, BinaryIO, NamedTuple
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.log import RecordingError
-from models.schema import require_few
+from models.schema import require_dense, require_few
 
 MOST_BLOCKS = 1_000_000  # of data
 BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 
 
 def is_bus(group: Any) -> bool:
-    """Whether a group of channels of an MDF4 file holds frames of a bus.
-
-    Parameters
-    ----------
-    group : as asammdf gives it.
-    """
+    """Whether a group of channels of an MDF4 file holds frames of a bus."""
     return bool(int(group.channel_group.flags) & BUS_EVENT)
 
 
@@ -48,7 +43,6 @@ def opened(path: Path, format: str) -> Iterator[Any]:
 
     Parameters
     ----------
-    path : of the file.
     format : that it is read as, for the message where the library is missing.
 
     Raises
@@ -121,11 +115,12 @@ def _require_fitting(path: Path, group: Any, is_4: bool) -> None:
             raise RecordingError(
                 f"{path}: is a damaged MDF file, a channel lies beyond its record of {width} bytes"
             )
-    file_size, total = path.stat().st_size, 0
+    file_size, total, packed = path.stat().st_size, 0, 0
     for number, block in enumerate(group.get_data_blocks()):
         inflated, stored = int(block.original_size or 0), int(block.compressed_size or 0)
         require_few(RecordingError, str(path), inflated / 1e6, "block", "megabytes of a block")
-        total += inflated
+        total, packed = total + inflated, packed + stored
+        require_dense(RecordingError, str(path), total, packed, "groups of channels")
         here = group.data_location == 0
         if (
             number > MOST_BLOCKS

@@ -21,7 +21,6 @@ class ArrayLog:
 
     Parameters
     ----------
-    name : stands for the file in messages.
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
@@ -108,7 +107,6 @@ class ArrayLog:
 
         Parameters
         ----------
-        names : of the columns.
         run : one of `runs`; None where there are none, or one.
 
         Raises

@@ -202,6 +202,16 @@ RULES: Mapping[str, Rule] = {
         (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, "x", "gyro", "twist",
          "magnetic"),
     ),
+    "a_x": Rule(
+        ("ax", "accx", "accelx", "xaccel", "accelerationx", "longacc", "longaccel", "acclong",
+         "acclon", "glong", "longg", "gforcelong", "laengsbeschleunigung", "alaengs", "blaengs",
+         "carax", "longitudinalacceleration", "longitudinalacc", "accelerometerx", "axcog", "axcg",
+         "axb", "longitudinalg", "alon", "axsm", "axveh"),
+        (f"{LONGITUDINAL};{ACCELERATIONS}|g", "linear;acceleration;x", "laengsbeschleunigung"),
+        (),
+        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, *LATERAL.split("|"), "gyro",
+         "twist", "magnetic", "pedal", "latitude", "longitude"),
+    ),
     "Fyf": Rule(
         ("fyf", "fyfront", "fyfrontaxle", "fyfinv"),
         ("fy|flat;front|f|va", "lateral|side;force;front"),
@@ -262,11 +272,9 @@ class Guess:
 
     Parameters
     ----------
-    channel : names in the file.
     confidence : from 0 to 1.
     hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
-    why : in a few words.
     """
 
     channel: tuple[str, ...]
@@ -282,7 +290,6 @@ class Proposal:
 
     Parameters
     ----------
-    guesses : by signal, the best one.
     rivals : by signal, all that are as good as the best, it included, where there are several.
     """
 
@@ -290,12 +297,7 @@ class Proposal:
     rivals: Mapping[str, tuple[Guess, ...]] = field(default_factory=dict)
 
     def is_sure(self, name: str) -> bool:
-        """Whether a signal is found beyond doubt; an angle of the hand wheel wants its ratio.
-
-        Parameters
-        ----------
-        name : of the signal.
-        """
+        """Whether a signal is found beyond doubt; an angle of the hand wheel wants its ratio."""
         guess = self.guesses.get(name)
         return (
             guess is not None
@@ -329,12 +331,7 @@ class Proposal:
 
 
 def words_of(name: str) -> tuple[str, ...]:
-    """Return a name as small words: "Car.YawRate" is car, yaw, rate.
-
-    Parameters
-    ----------
-    name : as in the file.
-    """
+    """Return a name as small words: "Car.YawRate" is car, yaw, rate."""
     plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
@@ -369,7 +366,6 @@ def name_confidence(signal: str, name: str) -> float:
     Parameters
     ----------
     signal : one of `RULES`, or a wheel.
-    name : of the channel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
@@ -410,7 +406,6 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     Parameters
     ----------
     log : as a format reads it; numbers are read of the channels that are in question.
-    headings : of its channels.
     run : which of its runs is looked at; None the only one, or the first.
     """
     candidates = {name: _candidates(name, headings) for name in QUANTITIES}
@@ -491,9 +486,9 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     found = []
     listed = [_with_told_unit(one) for one in headings]
     for one in listed:
-        names = {one.name, without_ending(one.name, one.unit)}
-        by_name = max(name_confidence(signal, name) for name in names)
-        by_hand = max(name_confidence(HAND, name) for name in names) if signal == "delta_f" else 0.0
+        name = without_ending(one.name, one.unit)
+        by_name = name_confidence(signal, name)
+        by_hand = name_confidence(HAND, name) if signal == "delta_f" else 0.0
         best = max(by_name, by_hand)
         if best > 0.0:
             found.append(
@@ -646,12 +641,13 @@ def _beside_turning(
             else _in_turning(name, {**best, name: guess}, seen)
             for guess in candidates[name]
         ]
-    forward = next((one for one in mended["v_x"] if one.channel == _channel_of(best, "v_x")), None)
-    if forward is not None and forward.unit and not _is_told(best["v_x"]):
-        mended["v_y"] = [
-            guess if _is_told(guess) else replace(_said(guess, "as v_x"), unit=forward.unit)
-            for guess in candidates["v_y"]
-        ]
+    for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
+        first = next((one for one in mended[like] if one.channel == _channel_of(best, like)), None)
+        if first is not None and first.unit and not _is_told(best[like]):
+            mended[name] = [
+                guess if _is_told(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
+                for guess in candidates[name]
+            ]
     return mended
 
 

@@ -15,7 +15,7 @@ from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog
-from models.schema import require_few, require_file
+from models.schema import LONGEST_NAME, require_dense, require_few, require_file
 
 HEAD = 400  # rows that tell what columns are
 WHAT = "a Parquet file"  # that a file is read as
@@ -24,10 +24,6 @@ BATCH = 1 << 16  # rows that are read at once
 
 def open_parquet(path: Path) -> TableLog:
     """Return the log in a Parquet file.
-
-    Parameters
-    ----------
-    path : of a file.
 
     Raises
     ------
@@ -40,8 +36,13 @@ def open_parquet(path: Path) -> TableLog:
         about = file.metadata
         require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
         require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
-        size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
+        groups = [about.row_group(k) for k in range(about.num_row_groups)]
+        size = sum(group.total_byte_size for group in groups)
         require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
+        for one in (group.column(k) for group in groups for k in range(group.num_columns)):
+            unpacked, packed = one.total_uncompressed_size, one.total_compressed_size
+            what = f"the cells of {shown(one.path_in_schema)}"
+            require_dense(RecordingError, str(path), unpacked, packed, what)
         table = ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
         return TableLog(table=table)
 
@@ -52,9 +53,7 @@ class ParquetTable:
 
     Parameters
     ----------
-    path : the file.
     schema : of its columns, as pyarrow gives it.
-    rows : how many it says to have.
     """
 
     path: Path
@@ -141,7 +140,8 @@ class ParquetTable:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""
         names = list(dict.fromkeys(self.names[k] for k in columns))
         parquet = need(self.path, "pyarrow.parquet", "Parquet", "parquet")
-        with parquet.ParquetFile(self.path) as file:
+        texts = [one.name for one in self.schema if _is_text(one.type)]  # each is kept once
+        with parquet.ParquetFile(self.path, read_dictionary=texts) as file:
             for batch in file.iter_batches(batch_size=size, columns=names):
                 places: dict[str, list[int]] = {}
                 for place, name in enumerate(batch.schema.names):
@@ -175,14 +175,15 @@ class ParquetTable:
                     f"{self.path}: {self.names[column]} must be of the years 1678 to 2262, "
                     f"rows from {rows[0]} on are not"
                 ) from None
-        instants = [nanoseconds(cell) for cell in _as_text(cells, found)]
+        names, codes = words(cells)
+        instants = [nanoseconds(name) for name in names]
         if None in instants:
-            k = instants.index(None)
+            k = instants.index(None)  # the first: words stand in the order of the rows
             raise RecordingError(
-                f"{self.path}: {self.names[column]} must be a time, row {rows[k]} has "
-                f"{shown(_as_text(cells, found)[k])}"
+                f"{self.path}: {self.names[column]} must be a time, row "
+                f"{rows[np.argmax(codes == k)]} has {shown(names[k][:LONGEST_NAME])}"
             )
-        return np.array(instants, dtype=np.int64)
+        return np.array(instants, dtype=np.int64)[codes]
 
 
 def _is_numeric(kind: Any) -> bool:
@@ -222,7 +223,11 @@ def _as_text(cells: Any, kind: Any) -> list[str]:
         return ["" if np.isnat(date) else str(date) for date in dates]
     if types.is_duration(kind):
         cells = cells.cast("int64")
-    if _is_numeric(kind) or _is_text(kind):
+    if _is_text(kind):
+        names, codes = words(cells)
+        short = [name[: LONGEST_NAME + 1] for name in names]
+        return [short[k] for k in codes]
+    if _is_numeric(kind):
         return ["" if cell is None else str(cell) for cell in cells.to_pylist()]
     return ["?"] * len(cells)
 

@@ -61,13 +61,11 @@ class Layout:
     delimiter : one character, " " for any number of blanks and tabs.
     decimal : "." or ",".
     thousands : what sets thousands apart in some cell, "" where nothing does.
-    names : of the columns, as in the file.
     units : of the columns, "" where none is told.
     first : line of the first row of data, from 1; one beyond the header where there is none.
     again : lines of header and units, which may come again further down and are no data then.
     numeric : which columns hold numbers, as far as the beginning tells.
     rows : cells of the first rows of data.
-    words : what was detected, for people.
     made_by : the logger or program whose format it is, "" where nothing tells.
     """
 
@@ -112,8 +110,6 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
 
     Parameters
     ----------
-    path : for messages.
-    head : its first bytes, unpacked.
     whole : whether they are all of it.
 
     Raises
@@ -208,7 +204,6 @@ def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
 
     Parameters
     ----------
-    line : without its end.
     delimiter : one character, " " for any number of blanks and tabs.
     """
     if delimiter == BLANKS:

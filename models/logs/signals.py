@@ -1,7 +1,7 @@
 """What a log must tell of a car, and how one of these signals is read from channels.
 
-SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y [m/s²], axle
-forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
+SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y, a_x [m/s²],
+axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
 """
 
 import math
@@ -30,12 +30,18 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "delta_f": ANGLE,
         "delta_r": ANGLE,
         "a_y": ACCELERATION,
+        "a_x": ACCELERATION,
         "Fyf": FORCE,
         "Fyr": FORCE,
         **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
     }
 )
-COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay"}  # what a column is called where it differs
+COLUMNS = {
+    "v_x": "vx",
+    "v_y": "vy",
+    "a_y": "ay",
+    "a_x": "ax",
+}  # what a column is called where it differs
 MEANINGS: Mapping[str, str] = MappingProxyType(
     {
         "v_x": "forward speed",
@@ -45,6 +51,7 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "delta_f": "front steering angle",
         "delta_r": "rear steering angle",
         "a_y": "lateral acceleration",
+        "a_x": "longitudinal acceleration",
         "Fyf": "front axle force",
         "Fyr": "rear axle force",
         "wheel_fl": "speed of the front left wheel",
@@ -54,28 +61,18 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "wheel": "speed of the wheels, by one encoder",
     }
 )
+SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
 LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
 def told_by(signals: Iterable[str]) -> set[str]:
-    """Return what signals tell, by name; beta tells v_y, wheels tell v_x.
-
-    Parameters
-    ----------
-    signals : our names.
-    """
+    """Return what signals tell, by name; beta tells v_y, wheels tell v_x."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
     return {stands_for.get(name, name) for name in signals}
 
 
 def quantity_of(name: str, unit: str) -> str:
-    """Return what a signal is; of wheels a speed or a rate, as the unit has it.
-
-    Parameters
-    ----------
-    name : of the signal, ours.
-    unit : as written.
-    """
+    """Return what a signal is; of wheels a speed or a rate, as the unit has it."""
     turns = [one for one in quantities(unit) if one in (RATE, TURNS)]
     return turns[0] if name in WHEELS and turns else QUANTITIES[name]
 
@@ -151,7 +148,6 @@ class Signal:
         Parameters
         ----------
         parts : each channel in SI, on one clock (n,).
-        quantity : what the signal is.
         """
         plain = Signal(channel=self.channel[:1], unit=self.unit)
         if len(parts) == 1 and self == plain:
@@ -185,11 +181,6 @@ class Signal:
 
 def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
     """Refuse signals that are no signals of ours, or that contradict one another.
-
-    Parameters
-    ----------
-    signals : by our name.
-    where : begins the message.
 
     Raises
     ------

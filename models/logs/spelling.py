@@ -37,22 +37,12 @@ _LENKRAD = re.compile("(?i:lenk_?rad)$")  # German for a wheel: no angle in rad
 
 
 def is_unit(word: str) -> bool:
-    """Return whether a word is a unit, or stands where one would.
-
-    Parameters
-    ----------
-    word : a cell, in brackets or not.
-    """
+    """Return whether a word is a unit, or stands where one would."""
     return is_known(word) or word.strip("[](){} ").lower() in _OTHERS
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Return whether cells are a row of units: all in brackets, or all known, and not all "1".
-
-    Parameters
-    ----------
-    cells : of a line.
-    """
+    """Return whether cells are a row of units: all in brackets, or all known, and not all "1"."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     if not filled:
         return False
@@ -66,26 +56,21 @@ def is_units_row(cells: Sequence[str]) -> bool:
 
 
 def unit_in_name(name: str) -> str:
-    """Return the unit that a name holds, as in "Speed [km/h]", "Speed:km/h" or "Speed_kmh".
+    """Return the unit that a name holds, as in "Speed [km/h]", "Speed:km/h" or "Speed_kmh"."""
+    return _split(name)[1]
 
-    Parameters
-    ----------
-    name : of a column, as in the file.
-    """
+
+def _split(name: str) -> tuple[str, str]:
+    """Return a name without the unit that it holds, and the unit; it and ""."""
     if len(name) > LONGEST_NAME:
-        return ""
+        return name, ""
     held = _BRACKETS.fullmatch(name)
     if held and (is_unit(held[1]) or "[" in name):
-        return held[1]
+        return without_unit(name), held[1]
     for mark in (":", " / ", ", ", " in "):
-        _, found, unit = name.rpartition(mark)
-        if found and is_unit(unit) and unit.strip() not in _EMPTY:
-            return unit.strip()
-    return _ending(name)[1]
-
-
-def _ending(name: str) -> tuple[str, str]:
-    """Return what stands before the unit in which a name ends, and the unit; it and ""."""
+        bare, there, unit = name.rpartition(mark)
+        if there and is_unit(unit) and unit.strip() not in _EMPTY:
+            return bare.strip(), unit.strip()
     if _LENKRAD.search(name):
         return name, ""
     for ending, unit in _LONGEST_FIRST:
@@ -102,22 +87,17 @@ _UNIT_BEHIND = re.compile(r"\s*[\[(][^\[\]()]*[\])]$")
 
 
 def without_unit(name: str) -> str:
-    """Return a name without the unit in brackets that it ends in: "Speed" of "Speed [km/h]".
-
-    Parameters
-    ----------
-    name : of a column, as in the file.
-    """
+    """Return a name without the unit in brackets that it ends in: "Speed" of "Speed [km/h]"."""
     return _UNIT_BEHIND.sub("", name)
 
 
 def without_ending(name: str, unit: str) -> str:
-    """Return a name without the unit after its last words, where it is that unit.
+    """Return a name without the unit that it holds, where it is that unit.
 
     Parameters
     ----------
-    name : of a column, as in the file: "speed_kmh".
+    name : of a column, as in the file: "speed_kmh", "speed [km/h]".
     unit : that was understood: "km/h".
     """
-    bare, meant = _ending(name)
+    bare, meant = _split(name)
     return bare if are_same(meant, unit) else name

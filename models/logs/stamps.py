@@ -68,12 +68,7 @@ class Stamps(NamedTuple):
     order: NDArray[np.intp] | None = None
 
     def of(self, column: NDArray[Any]) -> NDArray[Any]:
-        """Return the cells of a column that the stamps are of.
-
-        Parameters
-        ----------
-        column : a cell of each row.
-        """
+        """Return the cells of a column that the stamps are of."""
         return column if self.order is None else column[self.order]
 
 
@@ -87,7 +82,6 @@ def find_clock(
 
     Parameters
     ----------
-    names, units : of the columns.
     head : gives the first cells of a column, with decimal points.
     """
     named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
@@ -119,9 +113,7 @@ def own_clocks(
 
     Parameters
     ----------
-    names, units : of the columns.
     head : gives the first cells of a column, with decimal points.
-    first : the clock of the others.
     """
     found = {}
     for k, name in enumerate(names):
@@ -165,8 +157,6 @@ def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock 
     Parameters
     ----------
     column : from 0.
-    name, unit : of it.
-    head : its first cells, with decimal points.
     """
     return _clock(column, name, unit, head, _is_any)
 
@@ -339,11 +329,8 @@ def seconds(
 
     Parameters
     ----------
-    label : file and run, for messages.
-    clock : the column they are of.
     values : (n,) as in the file.
     rows : (n,) where each is in the file.
-    place : what a row is called.
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
         and what follows where the clock goes back for long is put after the rest; refused else.
     restarts : whether a clock that goes back for long is mended, too: not one of several.
@@ -394,12 +381,8 @@ def risen(
 
     Parameters
     ----------
-    label : file and run, for messages.
-    name : whose times they are, for messages.
     t : times [s], (n,).
     rows : (n,) where each is in the file.
-    place : what a row is called.
-    mend, restarts : as of `seconds`.
 
     Raises
     ------
@@ -639,7 +622,6 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     ----------
     t : stamps [s], one of which is not above the one before, (n,).
     rows : (n,) where each is in the file.
-    place : what a row is called.
     restarts : whether a clock that starts again can be mended.
     """
     k = _first_step(t, lambda step: ~(step > 0.0))

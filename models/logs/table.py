@@ -57,12 +57,7 @@ class Words(NamedTuple):
 
     @classmethod
     def of(cls, cells: Sequence[str]) -> "Words":
-        """Return the words of cells.
-
-        Parameters
-        ----------
-        cells : one per row.
-        """
+        """Return the words of cells."""
         codes: dict[str, int] = {}
         coded = [codes.setdefault(cell, len(codes)) for cell in cells]
         return cls(list(codes), np.array(coded, dtype=np.int32))
@@ -123,10 +118,7 @@ class Gathered:
 
     Parameters
     ----------
-    path : for messages.
     kinds : column from 0 -> how its cells are read.
-    names : of the columns.
-    place : what a row is called.
     run : column and word of the rows to keep; None keeps all.
     """
 
@@ -206,7 +198,6 @@ class TableLog:
 
     Parameters
     ----------
-    table : of any format.
     clock_name : of the column that is the time; empty finds it.
     mend : whether stamps that do not rise are mended, and not refused.
     """
@@ -349,13 +340,7 @@ class TableLog:
 
         Parameters
         ----------
-        names : as listed.
         run : one of `runs`; None where there are none.
-
-        Raises
-        ------
-        RecordingError
-            One line: file, column, rule, value, remedy.
         """
         places, clock = chosen(self.path, names, self._places), self.clock
         if clock is None:

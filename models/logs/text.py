@@ -37,10 +37,6 @@ _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 def open_text(path: Path) -> TableLog:
     """Return the log in a text file of any dialect, its layout understood.
 
-    Parameters
-    ----------
-    path : of a file, packed by gzip or not.
-
     Raises
     ------
     RecordingError
@@ -63,8 +59,6 @@ class TextTable:
 
     Parameters
     ----------
-    path : the file.
-    layout : where it is, and how it is written.
     arrow : whether pyarrow is used; None where it is installed and the file is large.
     """
 
@@ -231,8 +225,6 @@ class _Python:
 
     Parameters
     ----------
-    path : of the file, for messages.
-    layout : of the table.
     wanted : column from 0 -> how its cells are read.
     """
 

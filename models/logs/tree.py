@@ -33,7 +33,6 @@ class Leaf:
 
     Parameters
     ----------
-    shape : rows and columns.
     load : reads it, (rows, columns) float64.
     """
 
@@ -43,12 +42,7 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """What is not read: an object, a sparse or complex array.
-
-    Parameters
-    ----------
-    kind : what it is, for messages.
-    """
+    """What is not read: an object, a sparse or complex array."""
 
     kind: str
 
@@ -96,24 +90,14 @@ class Found(NamedTuple):
 
 
 def signals_of(tree: Mapping[str, Tree]) -> Found:
-    """Return the channels of a tree, in its order; their names may repeat.
-
-    Parameters
-    ----------
-    tree : by name of a variable.
-    """
+    """Return the channels of a tree, in its order; their names may repeat."""
     walk = _Walk()
     walk.struct(dict(tree), "", ())
     return Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
 
 
 def times_of(clock: Clock) -> Array:
-    """Read the times of a clock as they are in the file, (n,).
-
-    Parameters
-    ----------
-    clock : where they are.
-    """
+    """Read the times of a clock as they are in the file, (n,)."""
     values = clock.leaf.load()
     return values.reshape(-1) if clock.column is None else _line(values, clock.column, clock.leaf)
 
@@ -231,7 +215,6 @@ def line_of(values: Array, signal: Signal) -> Array:
     Parameters
     ----------
     values : of its leaf, (rows, columns).
-    signal : which line of them.
     """
     line = values[:, signal.place] if signal.along == 0 else values[signal.place]
     return np.array(line, dtype=np.float64)

@@ -152,12 +152,7 @@ _WORDS = (
 
 
 def _plain(unit: str) -> str:
-    """Return a spelling without brackets, blanks and exponents' signs, in small letters.
-
-    Parameters
-    ----------
-    unit : as written.
-    """
+    """Return a spelling without brackets, blanks and exponents' signs, in small letters."""
     text = unit.strip().strip("[](){}").strip().lower()
     for old, new in _WORDS:
         text = text.replace(old, new)
@@ -172,12 +167,7 @@ def _per_second(found: re.Match[str]) -> str:
 
 
 def quantities(unit: str) -> tuple[str, ...]:
-    """Return what a unit may be of; empty where it is of nothing a car's motion has.
-
-    Parameters
-    ----------
-    unit : as written.
-    """
+    """Return what a unit may be of; empty where it is of nothing a car's motion has."""
     plain = _plain(unit)
     found = tuple(name for name, factors in FACTORS.items() if plain in factors)
     if len(found) > 1 and plain == "kn":  # the letters' size tells, where it is as it should be
@@ -186,12 +176,7 @@ def quantities(unit: str) -> tuple[str, ...]:
 
 
 def is_known(unit: str) -> bool:
-    """Return whether a spelling is a unit of anything that cars log, or stands for none.
-
-    Parameters
-    ----------
-    unit : as written.
-    """
+    """Return whether a spelling is a unit of anything that cars log, or stands for none."""
     plain = _plain(unit)
     return plain in NO_UNIT or any(
         plain in known for known in (*FACTORS.values(), *OTHERS.values())
@@ -199,22 +184,12 @@ def is_known(unit: str) -> bool:
 
 
 def time_unit(unit: str) -> str:
-    """Return the unit of time, one of `PER_SECOND`, that a spelling is; "" where it is none.
-
-    Parameters
-    ----------
-    unit : as written.
-    """
+    """Return the unit of time, one of `PER_SECOND`, that a spelling is; "" where it is none."""
     return _TIMES.get(_plain(unit), "")
 
 
 def are_same(one: str, other: str) -> bool:
-    """Return whether two spellings are one unit, as "deg" and "°".
-
-    Parameters
-    ----------
-    one, other : as written.
-    """
+    """Return whether two spellings are one unit, as "deg" and "°"."""
     first, second = _plain(one), _plain(other)
     return first == second or any(
         first in known and second in known and known[first] == known[second]
@@ -223,12 +198,7 @@ def are_same(one: str, other: str) -> bool:
 
 
 def is_told(unit: str) -> bool:
-    """Whether a unit is written at all; "-" and the like tell none.
-
-    Parameters
-    ----------
-    unit : as written.
-    """
+    """Whether a unit is written at all; "-" and the like tell none."""
     return _plain(unit) not in NO_UNIT
 
 
@@ -253,7 +223,6 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     ----------
     unit : as written; where it tells none, SI is meant.
     quantity : of the signal, one of `SI`.
-    what : begins the message: the file, the signal and its channel.
 
     Raises
     ------

@@ -49,16 +49,15 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
     Parameters
     ----------
     signal : one of `WHEELS`.
-    words : of the name, in small letters.
     """
     listed = frozenset(words)
     if listed & OTHERS:
         return False
     if signal == WHEELS[-1]:
-        here = not listed & ANYWHERE
-        return here and bool(listed & ENCODER or (listed & WHEEL and listed & TURNS))
+        turns = listed & ENCODER or (listed & WHEEL and listed & TURNS) or listed == {signal}
+        return bool(turns and not listed & ANYWHERE)
     for place in PLACES[signal]:
         rest = listed - place
         if listed >= place and not rest & ANYWHERE:
-            return bool(rest & BOTH or (rest & WHEEL and rest & TURNS))
+            return bool(rest & BOTH or (rest & WHEEL and (rest & TURNS or rest <= WHEEL)))
     return False

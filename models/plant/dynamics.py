@@ -50,12 +50,7 @@ class Wheel(NamedTuple):
 
 
 def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
-    """Return the wheels: front left, front right, rear left, rear right.
-
-    Parameters
-    ----------
-    vehicle : the car, with chassis.
-    """
+    """Return the wheels: front left, front right, rear left, rear right."""
     c = vehicle.require_chassis()
     front, rear = 0.5 * c.track_front, 0.5 * c.track_rear
     return (
@@ -72,7 +67,6 @@ def mounted(tire: Tire, wheel: Wheel) -> Tire:
     Parameters
     ----------
     tire : any of `models.tires`.
-    wheel : where it goes.
     """
     if isinstance(tire, MagicFormula):
         return tire.mounted("left" if wheel.y > 0.0 else "right")
@@ -104,7 +98,6 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
 
     Parameters
     ----------
-    tire : as mounted on this side.
     slip : lagged slip tan(α') [-].
     camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
@@ -130,7 +123,6 @@ def downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
 
     Parameters
     ----------
-    vehicle : the car.
     v_x : longitudinal speed [m/s].
     """
     if not vehicle.has_downforce:
@@ -155,7 +147,6 @@ def wheel_loads(
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
     roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
     axle_force : side force of the front and the rear axle, body frame, (2,) [N].
     a_x : longitudinal acceleration [m/s^2].
@@ -244,12 +235,6 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
 
     `aside` is what pushes the body to the left at its center of gravity beside the tires, over its
     mass [m/s^2]: the slope of a banked road, which an accelerometer does not feel, and wind.
-
-    Parameters
-    ----------
-    vehicle : the car, with chassis.
-    tires : of the two front and of the two rear wheels.
-    driver : who holds the speed.
     """
     m, I_z, l_f, l_r = vehicle.mass, vehicle.yaw_inertia, vehicle.l_f, vehicle.l_r
     c, h = vehicle.require_chassis(), vehicle.roll_arm
@@ -261,7 +246,8 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     slip, delta, F_lagged, a_x_lagged, integral = x[8:12], x[12:14], x[14:16], x[16], x[17]
 
     demand, integral_dot = driver.demand(v_ref - v_x, integral)
-    drive = [m * demand * share for share in (c.drive_front_share, 1.0 - c.drive_front_share)]
+    front = ca.if_else(demand > 0.0, c.drive_front_share, c.brake_front_share)
+    drive = [m * demand * share for share in (front, 1.0 - front)]
     pressed = downforce(vehicle, v_x)
     F_z = wheel_loads(vehicle, roll, roll_rate, F_lagged, a_x_lagged, pressed)
 

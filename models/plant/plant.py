@@ -11,6 +11,7 @@ import numpy as np
 
 from codegen import Scan, Stepper, compiler
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from codegen.graph import lifted
 from models.friction import Friction
 from models.maneuvers import Maneuver
@@ -29,8 +30,6 @@ class PlantRun:
 
     Parameters
     ----------
-    name : of the run.
-    vehicle : the car that drove.
     t : time [s], (n,).
     v_x, v_y : velocity of the center of gravity in the body frame [m/s], (n,).
     r : yaw rate [rad/s], (n,).
@@ -77,8 +76,6 @@ class PlantRun:
 
         Parameters
         ----------
-        name : of the run.
-        vehicle : the car that drove.
         t : time [s], (n,).
         command : steering asked for [rad], (n, 2).
         record : state "x" (n, 18) in the order of `models.plant.dynamics`, and its outputs.
@@ -137,7 +134,7 @@ class PlantRun:
 OverTime = float | Callable[[Array], Array]  # a number, or a function of the times (n,) [s]
 
 
-class PlantError(ArithmeticError):
+class PlantError(TireidError, ArithmeticError):
     """The car left the range of its equations; the message says when."""
 
 
@@ -165,9 +162,6 @@ def compiled_loop(
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
-    tires : of the front and the rear wheels, hashable.
-    driver : who holds the speed.
     dt : step of the integration [s].
     """
     car, constants = lifted(dynamics(vehicle, tires, driver))
@@ -183,10 +177,6 @@ GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 def tire_of(vehicle: Vehicle) -> MagicFormula:
     """Return the tire of the file that a chassis names.
-
-    Parameters
-    ----------
-    vehicle : the car, with chassis.
 
     Raises
     ------
@@ -229,7 +219,6 @@ class Plant:
     vehicle : the car; it needs a chassis.
     tire : of all four wheels, a frozen record; None reads the file named by the chassis.
     rear_tire : of the two rear wheels, where they have another.
-    driver : who holds the speed.
 
     Raises
     ------
@@ -269,7 +258,6 @@ class Plant:
 
         Parameters
         ----------
-        maneuver : what the wheels are asked to do, and for how long.
         speed : wanted speed [m/s], a number or a function of the times (n,) [s].
         friction : of the road; None is what the tire was measured on.
         bank : slope of the road across the car [rad], positive where it falls to the left; wheel
@@ -364,7 +352,6 @@ class StepwisePlant:
 
     Parameters
     ----------
-    plant : the car on its tires.
     friction : of the road; None is what the tire was measured on.
     period : for which command and wanted speed are held [s], a multiple of `dt`.
     dt : step of the integration [s].
@@ -411,11 +398,6 @@ class StepwisePlant:
         v_x : speed [m/s].
         X, Y : position of the center of gravity [m].
         psi : heading [rad].
-
-        Raises
-        ------
-        ValueError
-            When the speed is not positive.
         """
         if not v_x > 0.0:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
@@ -428,7 +410,6 @@ class StepwisePlant:
 
         Parameters
         ----------
-        state : now.
         command : steering angles asked for, [δ_f, δ_r] [rad].
         v_ref : wanted speed [m/s].
 

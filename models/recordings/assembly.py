@@ -23,7 +23,7 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
-from models.logs.signals import BETA, QUANTITIES, WHEELS, Signal, quantity_of
+from models.logs.signals import BETA, QUANTITIES, SPARED, WHEELS, Signal, quantity_of
 from models.logs.spelling import without_unit
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, is_told, to_si
@@ -73,16 +73,9 @@ def recording_of(
 
     Parameters
     ----------
-    log : as a format reads it.
     name : of the recording, without its run.
-    log_map : how it is read.
     run : name of the run; None where the map names it, or there is only one.
     dt : sample time T_s of the result [s].
-
-    Raises
-    ------
-    RecordingError
-        One line: file and run, column, rule, value, remedy.
     """
     if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):
         raise RecordingError(f"{log.path}: the sample time dt must be positive, it is {dt!r}")
@@ -96,8 +89,19 @@ def recording_of(
         if has_wheels(signals):
             learnt = _scale_note(log, signals, log_map, run)
         signals = _without_wheels(signals)
-    parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
-    stretches = _stretches(label, signals, parts, log_map, dt)
+    spared = ""
+    try:
+        parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
+        stretches = _stretches(label, signals, parts, log_map, dt)
+    except RecordingError as error:
+        needed = {
+            key: one for key, one in signals.items() if key not in SPARED or key in log_map.signals
+        }
+        if len(needed) == len(signals):
+            raise
+        signals, spared = needed, f"{', '.join(map(column_of, SPARED))} is left aside: {error}"
+        parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
+        stretches = _stretches(label, signals, parts, log_map, dt)
     rolls = ""
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
@@ -105,7 +109,7 @@ def recording_of(
     mended = dict.fromkeys(note for raws in parts.values() for raw in raws for note in raw.mended)
     notes = (*_notes(log), *reading.notes, *mended, *_hole_notes(parts))
     notes += _gap_notes(stretches.kept)
-    notes += tuple(note for note in (learnt, rolls) if note)
+    notes += tuple(note for note in (learnt, rolls, spared) if note)
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
         notes += (f"left out: {stretches.short} stretch{several} of less than {_shortest(dt):g} s",)
@@ -188,7 +192,6 @@ def scaled(values: Array, factor: float) -> Array:
     Parameters
     ----------
     values : (n,).
-    factor : of all of them.
     """
     if factor == 1.0:
         return values
@@ -349,7 +352,7 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
     """Return one stretch as a recording, in ISO axes, filtered where the map says so."""
     t, sign = stretch.t, AXES[log_map.axes]
     signals = {
-        key: values if key == "v_x" else scaled(values, sign)
+        key: values if key in ("v_x", "a_x") else scaled(values, sign)
         for key, values in stretch.signals.items()
     }
     if log_map.low_pass is not None:
@@ -369,6 +372,7 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
         delta_f=signals["delta_f"],
         delta_r=signals["delta_r"] if "delta_r" in signals else np.zeros(t.size),
         a_y=signals.get("a_y"),
+        a_x=signals.get("a_x"),
         axle_force=force,
     )
 
@@ -380,10 +384,7 @@ def wheel_scales(
 
     Parameters
     ----------
-    log : as a format reads it.
     signals : v_x, wheels, and r where it is there; others are not looked at.
-    log_map : how the log is read.
-    run : of the log.
 
     Raises
     ------
@@ -408,13 +409,7 @@ def _scale_note(
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
-    """Return the units of wheels, told or else of the file, by signal.
-
-    Parameters
-    ----------
-    headings : of the log's channels.
-    signals : how each is read.
-    """
+    """Return the units of wheels, told or else of the file, by signal."""
     units = {one.name: one.unit for one in headings}
     return {
         name: one.unit if is_told(one.unit) else units[one.channel[0]]

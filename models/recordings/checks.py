@@ -38,17 +38,7 @@ LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars;
 
 
 def check_physics(recording: Recording) -> None:
-    """Refuse a recording whose signs, axes or units contradict the laws of motion.
-
-    Parameters
-    ----------
-    recording : the recording to judge.
-
-    Raises
-    ------
-    RecordingError
-        Naming the column, the rule, the value and the remedy.
-    """
+    """Refuse a recording whose signs, axes or units contradict the laws of motion."""
     _refuse(recording, physics_contradiction(recording))
 
 
@@ -60,10 +50,6 @@ def _refuse(recording: Recording, contradiction: str | None) -> None:
 
 def physics_contradiction(recording: Recording) -> str | None:
     """Return how a recording contradicts the laws of motion: column, rule, value and remedy.
-
-    Parameters
-    ----------
-    recording : the recording to judge.
 
     Returns
     -------
@@ -352,13 +338,7 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
 
     Parameters
     ----------
-    recording : the recording to judge.
     vehicle : anything with l_f and l_r [m] and mass [kg].
-
-    Raises
-    ------
-    RecordingError
-        Naming the column, the rule, the value and the remedy.
     """
     _refuse(recording, vehicle_contradiction(recording, vehicle))
 
@@ -368,7 +348,6 @@ def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
 
     Parameters
     ----------
-    recording : the recording to judge.
     vehicle : anything with l_f and l_r [m] and mass [kg].
 
     Returns

@@ -18,6 +18,7 @@ from models.logs.signals import (
     INSTEAD,
     NEEDED,
     QUANTITIES,
+    SPARED,
     WHEELS,
     Signal,
     require_fitting,
@@ -38,12 +39,7 @@ class Reading(NamedTuple):
 
 
 def column_of(name: str) -> str:
-    """Return what a signal is called where columns are told.
-
-    Parameters
-    ----------
-    name : ours.
-    """
+    """Return what a signal is called where columns are told."""
     return COLUMNS.get(name, name)
 
 
@@ -51,13 +47,6 @@ def chosen_signals(
     log: LogFile, headings: Sequence[Heading], log_map: LogMap, run: str | None
 ) -> Reading:
     """Return how each signal is read.
-
-    Parameters
-    ----------
-    log : as a format reads it.
-    headings : of its channels.
-    log_map : what is told.
-    run : of the log.
 
     Raises
     ------
@@ -93,12 +82,6 @@ def as_listed(
     A channel that is listed with its unit, "Vel Lat [km/h]", may be told without. A v_x that is
     not there is left out where wheels are told.
 
-    Parameters
-    ----------
-    log : for messages.
-    signals : by our name.
-    names : of the channels.
-
     Raises
     ------
     RecordingError
@@ -126,13 +109,7 @@ def as_listed(
 
 
 def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
-    """Return what is told, and what a proposal is sure of beside it, in the order of signals.
-
-    Parameters
-    ----------
-    told : by our name.
-    proposal : of the same log.
-    """
+    """Return what is told, and what a proposal is sure of beside it, in the order of signals."""
     sure = {name: one for name, one in proposal.signals().items() if name not in told}
     if has_wheels(told):
         sure.pop("v_x", None)
@@ -145,13 +122,7 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
 
 
 def with_wheels(signals: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
-    """Return signals and, beside a v_x, the wheels of which it tells how they roll.
-
-    Parameters
-    ----------
-    signals : by our name.
-    proposal : of the same log.
-    """
+    """Return signals and, beside a v_x, the wheels of which it tells how they roll."""
     if "v_x" not in signals:
         return dict(signals)
     there = {channel for one in signals.values() for channel in one.channel}
@@ -161,12 +132,7 @@ def with_wheels(signals: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
 
 
 def has_wheels(signals: Iterable[str]) -> bool:
-    """Return whether there is the speed of a wheel, of which v_x can be made.
-
-    Parameters
-    ----------
-    signals : our names.
-    """
+    """Return whether there is the speed of a wheel, of which v_x can be made."""
     return any(name in WHEELS for name in signals)
 
 
@@ -189,11 +155,6 @@ def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:
 def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
     """Return the signals that bear the standard names of columns.
 
-    Parameters
-    ----------
-    log : for messages.
-    names : of the channels.
-
     Raises
     ------
     RecordingError
@@ -202,6 +163,8 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
     found = {}
     for name in QUANTITIES:
         column = column_of(name)
+        if f"{column} (2)" in names and name in SPARED:
+            continue
         if f"{column} (2)" in names:
             raise RecordingError(f"{log.path}: column {column} appears more than once")
         if column in names and name != BETA:
@@ -222,33 +185,18 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
 
 
 def has_v_y(signals: Mapping[str, Signal]) -> bool:
-    """Return whether a lateral velocity is read, or the sideslip angle in its place.
-
-    Parameters
-    ----------
-    signals : by our name.
-    """
+    """Return whether a lateral velocity is read, or the sideslip angle in its place."""
     return "v_y" in told_by(signals)
 
 
 def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
-    """Return the needed signals that are not there; without v_y it is estimated from a_y.
-
-    Parameters
-    ----------
-    signals : by our name.
-    """
+    """Return the needed signals that are not there; without v_y it is estimated from a_y."""
     there = told_by(signals) | ({"v_y"} if "a_y" in signals else set())
     return [name for name in NEEDED if name not in there]
 
 
 def listing(names: Sequence[str]) -> str:
-    """Return what channels there are, the first of many.
-
-    Parameters
-    ----------
-    names : of the channels.
-    """
+    """Return what channels there are, the first of many."""
     return f"columns found: '{some(names)}'" if names else "there is none but the time"
 
 
@@ -267,13 +215,7 @@ def _lost_text(told: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tupl
 
 
 def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
-    """Return which channel was left aside that may be v_y, or beside it a_y; empty where none.
-
-    Parameters
-    ----------
-    found : signals that are read, by our name.
-    proposal : what the channels probably are.
-    """
+    """Return which channel was left aside that may be v_y, or beside it a_y; empty where none."""
     if has_v_y(found):
         a_y = proposal.guesses.get("a_y")
         if "a_y" in found or a_y is None or a_y.confidence < HINT:
@@ -289,26 +231,14 @@ def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
 
 
 def aside_signals(found: Mapping[str, Signal], proposal: Proposal) -> list[str]:
-    """Return the signals that a channel may be and that are left aside, as `aside_text` says.
-
-    Parameters
-    ----------
-    found : signals that are read, by our name.
-    proposal : what the channels probably are.
-    """
+    """Return the signals that a channel may be and that are left aside, as `aside_text` says."""
     if not aside_text(found, proposal):
         return []
     return ["a_y"] if has_v_y(found) else [x for x in stand_ins("v_y", proposal) if x != "a_y"]
 
 
 def stand_ins(name: str, proposal: Proposal) -> list[str]:
-    """Return what a channel may tell of a signal: itself; of v_y it or beta, and a_y.
-
-    Parameters
-    ----------
-    name : of a signal that is missing.
-    proposal : what the channels probably are.
-    """
+    """Return what a channel may tell of a signal: itself; of v_y it or beta, and a_y."""
     there = {one: guess.confidence for one, guess in proposal.guesses.items()}
     if name != "v_y":
         return [name] if name in there else []
@@ -318,15 +248,7 @@ def stand_ins(name: str, proposal: Proposal) -> list[str]:
 
 
 def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
-    """Return the error of a log in which not every signal is found: what may be it, what to do.
-
-    Parameters
-    ----------
-    log : that was looked at.
-    missing : signals that are needed.
-    proposal : what the channels probably are.
-    names : of the channels.
-    """
+    """Return the error of a log in which not every signal is found: what may be it, what to do."""
     likely = [one for name in missing for one in stand_ins(name, proposal)]
     parts = [likely_text(one, proposal) for one in likely]
     words = [column_word(one, proposal) for one in likely]
@@ -342,13 +264,7 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
 
 
 def likely_text(name: str, proposal: Proposal) -> str:
-    """Return which channels may be a signal, in words; empty where none may.
-
-    Parameters
-    ----------
-    name : of the signal.
-    proposal : what the channels probably are.
-    """
+    """Return which channels may be a signal, in words; empty where none may."""
     guess, rivals = proposal.guesses.get(name), proposal.rivals.get(name, ())
     if rivals:
         listed = " or ".join(repr(" + ".join(one.channel)) for one in rivals[:3])
@@ -361,13 +277,7 @@ def likely_text(name: str, proposal: Proposal) -> str:
 
 
 def column_word(name: str, proposal: Proposal) -> str:
-    """Return the word of --columns that would tell a signal; empty where no channel may be it.
-
-    Parameters
-    ----------
-    name : of the signal.
-    proposal : what the channels probably are.
-    """
+    """Return the word of --columns that would tell a signal; empty where no channel may be it."""
     guess = proposal.guesses.get(name)
     if guess is None:
         return ""

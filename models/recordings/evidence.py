@@ -177,13 +177,7 @@ def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
 
 
 def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:
-    """Return the sums of `width` samples of a signal from each start.
-
-    Parameters
-    ----------
-    signal : its values at samples.
-    n : samples that there are.
-    """
+    """Return the sums of `width` samples of a signal from each start."""
     if n > LONG:  # windows are far apart: their samples are looked at alone
         sums: Array = np.sum([signal(start + k) for k in range(width)], axis=0)
         return sums

@@ -39,7 +39,7 @@ from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
 from models.schema import Table, read_toml
 
-AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
+AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
 REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
 MEND = "mend"  # what may become of stamps that do not rise
 TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
@@ -52,8 +52,8 @@ class LogMap:
 
     Parameters
     ----------
-    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, Fyf, Fyr) how it is
-        read.
+    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, a_x, Fyf, Fyr) how
+        it is read.
     axes : of the file: "ISO" (y to the left, z up) or "SAE" (y to the right, z down).
     run : which of the file's runs; empty where there is one.
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
@@ -287,10 +287,6 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
     "delta_f=SteerFL + SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a
     star, an offset in SI behind a minus, a ratio of the steering behind a slash. Of several
     channels, with blanks about each plus, the mean is taken, of forces the sum.
-
-    Parameters
-    ----------
-    pairs : one word for each signal.
 
     Raises
     ------

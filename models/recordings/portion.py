@@ -46,7 +46,6 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
 
     Parameters
     ----------
-    recording : the whole.
     middle : sample before which half of the stretches shall lie; None spreads them over all.
     """
     n = len(recording)

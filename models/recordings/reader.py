@@ -23,15 +23,16 @@ Told = LogMap | str | PathLike[str] | None
 
 
 def read_recording(
-    path: str | Path,
+    source: Any,
     run: str | None = None,
     dt: float = DT,
     *,
+    name: str = "",
     check: bool = True,
     columns: Mapping[str, str] = NO_NAMES,
     log_map: Told = None,
 ) -> Recording:
-    """Read one run of a log and bring it to a uniform sample time.
+    """Read one run of a log, a file or arrays in memory, and bring it to a uniform sample time.
 
     Columns of standard names are in SI and ISO axes: t [s], vx, vy [m/s], r [rad/s], delta_f
     [rad]; if present also delta_r [rad] (else 0), wheel_fl, wheel_fr, wheel_rl, wheel_rr or wheel
@@ -44,9 +45,11 @@ def read_recording(
 
     Parameters
     ----------
-    path : a log of any format.
-    run : name of the run; may be left out when the file has only one.
+    source : path of a log of any format; or a data frame, or a mapping of arrays of one length, by
+        column. Times of the calendar and durations count from the first.
+    run : name of the run; may be left out when there is only one.
     dt : sample time T_s of the result [s].
+    name : of the recording; empty takes that of the file, "recording" for arrays.
     check : whether to judge signs, axes and units by physics; turn it off for a log that is right
         and refused all the same. Where the map holds a repair, what it leaves is judged.
     columns : by our name of a column, its name in this file and, where it wants them, unit,
@@ -57,17 +60,21 @@ def read_recording(
     Returns
     -------
     Recording
-        Named "FILE:RUN", or "FILE" when there is one run without a name.
+        Named "NAME:RUN", or "NAME" when there is one run without a name.
 
     Raises
     ------
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    path = Path(path)
     told = with_columns(map_of(log_map), columns)
+    if not isinstance(source, str | PathLike):
+        name = name or "recording"
+        arrays = ArrayLog(name, source, told.clock, mend=told.order == MEND)
+        return _judged(arrays, name, replace(told, clock=""), run=run, dt=dt, check=check)
+    path = Path(source)
     log = open_log(path, told.dbc or None, mend=told.order == MEND)
-    return _judged(log, _stem(path), told, run=run, dt=dt, check=check)
+    return _judged(log, name or _stem(path), told, run=run, dt=dt, check=check)
 
 
 def read_repaired(
@@ -111,40 +118,12 @@ def read_repaired(
 
 
 def repair_text(repair: Repair) -> str:
-    """Return a repair as words: each number with its name.
-
-    Parameters
-    ----------
-    repair : of a log.
-    """
+    """Return a repair as words: each number with its name."""
     words = []
     for name, value in repair.tables().items():
         inner = value if isinstance(value, dict) else {"": value}
         words += [f"{name}{'.' * bool(key)}{key} = {one:.4g}" for key, one in inner.items()]
     return ", ".join(words)
-
-
-def recording_from_arrays(
-    name: str, data: Any, told: LogMap, *, run: str | None, dt: float, check: bool
-) -> Recording:
-    """Return one run of arrays in memory as a recording.
-
-    Parameters
-    ----------
-    name : of the recording, and in messages.
-    data : a data frame or a mapping, by column.
-    told : how it is read.
-    run : name of the run; None where there is only one.
-    dt : sample time T_s of the result [s].
-    check : whether to judge signs, axes and units by physics.
-
-    Raises
-    ------
-    RecordingError
-        One line: name and run, column, rule, value, remedy.
-    """
-    log = ArrayLog(name, data, told.clock, mend=told.order == MEND)
-    return _judged(log, name, replace(told, clock=""), run=run, dt=dt, check=check)
 
 
 def map_of(told: Told) -> LogMap:
@@ -160,13 +139,7 @@ def map_of(told: Told) -> LogMap:
 
 
 def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
-    """Return a map with columns that are told beside it; "t" is the time.
-
-    Parameters
-    ----------
-    told : the map.
-    columns : as of `read_recording`.
-    """
+    """Return a map with columns that are told beside it; "t" is the time."""
     if not isinstance(columns, Mapping):
         raise RecordingError(
             f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
@@ -195,12 +168,7 @@ def _without_faults(recording: Recording, repair: Repair) -> Recording:
 
 
 def runs(path: str | Path) -> list[str]:
-    """List the runs of a log in their order; empty when it has none apart.
-
-    Parameters
-    ----------
-    path : a log of any format.
-    """
+    """List the runs of a log in their order; empty when it has none apart."""
     return list(open_log(path).runs())
 
 

@@ -5,15 +5,15 @@ ISO axes: x forward, y left, z up; r and delta turn left when positive, forces p
 """
 
 import csv
+import importlib
 import io
 import math
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,16 +24,13 @@ from models.files import write_atomically
 from models.logs.log import RecordingError
 from models.rules import LARGEST_FORCE
 
-if TYPE_CHECKING:
-    from models.recordings.map import LogMap
-
 MINIMUM_SAMPLES = 10
 PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
 JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
 
 
 ALL = slice(None)
-OPTIONAL = ("v_y", "a_y", "axle_force")
+OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
 MISSING = {
     "v_y": "so slip angles are not known; tireid identify --method inertial estimates it",
     "a_y": "which is needed where vy is not measured",
@@ -47,6 +44,7 @@ LARGEST = {
     "r": 1e4,
     "delta_f": 1e5,
     "delta_r": 1e5,
+    "a_x": 1e5,
     "a_y": 1e5,
     "axle_force": LARGEST_FORCE,
 }
@@ -75,6 +73,8 @@ class Recording:
     a_y : what an accelerometer at the center of gravity shows [m/s^2], positive to the left, shape
         (n,), or None when it was not logged. It feels tires and wind: v̇_y + v_x r on a level road,
         less g sin of its angle on one that falls to the left.
+    a_x : the same forward [m/s^2], shape (n,), or None when it was not logged. It feels what tires
+        push lengthwise, less the drag of the air: v̇_x - v_y r on a level road.
     axle_force : front and rear lateral axle force [N], positive to the left, shape (n, 2), or
         None when there is no truth.
     breaks : index of the first sample of each stretch but the first, rising.
@@ -97,6 +97,7 @@ class Recording:
     delta_f: Array
     delta_r: Array
     a_y: Array | None = None
+    a_x: Array | None = None
     axle_force: Array | None = None
     breaks: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
@@ -150,43 +151,6 @@ class Recording:
                     f"{self.name}: t must rise from one stretch to the next, "
                     f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
                 )
-
-    @classmethod
-    def from_dataframe(
-        cls,
-        data: Any,
-        *,
-        name: str = "recording",
-        run: str | None = None,
-        dt: float = 0.01,
-        check: bool = True,
-        columns: Mapping[str, str] | None = None,
-        log_map: "LogMap | str | PathLike[str] | None" = None,
-    ) -> "Recording":
-        """Return one run of a data frame, checked and brought to a uniform time as a file is.
-
-        Parameters
-        ----------
-        data : a pandas data frame, or a mapping of arrays of one length, by column. Names, units
-            and signs are those of `read_recording`; `delta_r` may be missing. Times of the
-            calendar and durations count from the first.
-        name : of the recording, in place of a file's.
-        run : which run of the column "run", where there are several.
-        dt : sample time T_s to resample to [s].
-        check : whether data that contradict physics, once they are repaired, are refused.
-        columns : by our name of a column, its name in `data` and, behind it, unit, factor, offset
-            or ratio, as of `read_recording`.
-        log_map : how the data are read, or the path of a log.toml; its repair is not applied.
-
-        Raises
-        ------
-        RecordingError
-            One line: name and run, column, rule, value, remedy.
-        """
-        from models.recordings.reader import map_of, recording_from_arrays, with_columns
-
-        told = with_columns(map_of(log_map), columns or {})
-        return recording_from_arrays(name, data, told, run=run, dt=dt, check=check)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -312,6 +276,40 @@ class Recording:
             )
         return self.taken(keep)
 
+    def __getitem__(self, times: slice) -> "Recording":
+        """Return the part between two times [s], both included, as label slices of pandas have it.
+
+        Parameters
+        ----------
+        times : `log[5.0:20.0]`, on the recording's own clock; what is left out is the begin or end.
+
+        Raises
+        ------
+        TypeError
+            Where it is no slice of two times.
+        RecordingError
+            If fewer than 10 samples are left.
+        """
+        if not isinstance(times, slice) or times.step is not None:
+            raise TypeError(f"a recording is sliced by time in s, as log[5.0:20.0], not {times!r}")
+        t0 = self.t[0] if times.start is None else times.start
+        t1 = self.t[-1] if times.stop is None else times.stop
+        return self.between(float(t0), float(t1))
+
+    def to_dataframe(self) -> Any:
+        """Return it as a data frame of pandas, by the columns of `write_recording`.
+
+        Raises
+        ------
+        ImportError
+            Where pandas is not installed.
+        """
+        try:
+            pandas = importlib.import_module("pandas")
+        except ImportError:
+            raise ImportError("a data frame needs pandas: pip install pandas") from None
+        return pandas.DataFrame(_columns(self))
+
     def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a stretch begins.
 
@@ -393,8 +391,8 @@ def peak(signal: Array) -> float:
     return max(abs(float(signal.min())), abs(float(signal.max())))
 
 
-CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")  # what sensors show
-SIGNALS = ("t", *CHANNELS, "axle_force")
+CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")  # what may be faulty, and repaired
+SIGNALS = ("t", *CHANNELS, "a_x", "axle_force")
 
 
 def joined(recordings: Sequence[Recording], name: str | None = None) -> Recording:
@@ -442,7 +440,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
         for name in SIGNALS[1:]
         if all(getattr(one, name) is not None for one in recordings)
     }
-    for missing in ("v_y", "a_y"):
+    for missing in ("v_y", "a_y", "a_x"):
         without = [one.name for one in recordings if getattr(one, missing) is None]
         if missing not in signals and len(without) < len(recordings):
             column = missing.replace("_", "")
@@ -518,18 +516,13 @@ def _off_grid(t: Array, step: float) -> float:
 
 
 def write_recording(recording: Recording, path: str | Path) -> Path:
-    """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay [m/s^2], Fyf, Fyr [N].
+    """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay, ax [m/s^2], Fyf, Fyr [N].
 
     Columns that the recording lacks are left out. Numbers are the shortest that read back the
     same: `read_recording` gives the recording back bit for bit at its own interval, a drive in
     stretches where each lasts a second and time leaps by more than 0.1 s between them. Over a
     shorter gap a reader draws a line, unless its map tells a shorter `longest_gap`, and shorter
     stretches it leaves out. The file appears whole or not at all; an existing one is replaced.
-
-    Parameters
-    ----------
-    recording : what to write.
-    path : a name that ends in .csv or .csv.gz.
 
     Returns
     -------
@@ -544,6 +537,13 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
         raise RecordingError(f"{path}: the name must end in .csv or .csv.gz")
+    text = _csv(_columns(recording))
+    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
+    return path
+
+
+def _columns(recording: Recording) -> dict[str, Array]:
+    """Return the signals that there are, by the standard names of columns."""
     signals = {
         "t": recording.t,
         "vx": recording.v_x,
@@ -552,13 +552,12 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         "delta_f": recording.delta_f,
         "delta_r": recording.delta_r,
         "ay": recording.a_y,
+        "ax": recording.a_x,
     }
     columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
-    text = _csv(columns)
-    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
-    return path
+    return columns
 
 
 def _csv(columns: Mapping[str, Array]) -> Iterator[bytes]:

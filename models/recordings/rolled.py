@@ -60,7 +60,6 @@ def rolled(
     speeds : at which wheels roll [m/s], by names of `WHEELS`, each (n,); at least one.
     r : yaw rate [rad/s], (n,).
     delta_f, delta_r : angles of the road wheels [rad], (n,).
-    wheels : their places, and which are driven.
     dt : sample time [s].
 
     Raises
@@ -127,10 +126,8 @@ def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
 
     Parameters
     ----------
-    trust : before it.
     c : speed of the center of gravity by each wheel [m/s], (k,).
     rates : by which each changed lately [m/s²], (k,).
-    rule : of all samples.
     """
     v, a, since, known = trust
     dt, most, limit, free = rule

@@ -42,13 +42,6 @@ def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
 
     Where no unit is written, a radius that is told says that the numbers are turns.
 
-    Parameters
-    ----------
-    what : begins the message: the file, the signal and its channel.
-    name : of the signal.
-    unit : as written.
-    wheels : what they are.
-
     Raises
     ------
     RecordingError
@@ -75,8 +68,6 @@ def learnt_scales(
     Parameters
     ----------
     parts : by signal its channels in SI; v_x, wheels, and r where it is there.
-    signals : how each is made of them.
-    units : of the wheels, as written.
     """
     t = parts["v_x"][0].t
     t = t[:: -(-t.size // MOST)]
@@ -134,12 +125,7 @@ def learnt_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, f
 
 
 def scale_text(scales: Mapping[str, Scale]) -> str:
-    """Return in words what v_x told of wheels; empty where it told nothing.
-
-    Parameters
-    ----------
-    scales : by name.
-    """
+    """Return in words what v_x told of wheels; empty where it told nothing."""
     if not scales:
         return ""
     told = ", ".join(
@@ -153,14 +139,7 @@ def scale_text(scales: Mapping[str, Scale]) -> str:
 def with_scales(
     wheels: Wheels, signals: Mapping[str, Signal], scales: Mapping[str, Scale]
 ) -> tuple[Wheels, dict[str, Signal]]:
-    """Return what a log.toml says of wheels by what was learnt: radii, and factors of speeds.
-
-    Parameters
-    ----------
-    wheels : as told.
-    signals : how each is read.
-    scales : by name.
-    """
+    """Return what a log.toml says of wheels by what was learnt: radii, and factors of speeds."""
     found = dict(signals)
     for name, one in scales.items():
         if not one.turns:

@@ -81,12 +81,7 @@ def positive(x: Expression) -> Expression:
 
 
 def smaller(a: Expression, b: Expression) -> Expression:
-    """The smaller of two finite numbers; NaN stays NaN, which fmin(a, b) would hide.
-
-    Parameters
-    ----------
-    a, b : the numbers.
-    """
+    """The smaller of two finite numbers; NaN stays NaN, which fmin(a, b) would hide."""
     return a * (a <= b) + b * (b < a)
 
 

@@ -67,7 +67,6 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
     Parameters
     ----------
     s : the other slip, not shifted.
-    S_H : its shift.
     B, C, E : stiffness, shape and curvature factor of the weight.
     """
     Bs = B * (s + S_H)
@@ -294,9 +293,7 @@ class MagicFormula:
 
     Parameters
     ----------
-    coefficients : force coefficients and scaling factors of the file.
     side : side of the car this tire belongs to, "left" or "right".
-    valid_range : slips, camber and loads the file was measured for.
     name : where the tire comes from, for messages and tables.
 
     Raises

@@ -15,6 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from codegen.errors import TireidError
 from codegen.escape import shown
 from models.schema import read_bytes
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
@@ -90,7 +91,6 @@ def unit_in_si(dimension: str, unit: str) -> float:
     Parameters
     ----------
     dimension : "LENGTH", "FORCE", "ANGLE", "MASS" or "TIME".
-    unit : as written in the file.
 
     Raises
     ------
@@ -116,7 +116,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")  # alone: str.splitlines also ends a comme
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?")
 
 
-class TirError(ValueError):
+class TirError(TireidError, ValueError):
     """A tire property file cannot be used; one line naming the file and the reason."""
 
 
@@ -141,8 +141,6 @@ class TirFile:
 
     Parameters
     ----------
-    path : the file, for messages.
-    entries : all lines of each key, the key in capitals.
     without_sign : lines that begin with a word but have no "=", by that word in capitals; their
         value is empty.
     """
@@ -159,7 +157,6 @@ class TirFile:
 
         Parameters
         ----------
-        key : in capitals.
         default : the answer where the file has no such key, or an empty value.
 
         Raises
@@ -190,12 +187,7 @@ class TirFile:
         return next(iter(values)) * self._unit(key)
 
     def error(self, reason: str) -> TirError:
-        """A TirError that names this file.
-
-        Parameters
-        ----------
-        reason : the rule and the value, in one line.
-        """
+        """A TirError that names this file."""
         return TirError(f"{self.path}: {reason}")
 
     def _parsed(self, key: str, entry: Entry) -> float:

@@ -211,35 +211,44 @@ static void count(tireid_mpc_state *state, tireid_mpc_status status)
     state->faults[status] += (state->faults[status] < UINT32_MAX) ? 1U : 0U;
 }
 
+/* The wheels at an angle, and no plan. */
+static void begin_at(tireid_mpc_state *state, real steering)
+{
+    uint32_t i;
+    tireid_mpc_clear(state);
+    for (i = 0U; i < TIREID_MPC_COMMANDS; i++) {
+        state->commands[i] = steering;
+    }
+    state->lagged[0] = TIREID_MPC_C(0.0);
+    state->lagged[1] = TIREID_MPC_C(0.0);
+    tireid_mpc_trust(state);
+    state->iterations = 0U;
+    state->age = 0U;
+    state->planned = 0U;
+    state->shifted = 0U;
+    state->started = 0U;
+}
+
 tireid_mpc_status tireid_mpc_init(tireid_mpc_state *state)
 {
-    tireid_mpc_status status = tireid_mpc_reset(state, TIREID_MPC_C(0.0));
-    if (status == TIREID_MPC_OK) {
+    tireid_mpc_status status = TIREID_MPC_BAD_CALL;
+    if (state != NULL) {
         uint32_t i;
+        begin_at(state, TIREID_MPC_C(0.0));
         for (i = 0U; i < TIREID_MPC_STATUSES; i++) {
             state->faults[i] = 0U;
         }
+        status = TIREID_MPC_OK;
     }
     return status;
 }
 
-tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, real steering)
+tireid_mpc_status tireid_mpc_reset(
+    tireid_mpc_state *state, const tireid_mpc_params *params, real steering)
 {
     tireid_mpc_status status = TIREID_MPC_BAD_CALL;
-    if ((state != NULL) && tireid_mpc_within(steering, MOST_ANGLE)) {
-        uint32_t i;
-        tireid_mpc_clear(state);
-        for (i = 0U; i < TIREID_MPC_COMMANDS; i++) {
-            state->commands[i] = steering;
-        }
-        state->lagged[0] = TIREID_MPC_C(0.0);
-        state->lagged[1] = TIREID_MPC_C(0.0);
-        tireid_mpc_trust(state);
-        state->iterations = 0U;
-        state->age = 0U;
-        state->planned = 0U;
-        state->shifted = 0U;
-        state->started = 0U;
+    if ((state != NULL) && (params != NULL) && tireid_mpc_within(steering, params->max_steering)) {
+        begin_at(state, steering);
         status = TIREID_MPC_OK;
     }
     return status;

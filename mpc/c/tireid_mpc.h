@@ -41,7 +41,7 @@ typedef enum {
     TIREID_MPC_OFF_MAP = 5,         /* |v_y|, |r|, speed or curvature beyond the limits */
     TIREID_MPC_TOO_SLOW = 6,        /* slower than min_speed, now or ahead */
     TIREID_MPC_LATE = 7,            /* set by the caller: the command came after its time */
-    TIREID_MPC_BAD_CALL = 8         /* a null pointer, no angle: nothing was done */
+    TIREID_MPC_BAD_CALL = 8         /* a null pointer, no such angle: nothing was done */
 } tireid_mpc_status;
 
 typedef struct {
@@ -101,9 +101,12 @@ typedef struct {
     tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
     tireid_mpc_real commands[TIREID_MPC_COMMANDS]; /* steering [rad], the last one first */
     tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
-    tireid_mpc_real zero;     /* of the wheels over what is commanded [rad], without caution none */
-    tireid_mpc_real drift;    /* across the path beyond heading and v_y, by positions [m/s] */
-    tireid_mpc_real turning;  /* beyond the yaw rate, by headings [rad/s] */
+    tireid_mpc_real zero;  /* of the wheels over what is commanded [rad], without caution none */
+    tireid_mpc_real drift; /* across the path beyond heading and v_y, that is planned with [m/s] */
+    tireid_mpc_real turning;  /* beyond the yaw rate, that is planned with [rad/s] */
+    tireid_mpc_real apart[2]; /* both as position and heading show them now [m/s, rad/s] */
+    tireid_mpc_real stays[2]; /* what of that stays */
+    tireid_mpc_real last[2];  /* v_y [m/s] and yaw rate [rad/s] that were watched last */
     tireid_mpc_real place[2]; /* e_y [m] and e_psi [rad], followed by what moves the car */
     tireid_mpc_real grip;     /* friction that is planned with, over that of the tire */
     /* of each friction: -2 ln of its likelihood over that of the best; its slip [rad]; the impulse of
@@ -121,6 +124,7 @@ typedef struct {
     uint32_t guessed;  /* 1: x and u without a solution */
     uint32_t started;  /* 0 until the first step */
     uint32_t gentle;   /* steps that told of the zero of the wheels */
+    uint32_t placed;   /* steps that told of those of v_y and yaw rate */
     uint32_t watched;  /* steps for which impulses are followed */
     uint32_t doubted;  /* 0 until frictions have their costs */
 } tireid_mpc_state;
@@ -184,8 +188,10 @@ typedef struct {
 /* Begin with the wheels straight and no plan; faults are forgotten. */
 tireid_mpc_status tireid_mpc_init(tireid_mpc_state *state);
 
-/* Begin with the wheels at an angle [rad], at most 3.2, and no plan; faults are kept. */
-tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, tireid_mpc_real steering);
+/* Begin with the wheels at an angle [rad], at most params.max_steering to either side, and no plan;
+ * faults are kept. */
+tireid_mpc_status tireid_mpc_reset(
+    tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_real steering);
 
 /* Do ahead of a measurement what does not ask for it: shift the plan, linearize along it on the road that
  * is expected, factorize. Its step then does the first third of the stages anew, and a sweep. Of `expected` the road alone is

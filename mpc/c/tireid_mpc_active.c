@@ -4,7 +4,9 @@
  * no choice left and is eliminated; soft ones as the quadratics 1/2 s^2 / regular. The next set is
  * what this solution says: rows that it breaks come in, rows that hold it back from less cost go
  * (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13, 2002). Where nothing changes all conditions of
- * optimality hold. Behind the last stage that changed the recursion stays as it is. */
+ * optimality hold. Where a set changes more rows than the one before, so that sets may come again and
+ * again, the first stage that changes does so alone from then on (Murty, Math. Programming 7, 1974).
+ * Behind the last stage that changed the recursion stays as it is. */
 #include "tireid_mpc_active.h"
 
 #include "tireid_mpc_equations.h"
@@ -17,7 +19,7 @@
 #define RATE 0U         /* place of the rate among the rows of a stage */
 #define ANGLE 1U        /* of the angle; then soft ones */
 
-#define MOST_CHANGES ((3U * N) / 10U) /* by the first set, where it is worth to go on */
+#define MOST_CHANGES ((3U * N) / 10U) /* by a set, where it is worth to go on */
 
 #define real tireid_mpc_real
 
@@ -81,8 +83,9 @@ static void choose_held(tireid_mpc_work *work, uint32_t k, real tolerance)
     }
 }
 
-/* The next set, from what this one leads to; the count of rows that change, and the last stage. */
-static uint32_t choose(tireid_mpc_work *work, real tolerance, uint32_t *last)
+/* The next set, from what this one leads to, of all stages or of the first that changes alone; the count
+ * of rows that are to change, and the last stage that does. */
+static uint32_t choose(tireid_mpc_work *work, real tolerance, bool first_only, uint32_t *last)
 {
     const real limit[2] = { TIREID_MPC_C(1.0) + tolerance, TIREID_MPC_C(1.0) - tolerance };
     uint32_t changes = 0U;
@@ -93,16 +96,15 @@ static uint32_t choose(tireid_mpc_work *work, real tolerance, uint32_t *last)
     }
     for (k = 0U; k < N; k++) {
         const uint32_t p = k * ROWS;
+        const bool moves = !first_only || (changes == 0U);
         uint32_t differ = 0U;
         choose_held(work, k, tolerance);
         for (i = 0U; i < ROWS; i++) {
             differ += (work->next[p + i] != work->active[p + i]) ? 1U : 0U;
-            work->active[p + i] = work->next[p + i];
+            work->active[p + i] = moves ? work->next[p + i] : work->active[p + i];
         }
-        if (differ > 0U) {
-            changes += differ;
-            *last = k;
-        }
+        *last = (moves && (differ > 0U)) ? k : *last;
+        changes += differ;
     }
     return changes;
 }
@@ -126,6 +128,7 @@ tireid_mpc_status tireid_mpc_active_set(tireid_mpc_work *work, const tireid_mpc_
     tireid_mpc_status status = TIREID_MPC_ITERATION_LIMIT;
     const uint32_t left = params->max_iterations - work->iterations;
     const uint32_t tries = (left < params->max_active_sets) ? left : params->max_active_sets;
+    bool first_only = false;
     uint32_t most = MOST_CHANGES;
     uint32_t tried = 0U;
     while ((status == TIREID_MPC_ITERATION_LIMIT) && (tried < tries)) {
@@ -134,14 +137,15 @@ tireid_mpc_status tireid_mpc_active_set(tireid_mpc_work *work, const tireid_mpc_
         work->iterations++;
         tried++;
         tireid_mpc_forward(work);
-        changes = choose(work, params->tolerance, &last);
+        changes = choose(work, params->tolerance, first_only, &last);
         if (changes == 0U) {
             status = TIREID_MPC_OK;
-        } else if (changes > most) {
+        } else if (changes > MOST_CHANGES) {
             tried = tries;
         } else if ((tried < tries) && !tireid_mpc_prepare_set(work, params->cost_rate, last)) {
             status = TIREID_MPC_QP_FAILED;
         } else {
+            first_only = first_only || (changes > most);
             most = changes;
         }
     }

@@ -6,8 +6,10 @@
  * its cost is -2 ln of its likelihood, over that of the best. A friction may come at any time, so that
  * no cost is above a surprise. Planned is with the least friction that is not refuted.
  *
- * Sensors may be off for good. Position and heading show where the car came to, so that what v_y and
- * the yaw rate tell beyond that is theirs.
+ * Sensors may be off. Position and heading show where the car came to, so that what v_y and the yaw
+ * rate tell beyond that is theirs, or that of the speed. While they contradict position and heading by
+ * more than good sensors do, or jump as no car does, a force that is missed is a sensor fault before it
+ * is ice: of friction nothing is concluded until they agreed for a while, and nothing is tightened.
  *
  * Along the plan the doubt of the forces, less grip at both axles for the whole horizon, moves the car
  * by the sensitivities of the plan and its feedback: by that much soft limits are tightened. */
@@ -31,14 +33,20 @@
 #define LEFT TIREID_MPC_C(0.3)     /* share of a limit that is left */
 
 #define GENTLE TIREID_MPC_C(0.3)    /* slip over the useful one up to which wheels are judged */
-#define FOUND TIREID_MPC_C(0.3)     /* time in which their zero is found at first [s] */
+#define FOUND TIREID_MPC_C(0.3)     /* time in which a zero is found at first [s] */
 #define LASTING TIREID_MPC_C(3.0)   /* and in the end; between them as long as it was looked for */
 #define MOST_ZERO TIREID_MPC_C(0.1) /* of it [rad] */
 
-#define SHOWN TIREID_MPC_C(0.5)        /* time in which a zero of v_y or yaw rate is found [s] */
-#define ASTRAY TIREID_MPC_C(0.5)       /* m, rad: a place that is another one, of another path */
+#define SHOWN TIREID_MPC_C(0.14)       /* time in which it shows what v_y is off [s] */
+#define TURNED TIREID_MPC_C(0.07)      /* and what the yaw rate is: headings are less noisy [s] */
+#define ASTRAY TIREID_MPC_C(0.25)      /* m, rad: a place that is another one, of another path */
+#define ACROSS TIREID_MPC_C(0.2)       /* that v_y and position of good sensors are apart [m/s] */
+#define AROUND TIREID_MPC_C(0.04)      /* that yaw rate and heading are [rad/s] */
+#define SWAYS TIREID_MPC_C(0.2)        /* noise from one v_y to the next of good sensors [m/s] */
+#define TURNS TIREID_MPC_C(0.02)       /* and from one yaw rate [rad/s] */
+#define FASTEST TIREID_MPC_C(10.0)     /* that tires change either [m/s^2, rad/s^2] */
 #define MOST_DRIFT TIREID_MPC_C(1.0)   /* of the zero of v_y [m/s] */
-#define MOST_TURNING TIREID_MPC_C(0.1) /* of the zero of the yaw rate [rad/s] */
+#define MOST_TURNING TIREID_MPC_C(0.6) /* of the zero of the yaw rate [rad/s] */
 
 #define real tireid_mpc_real
 
@@ -78,7 +86,14 @@ void tireid_mpc_trust(tireid_mpc_state *state)
     state->turning = TIREID_MPC_C(0.0);
     state->place[0] = TIREID_MPC_C(0.0);
     state->place[1] = TIREID_MPC_C(0.0);
+    state->apart[0] = TIREID_MPC_C(0.0);
+    state->apart[1] = TIREID_MPC_C(0.0);
+    state->stays[0] = TIREID_MPC_C(0.0);
+    state->stays[1] = TIREID_MPC_C(0.0);
+    state->last[0] = TIREID_MPC_C(0.0);
+    state->last[1] = TIREID_MPC_C(0.0);
     state->gentle = 0U;
+    state->placed = 0U;
     state->watched = 0U;
     state->doubted = 0U;
 }
@@ -137,18 +152,24 @@ static sight follow(tireid_mpc_state *state, const tireid_mpc_params *params,
     return seen;
 }
 
+/* Share of the way to a zero that a step goes: what tells it is averaged from the first of it on, as of
+ * what stays. `told` counts the steps that did. */
+static real share_of(const tireid_mpc_params *params, uint32_t *told)
+{
+    const real time = (real)*told * params->period;
+    const real most = (time < LASTING) ? time : LASTING;
+    *told += (*told < UINT32_MAX) ? 1U : 0U;
+    return params->period / ((most > FOUND) ? most : FOUND);
+}
+
 /* Angle [rad] by which wheels are off what is commanded: where slip is small, friction makes little of
- * the force that is missed in front. What tells it is averaged from the first of it on, as of what stays. */
+ * the force that is missed in front. */
 static void find_zero(
     tireid_mpc_state *state, const tireid_mpc_params *params, const sight *seen, real grip)
 {
     if (size_of(seen->slip) < (GENTLE * (grip * params->max_slip[0]))) {
-        const real told = (real)state->gentle * params->period;
-        const real most = (told < LASTING) ? told : LASTING;
-        const real time = (most > FOUND) ? most : FOUND;
-        const real moved = (seen->front / params->stiffness) * (params->period / time);
+        const real moved = (seen->front / params->stiffness) * share_of(params, &state->gentle);
         state->zero = tireid_mpc_clipped(state->zero + moved, MOST_ZERO);
-        state->gentle += (state->gentle < UINT32_MAX) ? 1U : 0U;
     }
 }
 
@@ -166,28 +187,58 @@ static void move_of(const tireid_mpc_input *in, real moves[2])
 }
 
 /* Find how the car drifts and turns beyond what heading, v_y and yaw rate tell, by an observer of the place
- * with both poles at -1 / SHOWN. */
+ * with double poles at -1 / SHOWN and -1 / TURNED. What of it stays is learnt slowly, at most as fast as
+ * good sensors are apart; what is beyond both is a sensor that fails now, and is taken off at once. */
 static void find_drift(
     tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in)
 {
     const real half = TIREID_MPC_C(0.5) * params->period;
-    const real gain = params->period / SHOWN;
+    const real share = share_of(params, &state->placed);
+    const real gain[2] = { params->period / SHOWN, params->period / TURNED };
+    const real rate[2] = { TIREID_MPC_C(1.0) / SHOWN, TIREID_MPC_C(1.0) / TURNED };
     const real shown[2] = { in->e_y, in->e_psi };
-    real moves[2];
-    real *const zeros[2] = { &state->drift, &state->turning };
+    const real good[2] = { ACROSS, AROUND };
     const real most[2] = { MOST_DRIFT, MOST_TURNING };
+    real *const zeros[2] = { &state->drift, &state->turning };
+    real moves[2];
     uint32_t i;
     move_of(in, moves);
     for (i = 0U; i < 2U; i++) {
-        const real way = half * (moves[i] + *zeros[i]);
+        const real way = half * (moves[i] + state->apart[i]);
         const real error = shown[i] - (state->place[i] + way);
+        real small;
         if ((state->watched == 0U) || !tireid_mpc_within(error, ASTRAY)) {
             state->place[i] = shown[i] + way;
         } else {
-            *zeros[i] = tireid_mpc_clipped(*zeros[i] + ((gain / SHOWN) * error), most[i]);
-            state->place[i] += (TIREID_MPC_C(2.0) * way) + (TIREID_MPC_C(2.0) * (gain * error));
+            state->place[i] += (TIREID_MPC_C(2.0) * way) + (TIREID_MPC_C(2.0) * (gain[i] * error));
+            state->apart[i] =
+                tireid_mpc_clipped(state->apart[i] + ((gain[i] * rate[i]) * error), most[i]);
         }
+        small = tireid_mpc_clipped(state->apart[i] - state->stays[i], good[i]);
+        state->stays[i] += share * small;
+        *zeros[i] = state->apart[i] - small;
     }
+}
+
+/* Whether sensors contradict each other: what is apart is more than that of good ones, or one of them
+ * moves as no tire moves a car. */
+static bool contradicted(
+    tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in)
+{
+    const real most = FASTEST * params->period;
+    const bool follows = (state->watched == 0U)
+        || (tireid_mpc_within(in->v_y - state->last[0], SWAYS + most)
+            && tireid_mpc_within(in->r - state->last[1], TURNS + most));
+    state->last[0] = in->v_y;
+    state->last[1] = in->r;
+    return !follows || !tireid_mpc_within(state->apart[0], ACROSS)
+        || !tireid_mpc_within(state->apart[1], AROUND);
+}
+
+/* Whether what is followed tells something: sensors agree, and did for a while. */
+static bool settled(const tireid_mpc_state *state, const tireid_mpc_params *params)
+{
+    return ((real)state->watched * params->period) > SETTLED;
 }
 
 /* Place of the friction that is held for the most likely one. */
@@ -253,18 +304,21 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
         real feared;
         uint32_t best;
         uint32_t j;
+        bool faulty;
+        find_drift(state, params, in);
+        faulty = contradicted(state, params, in);
         for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
-            if (state->doubted == 0U) {
+            if (faulty || (state->doubted == 0U)) {
                 state->cost[j] = params->prior[j];
             }
             seen[j] = follow(state, params, in, wheels, j);
         }
-        if (((real)state->watched * params->period) > SETTLED) {
+        state->watched = faulty ? 0U : state->watched;
+        if (settled(state, params)) {
             judge_grips(state, params, seen);
+            best = best_of(state);
+            find_zero(state, params, &seen[best], params->grips[best]);
         }
-        best = best_of(state);
-        find_zero(state, params, &seen[best], params->grips[best]);
-        find_drift(state, params, in);
         feared = params->caution * (TIREID_MPC_C(1.0) - least_grip(state, params));
         if (state->doubted == 0U) {
             state->grip = TIREID_MPC_C(1.0) - feared;
@@ -274,7 +328,7 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
         state->watched += (state->watched < UINT32_MAX) ? 1U : 0U;
         state->doubted = 1U;
         if (!tireid_mpc_within(state->grip, TIREID_MPC_C(1.0))
-            || !tireid_mpc_carriable(state->place, 2U)
+            || !tireid_mpc_carriable(state->place, 2U) || !tireid_mpc_carriable(state->apart, 2U)
             || !tireid_mpc_carriable(state->cost, TIREID_MPC_GRIPS)
             || !tireid_mpc_carriable(state->impulse[0], 2U * TIREID_MPC_GRIPS)
             || !tireid_mpc_carriable(state->slips[0], 2U * TIREID_MPC_GRIPS)) {
@@ -318,7 +372,7 @@ void tireid_mpc_tighten(
     const tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work)
 {
     const real dt = params->stage_time;
-    const bool cautious = params->caution > TIREID_MPC_C(0.0);
+    const bool cautious = (params->caution > TIREID_MPC_C(0.0)) && settled(state, params);
     real d[2][NX] = { { TIREID_MPC_C(0.0) } }; /* by the front and by the rear axle */
     uint32_t k;
     uint32_t axle;

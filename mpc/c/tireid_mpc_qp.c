@@ -7,7 +7,8 @@
  *
  * Before it, and once it comes close, the set of active rows alone is tried, which takes half an
  * iteration where it is right. At first only where the solution before left few rows otherwise than
- * it found them: a car that is thrown about at every step pays for no set that is not. */
+ * it found them, and the way from here presses few that the plan does not: a car that is thrown about pays for no set
+ * that is not. Where no sets are wanted, nothing is factorized for one. */
 #include "tireid_mpc_qp.h"
 
 #include "tireid_mpc_active.h"
@@ -18,7 +19,7 @@
 #define N TIREID_MPC_HORIZON
 #define SIDE (N * TIREID_MPC_ROWS) /* rows of all stages */
 #define FEW_SWITCHED (N / 5U)      /* rows, of the solution before: so few that sets are tried */
-#define CLOSE TIREID_MPC_C(1.0)    /* mean product l t from which on the set is looked at */
+#define CLOSE TIREID_MPC_C(0.1)    /* mean product l t from which on the set is looked at */
 #define SETTLED ((2U * N) / 5U)    /* rows that may change yet, so that the set is tried */
 #define SMALLEST_GAP TIREID_MPC_C(0.1) /* to begin with */
 #define NEAR TIREID_MPC_C(10.0)        /* products l t to begin with */
@@ -256,7 +257,7 @@ static tireid_mpc_status advance(
     tireid_mpc_status status = TIREID_MPC_ITERATION_LIMIT;
     go(work, shortened(seen->primal), shortened(seen->dual));
     *mu = mean_product(work, TIREID_MPC_C(0.0), TIREID_MPC_C(0.0));
-    if ((*mu <= CLOSE) && (find_set(work) <= SETTLED)) {
+    if ((params->max_active_sets > 0U) && (*mu <= CLOSE) && (find_set(work) <= SETTLED)) {
         if (tireid_mpc_prepare_set(work, params->cost_rate, N - 1U)) {
             status = tireid_mpc_active_set(work, params);
         }
@@ -299,7 +300,8 @@ void tireid_mpc_prepare_qp(
     tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t switched, uint32_t stages)
 {
     tireid_mpc_begin_set(work, params->tolerance, stages);
-    work->ready = (switched <= FEW_SWITCHED) && ((stages == N) || work->ready)
+    work->ready = (params->max_active_sets > 0U) && (switched <= FEW_SWITCHED)
+        && ((stages == N) || work->ready)
         && tireid_mpc_prepare_set(work, params->cost_rate, stages - 1U);
 }
 

@@ -7,14 +7,16 @@ from typing import Any
 
 import casadi as ca
 
+from codegen.errors import TireidError
+from models.extras import needs
 from models.tires import TireForces
 from models.vehicle import GRAVITY, Chassis, Vehicle
 
 # The package commonroad-vehicle-models, which not everybody has installed.
 
 
-class MissingCommonRoadError(ImportError):
-    """The package is not installed; `pip install tireid[commonroad]` brings it."""
+class MissingCommonRoadError(TireidError, ImportError):
+    """The package is not installed; the message says how to install it."""
 
 
 def require_commonroad() -> None:
@@ -29,8 +31,7 @@ def require_commonroad() -> None:
         importlib.import_module("vehiclemodels.parameters_vehicle2")
     except ImportError:
         raise MissingCommonRoadError(
-            "the CommonRoad cars need the package commonroad-vehicle-models: "
-            "pip install tireid[commonroad]"
+            needs("a CommonRoad car", "commonroad-vehicle-models", "commonroad")
         ) from None
 
 
@@ -77,7 +78,6 @@ def scale_friction(parameters: Any, tire: dict[str, float], scale: float) -> Non
 
     Parameters
     ----------
-    parameters : theirs, changed in place.
     tire : the coefficients at scale 1.
     scale : friction over the tire's own [-].
     """
@@ -202,6 +202,7 @@ def bmw() -> Vehicle:
         relaxation_length_rear=0.05,
         steering_lag=INSTANT,
         drive_front_share=p.T_se,
+        brake_front_share=p.T_sb,
     )
     return Vehicle(
         name="BMW 320i",

@@ -8,8 +8,9 @@ of the center of gravity, speeds of the front and the rear wheel.
 """
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from itertools import count
+from types import FunctionType
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,7 +30,6 @@ class Equations(Protocol):
         Parameters
         ----------
         core : X, Y, steering, speed, heading, yaw rate, side slip.
-        parameters : theirs.
         """
 
     def derivative(self, x: Array, rate: float, demand: float, parameters: Any) -> Array:
@@ -40,7 +40,6 @@ class Equations(Protocol):
         x : their state (n,).
         rate : of the steering [rad/s].
         demand : acceleration asked for [m/s^2].
-        parameters : theirs.
         """
 
     def car_state(self, t: float, x: Array, x_dot: Array, inner: Any, parameters: Any) -> CarState:
@@ -50,8 +49,6 @@ class Equations(Protocol):
         ----------
         t : time [s].
         x, x_dot : their state and its derivative, (n,).
-        inner : what the car reads when it goes on.
-        parameters : theirs.
         """
 
 
@@ -75,67 +72,52 @@ def axle_force(vehicle: Vehicle, a_y: float, r_dot: float) -> Array:
 STEERING, V_X, HEADING, YAW_RATE, ROLL, V_Y, V_Y_FRONT, V_Y_REAR = 2, 3, 4, 5, 6, 10, 15, 20
 
 
-@contextmanager
-def slip_at_the_axles(parameters: Any) -> Iterator[Callable[[Array], None]]:
-    """Let their tires slip by the velocity of the axle instead of that of the sprung mass.
+class SlipAtTheAxles:
+    """Their tire functions, with the slip by the velocity of the axle, not of the sprung mass.
 
-    Their tire functions are called for the front pair and then for the rear pair; each is wrapped
-    so that it adds what the slip angle lacks. Gives the function to call before each evaluation.
+    Their program calls each for the front pair and then for the rear pair; what the slip angle
+    lacks is added to what it gives.
 
     Parameters
     ----------
-    parameters : theirs, with the axle distances a and b.
+    x : their state (29,).
     """
-    from vehiclemodels.utils import tire_model
 
-    lacking = [0.0, 0.0]
-    names = {"formula_lateral": 0, "formula_longitudinal_comb": 1, "formula_lateral_comb": 1}
-    originals = {name: getattr(tire_model, name) for name in names}
-    calls = dict.fromkeys(names, 0)
+    def __init__(self, tires: Any, x: Array, parameters: Any) -> None:
+        p = parameters
+        self._lacking = (
+            (x[V_Y_FRONT] - x[V_Y] - p.a * x[YAW_RATE]) / x[V_X],
+            (x[V_Y_REAR] - x[V_Y] + p.b * x[YAW_RATE]) / x[V_X],
+        )
+        self.formula_longitudinal = tires.formula_longitudinal
+        self.formula_lateral = self._shifted(tires.formula_lateral, 0)
+        self.formula_longitudinal_comb = self._shifted(tires.formula_longitudinal_comb, 1)
+        self.formula_lateral_comb = self._shifted(tires.formula_lateral_comb, 1)
 
-    def wrapped(name: str) -> Callable[..., Any]:
+    def _shifted(self, formula: Callable[..., Any], place: int) -> Callable[..., Any]:
+        """Return a formula whose argument at a place, the slip angle, is that of the axle."""
+        calls = count()
+
         def shifted(*arguments: Any) -> Any:
-            axle = calls[name] % 4 // 2
-            calls[name] += 1
             values = list(arguments)
-            values[names[name]] += lacking[axle]
-            return originals[name](*values)
+            values[place] += self._lacking[next(calls) % 4 // 2]
+            return formula(*values)
 
         return shifted
 
-    def prepare(x: Array) -> None:
-        p = parameters
-        lacking[0] = (x[V_Y_FRONT] - x[V_Y] - p.a * x[YAW_RATE]) / x[V_X]
-        lacking[1] = (x[V_Y_REAR] - x[V_Y] + p.b * x[YAW_RATE]) / x[V_X]
 
-    try:
-        for name in names:
-            setattr(tire_model, name, wrapped(name))
-        yield prepare
-    finally:
-        for name, original in originals.items():
-            setattr(tire_model, name, original)
-
-
-@contextmanager
-def as_published(parameters: Any) -> Iterator[Callable[[Array], None]]:
-    """Leave their program as it is.
+def with_tires(dynamics: Callable[..., Any], tires: object) -> Callable[..., Any]:
+    """Return their equations on other tire functions: the same code, in a namespace of its own.
 
     Parameters
     ----------
-    parameters : theirs, not needed.
+    dynamics : their function, which calls its tires `tireModel`; it stays as it is.
     """
-    del parameters
-    yield lambda _: None
+    return FunctionType(dynamics.__code__, {**dynamics.__globals__, "tireModel": tires})
 
 
 class MultiBody:
     """Their equations, and what their state says.
-
-    Parameters
-    ----------
-    vehicle : the same car for us.
-    repaired : let the tires slip at the axles.
 
     Raises
     ------
@@ -149,7 +131,7 @@ class MultiBody:
         from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
         self.vehicle = vehicle
-        self._slip = slip_at_the_axles if repaired else as_published
+        self._repaired = repaired
         self._start, self._dynamics = init_mb, vehicle_dynamics_mb
 
     def start(self, core: list[float], parameters: Any) -> Array:
@@ -163,10 +145,12 @@ class MultiBody:
         ----------
         x : their state (29,).
         """
-        with self._slip(parameters) as prepare:
-            prepare(x)
-            # The list is a copy: their function changes the state it is given.
-            return np.array(self._dynamics(list(x), [rate, demand], parameters))
+        dynamics = self._dynamics
+        if self._repaired:
+            tires = SlipAtTheAxles(dynamics.__globals__["tireModel"], x, parameters)
+            dynamics = with_tires(dynamics, tires)
+        # The list is a copy: their function changes the state it is given.
+        return np.array(dynamics(list(x), [rate, demand], parameters))
 
     def lateral(self, values: Array, parameters: Any) -> float:
         """Return what all masses together have of a lateral velocity or its derivative.
@@ -174,7 +158,6 @@ class MultiBody:
         Parameters
         ----------
         values : their state, or its derivative, (29,).
-        parameters : theirs.
         """
         p = parameters
         parts = p.m_s * values[V_Y] + p.m_uf * values[V_Y_FRONT] + p.m_ur * values[V_Y_REAR]
@@ -212,10 +195,6 @@ class MultiBody:
 
 class Drift:
     """Their equations, and what their state says.
-
-    Parameters
-    ----------
-    vehicle : the same car for us.
 
     Raises
     ------

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.friction import Friction, place_change
 from models.plant import Driver
 from mpc.cars.bmw import CommonRoadTire, bmw, bmw_parameters, bmw_tire, scale_friction
@@ -38,7 +39,6 @@ def friction_at(friction: Friction, t: float, X: float) -> float:
 
     Parameters
     ----------
-    friction : of the road.
     t : time [s].
     X : where its center of gravity is [m].
     """
@@ -46,7 +46,7 @@ def friction_at(friction: Friction, t: float, X: float) -> float:
     return scale + float(place_change(friction.over_place(), X)) if friction.by_place else scale
 
 
-class CommonRoadError(ArithmeticError):
+class CommonRoadError(TireidError, ArithmeticError):
     """Their car left the range of its equations; the message says when."""
 
 
@@ -64,10 +64,8 @@ class CommonRoadCar:
 
     Parameters
     ----------
-    equations : theirs.
     parameters : theirs, at friction 1; not shared with another car.
     friction : of the road; a change over the place acts on all wheels at once.
-    driver : who holds the speed, by proportional gain alone.
     period : for which the inputs are held [s], a multiple of `dt`.
     dt : step of the integration [s].
 
@@ -102,13 +100,7 @@ class CommonRoadCar:
         self.speed_gain = driver.gain
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
-        """Return the car rolling straight ahead.
-
-        Raises
-        ------
-        ValueError
-            When the speed is not positive.
-        """
+        """Return the car rolling straight ahead."""
         if not v_x > 0.0:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
         x = self._equations.start([X, Y, 0.0, v_x, psi, 0.0, 0.0], self._parameters)
@@ -166,8 +158,6 @@ def multi_body_car(
 
     Parameters
     ----------
-    friction : of the road.
-    driver : who holds the speed.
     period : for which the inputs are held [s].
     repaired : remove the two contradictions in their program, see `mpc.cars.bmw_equations`.
 
@@ -188,8 +178,6 @@ def drift_car(
 
     Parameters
     ----------
-    friction : of the road.
-    driver : who holds the speed.
     period : for which the inputs are held [s].
 
     Raises

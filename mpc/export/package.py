@@ -124,7 +124,6 @@ def record(tracker: Tracker, steps: int = STEPS) -> Vectors:
     Parameters
     ----------
     tracker : in double; it is reset before, and steers.
-    steps : of the tracker.
     """
     tracker.reset()
     problem, period = tracker.problem, tracker.period
@@ -177,12 +176,7 @@ def _road(n: int, period: float) -> Array:
 
 
 def vectors_header(name: str, found: Vectors) -> str:
-    """Return the vectors as a C header.
-
-    Parameters
-    ----------
-    name : of the package.
-    """
+    """Return the vectors as a C header."""
     return header(
         f"{name}_vectors.h",
         "Generated. Measurements e_y, e_psi, v_y, r; steering [rad] and status that follow; "
@@ -246,10 +240,8 @@ def build_mpc_package(
 
     Parameters
     ----------
-    tire : of the prediction, with its car.
     period : between two steps [s].
     delay : from a measurement until its command acts [s].
-    name : beginning of every symbol and file name.
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.
 
@@ -259,8 +251,6 @@ def build_mpc_package(
         Where the name is not one of C in lower case.
     NoCompilerError
         Where there is no C compiler, which the self-test is computed with.
-    ValueError
-        Where a number is out of its range.
     """
     check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
@@ -286,7 +276,6 @@ def mpc_readme(package: MpcPackage, about_figures: str) -> str:
 
     Parameters
     ----------
-    package : what it describes.
     about_figures : what it costs, as Markdown.
     """
     p = plain_params(package.params)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from codegen.errors import TireidError
 from codegen.package import c_files, defines, generated, header
 from codegen.template import Words, filled
 from identifier.axle.model import AxleModel
@@ -29,16 +30,12 @@ EXAMPLES: Mapping[str, str] = dict.fromkeys(
 )
 
 
-class NoHandoverError(ValueError):
+class NoHandoverError(TireidError, ValueError):
     """What a method learns cannot be handed over in C."""
 
 
 def frozen_start(package: Package) -> TireModel:
     """Return the model that an exported identifier begins with.
-
-    Parameters
-    ----------
-    package : of the identifier.
 
     Raises
     ------
@@ -158,7 +155,6 @@ def build_pair(
     Parameters
     ----------
     identifier : package of the identifier; its weights are the tire that is begun with.
-    problem : of the tracker.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.
     caution : of the tracker, from 0 to 1; a number of the parameters.

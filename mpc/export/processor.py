@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.package import manifest_with_figures, renamed
+from codegen.writing import write_file
 from identifier.export.processor import (
     CROSS_COMPILER,
     EMULATOR,
@@ -55,9 +56,7 @@ def replay_on_processor(package: MpcPackage, *, single: bool, steps: int = STEPS
 
     Parameters
     ----------
-    package : of the tracker.
     single : whether to compute in float.
-    steps : how many vectors.
 
     Raises
     ------
@@ -84,10 +83,7 @@ def replay_here(
 
     Parameters
     ----------
-    package : of the tracker.
     single : whether to compute in float.
-    steps : how many vectors.
-    flags : of the compiler.
 
     Raises
     ------
@@ -113,12 +109,12 @@ def _replayed(
         folder = Path(scratch)
         for path, text in package.files.items():
             (folder / path).parent.mkdir(exist_ok=True)
-            (folder / path).write_text(text, encoding="utf-8")
+            write_file(folder / path, text)
         for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
             source = (BOARD / board).read_text(encoding="utf-8")
-            (folder / board).write_text(source, encoding="utf-8")
+            write_file(folder / board, source)
         replay = (TARGET / "replay.c").read_text(encoding="utf-8")
-        (folder / "replay.c").write_text(renamed(replay, {PREFIX: name}), encoding="utf-8")
+        write_file(folder / "replay.c", renamed(replay, {PREFIX: name}))
         sources = sorted(path for path in package.files if path.startswith("src/"))
         macros = [f"-D{name.upper()}_SINGLE={int(single)}", f"-DSTEPS={steps}U"]
         own = [*macros, "-Iinclude", "-Isrc", "-Itests", "-I."]
@@ -132,9 +128,10 @@ def _replayed(
 
 
 class MpcCost(NamedTuple):
-    """What a package costs on a processor; flash: code and constants [bytes]."""
+    """What a package costs on a processor, built by a compiler; flash: code, constants [bytes]."""
 
     processor: str
+    compiler: str
     single: bool
     flash: int
     static_ram: int
@@ -150,29 +147,20 @@ class Times(NamedTuple):
 
 
 def measure_mpc(package: MpcPackage) -> list[MpcCost]:
-    """Return what a package costs on a Cortex-M7, float and double; empty without the tools.
-
-    Parameters
-    ----------
-    package : of the tracker.
-    """
+    """Return what a package costs on a Cortex-M7, float and double; empty without the tools."""
     if missing_tools():
         return []
-    costs = []
+    compiler, costs = compiler_version(CROSS_COMPILER), []
     for single in (True, False):
         size = size_on(PROCESSOR, package.name, package.files, single=single)
         replay = replay_on_processor(package, single=single)
-        costs.append(MpcCost(PROCESSOR.name, single, size.flash, size.static_ram, replay))
+        cost = MpcCost(PROCESSOR.name, compiler, single, size.flash, size.static_ram, replay)
+        costs.append(cost)
     return costs
 
 
 def time_here(package: MpcPackage) -> Times:
-    """Return what a step takes on this machine, in double, by Python's tracker: the same C.
-
-    Parameters
-    ----------
-    package : of the tracker.
-    """
+    """Return what a step takes on this machine, in double, by Python's tracker: the same C."""
     period, delay = float(package.params["period"]), float(package.params["delay"])
     tracker = Tracker(package.tire, package.problem, period=period, delay=delay)
     times, n = [], package.problem.horizon
@@ -211,7 +199,7 @@ def mpc_figures_text(costs: Sequence[MpcCost], times: Times) -> str:
         for c in costs
     )
     return (
-        f"{head}{rows}\n{compiler_version(CROSS_COMPILER)}, -O2; instructions\nand stack by "
+        f"{head}{rows}\n{costs[0].compiler}, -O2; instructions\nand stack by "
         f"{EMULATOR} over {STEPS} measurements of the self-test. The bound on instructions is\n"
         f"`max_iterations` of the solver.\n\n{here}"
     )
@@ -229,7 +217,7 @@ def with_mpc_figures(manifest: str, costs: Sequence[MpcCost]) -> str:
         {
             "processor": cost.processor,
             "precision": "float" if cost.single else "double",
-            "compiler": compiler_version(CROSS_COMPILER),
+            "compiler": cost.compiler,
             "flash_B": cost.flash,
             "static_ram_B": cost.static_ram,
             "state_B": cost.replay.state,

@@ -40,7 +40,6 @@ def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SL
 
     Parameters
     ----------
-    tire : weights to be handed over.
     v_x : speed [m/s].
     largest : slip up to which it is judged [rad].
     """

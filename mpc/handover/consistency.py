@@ -71,11 +71,6 @@ class Tolerances:
     calm : time of agreement after which learning goes on [s]. It doubles each time a disagreement
         comes back within ...
     relapse : ... this time of agreement, and to no more than this [s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     rate: float = 5.0
@@ -138,7 +133,6 @@ class Consistency:
 
         Parameters
         ----------
-        measured : by the sensors.
         asked : angle asked of the wheels that should have been reached by now [rad]; None where it
             is not known.
         """

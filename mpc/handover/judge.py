@@ -127,7 +127,6 @@ def axle_scan(structure: Any, k: int) -> Scan:
 
     Parameters
     ----------
-    structure : of the tires.
     k : number of tires.
     """
     lagged, begun = ca.SX.sym("lagged", 2, k), ca.SX.sym("begun")
@@ -168,11 +167,6 @@ class ErrorModel:
     accelerating : added to that share for each g of acceleration or braking, which shifts load
         between the axles and takes grip [-].
     largest : error that counts in full [standard deviations]: one fault alone proves nothing.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     stretch: float = 0.12
@@ -241,7 +235,6 @@ class Judge:
 
         Parameters
         ----------
-        tire : the model.
         samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
 
         Raises
@@ -254,11 +247,6 @@ class Judge:
 
     def chi_square(self, tire: PredictionTire, samples: Array) -> ChiSquare:
         """Return how badly a tire explains samples.
-
-        Parameters
-        ----------
-        tire : the model.
-        samples : as for `errors`.
 
         Raises
         ------
@@ -274,7 +262,6 @@ class Judge:
         ----------
         tire : structure and car; its weights are not read.
         weights : of k tires (k, n_weights).
-        samples : as for `errors`.
 
         Raises
         ------

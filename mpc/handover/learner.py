@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,6 @@ from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
-from mpc.tires.tire import valid_slip
 
 # Moving weights to new ones so gently that the plan does not jump.
 
@@ -47,8 +45,6 @@ def blended(
 
     Parameters
     ----------
-    now : tire in use.
-    target : tire to arrive at, of the same structure.
     share : of the way that is left, to go at most [-], in (0, 1].
     planned : first steering rate of the plan that a tire leads to, in one situation [rad/s].
     most : change of it that is allowed [rad/s].
@@ -74,39 +70,6 @@ def blended(
     return Step(now, 0.0, 0.0, False)
 
 
-# What a tracker would plan with other weights, in the situation that it is in.
-
-
-def previewed_rate(tracker: Tracker, tire: PredictionTire) -> float:
-    """Return the first steering rate of the plan after one more iteration with a tire [rad/s].
-
-    From the plan and the road of the last step; the tracker is left as it was.
-
-    Parameters
-    ----------
-    tracker : after a step.
-    tire : of the same structure.
-
-    Raises
-    ------
-    ValueError
-        Where the structure is another.
-    """
-    if tire.structure != tracker.tire.structure:
-        raise ValueError(f"the tracker is built for {tracker.tire.structure}, not {tire.structure}")
-    instance = tracker.instance
-    state, params = instance.state.copy(), instance.params.copy()
-    instance.start[:] = state["x"][0]
-    params_now = instance.params
-    params_now["weights"], params_now["car"] = tire.weights, tire.car
-    valid = valid_slip(tire, tracker.problem.limits.slip)
-    params_now["max_slip"], params_now["rise"] = valid.slip, valid.rise
-    instance.solve()
-    rate = float(instance.state["u"][0])
-    instance.state[...], instance.params[...] = state, params
-    return rate
-
-
 class Moved(NamedTuple):
     """A move of weights at a time [s]: share of the way, jump of the planned rate [rad/s]."""
 
@@ -125,14 +88,8 @@ class Learner:
 
     Parameters
     ----------
-    supervisor : decides.
     largest_jump : of the planned steering rate [rad/s].
     quick_jump : the same where the friction has changed [rad/s].
-
-    Raises
-    ------
-    ValueError
-        Where a bound is not positive.
     """
 
     def __init__(
@@ -153,7 +110,6 @@ class Learner:
 
         Parameters
         ----------
-        measured : by the sensors.
         tracker : which steers; its tire is moved.
         """
         agree = self._sensors.observe(measured, self._asked(tracker))
@@ -194,9 +150,7 @@ class Learner:
             return
         most = self._quick_jump if self._quick else self._jump
         share = min(1.0, tracker.period / max(self._left, tracker.period))
-        step = blended(
-            tracker.tire, target, share, planned=partial(previewed_rate, tracker), most=most
-        )
+        step = blended(tracker.tire, target, share, planned=tracker.previewed_rate, most=most)
         if step.share > 0.0:
             tracker.set_tire(step.tire)
         self._left = max(self._left - tracker.period, tracker.period)

@@ -39,7 +39,6 @@ def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
 
     Parameters
     ----------
-    tire : a ladder, or a network that does not read the speed.
     ratio : friction over the one that the tire has [-].
 
     Raises
@@ -74,8 +73,6 @@ def fit_friction(
 
     Parameters
     ----------
-    tire : as `at_friction` takes it.
-    samples : as `Judge.errors` takes them.
     known : friction over that of the tire that was taken so far [-].
     between : least and largest friction over that of the tire that is looked for [-].
     scale : of chi-squares: they are that many times as large as expected even of a good tire [-].
@@ -161,9 +158,6 @@ def look_at_road(
 
     Parameters
     ----------
-    road : the estimate so far.
-    in_use : the tire in use, the base at that friction.
-    window : the last samples.
     t : time [s].
     baseline : mean chi-square of the tire in use where the road does not change [-].
     trusted : slip up to which a tire must be one [rad].

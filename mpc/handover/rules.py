@@ -36,11 +36,6 @@ class Rules:
         that was less than this before [s].
     blend, quick_blend : time in which weights move to those handed over [s], for a learnt tire and
         for another friction.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     every: float = 0.05

@@ -76,10 +76,6 @@ class Excitation:
         """Return up to which slip [rad] a tire is to be judged.
 
         Ladders saturate whatever they have seen; any other tire only as far as the car slipped.
-
-        Parameters
-        ----------
-        tire : to be judged.
         """
         if tire.structure.saturates:
             return LARGEST_SLIP
@@ -112,8 +108,6 @@ class Supervisor:
 
     Parameters
     ----------
-    identifier : which is told every sample here.
-    in_use : the tire that is steered with at the start.
     judge : of chi-squares; None expects the usual errors.
     proven : whether that tire is one of this car, so that what it does not explain is the road;
         else a friction is looked for only after a learnt tire took over.

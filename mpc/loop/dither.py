@@ -30,7 +30,6 @@ class Dither:
 
     Parameters
     ----------
-    vehicle : whose size sets the tempo.
     amplitude : A, the deviation that is borne [m].
     grip : largest lateral acceleration of the car [m/s²].
     need : how much is unknown now, 0 to 1; None teaches a log, with full strength.
@@ -78,7 +77,6 @@ class Dither:
 
         Parameters
         ----------
-        told : the car against its path, and the road ahead.
         t : now [s].
         times : after which the road ahead is told [s], (k,).
         period : since the last one [s].

@@ -40,12 +40,7 @@ class PathTracker(Protocol):
         """Times after the measurement of the states of its plan [s], (N + 1,)."""
 
     def step(self, measurement: Measurement) -> Command:
-        """Return what to steer.
-
-        Parameters
-        ----------
-        measurement : the car against the path, and the road ahead.
-        """
+        """Return what to steer."""
 
     def reset(self) -> None:
         """Forget what was planned and steered."""
@@ -66,13 +61,7 @@ class LearningTires(Protocol):
     """What runs beside the tracker and may hand it another tire."""
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
-        """Look at a sample; return what was decided where that is worth a note.
-
-        Parameters
-        ----------
-        measured : by the sensors, before the tracker steps.
-        tracker : which steers.
-        """
+        """Look at a sample; return what was decided where that is worth a note."""
 
 
 def drive(
@@ -100,13 +89,9 @@ def drive(
     Parameters
     ----------
     path : to follow, from s = 0.
-    car : to drive.
     tracker : which steers; it is reset.
     speed : wanted along the path, [m/s] where it is a number.
     sensors : of the car; None measures exactly.
-    delay : periods from a measurement until what follows from it acts.
-    rng : source of the noise.
-    learner : what may change the tracker's tire on the way.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
         they show.
     dither : weaves along the path to teach; None keeps to it.

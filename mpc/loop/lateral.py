@@ -75,11 +75,6 @@ class Localization:
     clip : standard deviations from which an innovation counts no more.
     lost : rate at which v_y may change where no acceleration is shown [m/s²].
     observable : largest standard deviation of side slip that is told for observed [rad].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     position: float = 0.025
@@ -201,15 +196,7 @@ class LateralVelocity:
             self._place = self._place + 0.5 * dt * velocity
 
     def _correct(self, i: int, innovation: float, variance: float, alike: float = 1.0) -> float:
-        """Correct by a measurement of p (0) or w (1); return the correction of p [m].
-
-        Parameters
-        ----------
-        i : of what is measured.
-        innovation : measured less predicted.
-        variance : of the measurement.
-        alike : samples that err alike.
-        """
+        """Correct by a measurement of p (0) or w (1); return the correction of p [m]."""
         P = self._P
         most = self.trust.clip * math.sqrt(P[i, i] + variance)
         gain = P[:, i] / (P[i, i] + alike * variance)

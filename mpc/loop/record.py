@@ -30,12 +30,7 @@ class Plan(NamedTuple):
     u: Array
 
     def line(self, path: Path) -> tuple[Array, Array]:
-        """Return X and Y [m] of the plan, (N + 1,) each.
-
-        Parameters
-        ----------
-        path : of the drive.
-        """
+        """Return X and Y [m] of the plan, (N + 1,) each."""
         X, Y, psi = path.pose(self.s)
         return X - self.x[:, 0] * np.sin(psi), Y + self.x[:, 0] * np.cos(psi)
 
@@ -46,9 +41,6 @@ class Drive:
 
     Parameters
     ----------
-    name : what was driven.
-    vehicle : the car as its tracker was told of it.
-    path : that was followed.
     period : control period [s].
     t : time [s], (n,).
     X, Y, psi : position [m] and heading [rad], (n,).
@@ -66,10 +58,8 @@ class Drive:
     told : v_y in its place, by the names of `Told`, (n,) each; empty where sensors show it.
     status : of the tracker, by its number, (n,).
     solve_time : of the tracker [s], (n,).
-    plans : some of the tracker's plans.
     notes : what the learner said and when [s].
     completed : whether the car reached the end on the path and without spinning.
-    ending : why the drive ended.
     """
 
     name: str
@@ -157,7 +147,6 @@ class Recorder:
         Parameters
         ----------
         t : time [s].
-        text : nothing, or a note.
         """
         if text:
             self._notes.append((t, text))
@@ -172,7 +161,6 @@ class Recorder:
 
         Parameters
         ----------
-        command : of the tracker.
         s : where the states of the plan lie along the path [m], (N + 1,).
         """
         plan = Plan(len(self._cars), s, command.plan_x.copy(), command.plan_u.copy())
@@ -191,10 +179,7 @@ class Recorder:
 
         Parameters
         ----------
-        here : where it is along the path.
-        measured : what the sensors said.
         v_ref : wanted speed [m/s].
-        command : of the tracker.
         told : of v_y, where nothing measures it.
         """
         if told is not None:
@@ -223,12 +208,8 @@ class Recorder:
 
         Parameters
         ----------
-        name : what was driven.
-        vehicle : the car as its tracker was told of it.
-        path : that was followed.
         period : control period [s].
         completed : whether the car reached the end on the path and without spinning.
-        ending : why the drive ended.
         """
         s, e_y, e_psi, kappa, v_ref, steering, solve_time, status = np.array(self._others).T
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))

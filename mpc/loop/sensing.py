@@ -44,12 +44,7 @@ class Measures(Protocol):
     """What a loop measures a car with."""
 
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
-        """Return what is measured at one instant.
-
-        Parameters
-        ----------
-        rng : source of the noise.
-        """
+        """Return what is measured at one instant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +162,6 @@ class FaultySensors:
 
     Parameters
     ----------
-    sensors : the good ones.
     faults : what breaks, where channels are those of `Measured`.
 
     Raises
@@ -320,7 +314,6 @@ def cornering_limit(
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
     tire : of all four wheels; None reads the file named by the chassis.
     mu : friction of the road over that of the tire's measurement [-].
     speed : at which the car is driven [m/s].

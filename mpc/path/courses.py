@@ -29,11 +29,6 @@ class Straight:
     Parameters
     ----------
     length : [m].
-
-    Raises
-    ------
-    PathError
-        Where it is not positive and finite.
     """
 
     length: float
@@ -117,7 +112,6 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
 
     Parameters
     ----------
-    sections : in driving order.
     spacing : longest step of the samples [m].
 
     Raises
@@ -260,7 +254,6 @@ def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Ar
 
     Parameters
     ----------
-    path : between the cones.
     gap : about the distance from pair to pair along the path [m].
     half_width : from the path to a cone [m].
     """

@@ -67,12 +67,7 @@ class Gate:
 
 
 def cones_of(gates: Sequence[Gate]) -> Array:
-    """Return X, Y of all cones [m], (k, 2).
-
-    Parameters
-    ----------
-    gates : of the course.
-    """
+    """Return X, Y of all cones [m], (k, 2)."""
     return np.vstack([gate.cones() for gate in gates])
 
 

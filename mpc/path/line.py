@@ -10,10 +10,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from models.schema import require_few
 
 
-class PathError(ValueError):
+class PathError(TireidError, ValueError):
     """A path or its source breaks a rule; one line: file or name, place, rule, value, remedy."""
 
 
@@ -92,7 +93,6 @@ def check_line(line: Line, name: str, closed: bool) -> None:
     Parameters
     ----------
     line : finite samples of equal shape.
-    name : for messages.
     closed : whether the last sample must be the first one again.
 
     Raises
@@ -163,8 +163,6 @@ class Ends(NamedTuple):
         ----------
         u : place in the step, 0 to 1 [-].
         h : length of the step [m].
-        cos : cosine, for what the ends are made of.
-        sin : sine.
         """
         (psi_0, psi_1), (kappa_0, kappa_1) = self.psi, self.kappa
         cos_0, cos_1, sin_0, sin_1 = cos(psi_0), cos(psi_1), sin(psi_0), sin(psi_1)

@@ -111,7 +111,6 @@ def line_through(
     X : of the way-points [m], (k,).
     Y : of the way-points [m], (k,).
     closed : whether the last leads back to the first.
-    name : for messages.
     spacing : longest step of the samples [m].
     smoothing : root mean square distance that the line may keep from the way-points [m].
     minimum_radius : tightest turn allowed [m].
@@ -151,7 +150,6 @@ def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     spline : t -> (X, Y) with `.derivative(order)`, C2, polynomial between its knots.
     knots : rising t, (k,).
     spacing : longest step [m].
-    name : for messages.
 
     Raises
     ------
@@ -256,11 +254,6 @@ def read_waypoints(file: Path) -> Waypoints:
     Parameters
     ----------
     file : the CSV; names in its header may be of either case, and the header may start with "#".
-
-    Raises
-    ------
-    PathError
-        Naming the file and the column, line or rule that is broken.
     """
     rows = _rows(file)
     header = [cell.strip().lstrip("#").strip() for cell in rows[0][1]]

@@ -79,11 +79,8 @@ def c_sources(
 
     Parameters
     ----------
-    structure : of the prediction tire.
     horizon : number of stages.
-    name : beginning of every symbol and file name.
     single : whether float is the default precision.
-    about : title, version, hash and version_text.
     """
     return {
         **c_files(C, PLACES, {PREFIX: name}),
@@ -105,7 +102,6 @@ def python_file(files: Mapping[str, str], *, name: str, single: bool) -> str:
     Parameters
     ----------
     files : of `c_sources`.
-    name : beginning of every symbol.
     single : whether to compute in float.
     """
     (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: name}).values()

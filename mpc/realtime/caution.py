@@ -26,13 +26,7 @@ def require_caution(name: str, caution: float) -> float:
 
     Parameters
     ----------
-    name : that it was given by.
     caution : from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where it is not.
     """
     if not 0.0 <= caution <= 1.0:
         raise ValueError(f"{name} must be from 0 to 1, it is {caution:g}")
@@ -45,7 +39,6 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
     Parameters
     ----------
     params : of `mpc.realtime.instance.params_type`, written in place.
-    tire : of the prediction.
     caution : from 0 to 1.
 
     Raises

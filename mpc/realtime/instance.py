@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from codegen import load_library
 from codegen.arrays import Array
 from codegen.compiler import keep, kept
+from codegen.errors import TireidError
 from mpc.prediction import state_size
 from mpc.problem import N_ERRORS, Guards, Problem
 from mpc.realtime.c_source import c_sources, python_file
@@ -97,7 +98,6 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
 
     Parameters
     ----------
-    n_weights : numbers of the tire.
     single : whether numbers are float.
     """
     real = _real(single)
@@ -130,7 +130,8 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     single : whether numbers are float.
     """
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    counts = (*solution, "age", "planned", "guessed", "started", "gentle", "watched", "doubted")
+    watch = ("gentle", "placed", "watched", "doubted")
+    counts = (*solution, "age", "planned", "guessed", "started", *watch)
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),
@@ -141,6 +142,9 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
             ("zero", real),
             ("drift", real),
             ("turning", real),
+            ("apart", real, (2,)),
+            ("stays", real, (2,)),
+            ("last", real, (2,)),
             ("place", real, (2,)),
             ("grip", real),
             ("cost", real, (N_GRIPS,)),
@@ -173,7 +177,6 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
     Parameters
     ----------
     params : of `params_type`, written in place.
-    guards : bounds and fall-back.
     """
     cost, limits = problem.cost, problem.limits
     params["cost"], params["cost_end"] = cost.numbers(), cost.terminal_numbers()
@@ -202,7 +205,6 @@ def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> s
 
     Parameters
     ----------
-    structure : of the prediction tire.
     horizon : number of stages.
     single : whether to compute in float.
     """
@@ -251,7 +253,7 @@ FLAGS = (
 )
 
 
-class NoCompilerError(RuntimeError):
+class NoCompilerError(TireidError, RuntimeError):
     """There is no C compiler to build the tracker with."""
 
 
@@ -260,7 +262,6 @@ class Instance:
 
     Parameters
     ----------
-    structure : of the prediction tire.
     horizon : number of stages.
     single : whether numbers are float.
 
@@ -294,6 +295,11 @@ class Instance:
         self.start = np.zeros(n_x, self.state["u"].dtype)
         self.solve_arguments = (*self._step[:3], pointer(self.start), *map(pointer, road))
         self._library.mpc_init(self._step[0])
+
+    @property
+    def numbers(self) -> tuple[NDArray[Any], ...]:
+        """State, parameters and input: all that the next solution depends on, unprepared."""
+        return self.state, self.params, self.input
 
     def step(self) -> int:
         """Take the measurement in `input`; return the status, and set `steering`."""
@@ -347,14 +353,9 @@ class Instance:
         ----------
         steering : angle of the wheels [rad].
         """
-        return Status(self._library.mpc_reset(self._step[0], self._real(steering)))
+        return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))
 
 
 def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
-    """Return where an array lies; it must outlive the pointer.
-
-    Parameters
-    ----------
-    array : contiguous.
-    """
+    """Return where an array lies; it must outlive the pointer."""
     return ctypes.c_void_p(array.ctypes.data)

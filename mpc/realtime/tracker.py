@@ -25,7 +25,6 @@ class Tracker:
 
     Parameters
     ----------
-    tire : of the prediction, with its car.
     problem : what to minimize; None takes the default.
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
@@ -33,7 +32,6 @@ class Tracker:
     budget : time of a step [s] beyond which it is late: then the plan before it steers.
     tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
-    max_iterations : of the solver.
     linearizations : a step; 1 in real time, some 10 to convergence.
     max_active_sets : sets of active limits that are tried in a row, each at half an iteration
         of the interior point, before it and once it comes close; 0 takes that alone.
@@ -44,8 +42,6 @@ class Tracker:
 
     Raises
     ------
-    ValueError
-        Where a number is out of its range.
     NoCompilerError
         Where there is no C compiler.
     CompilationError
@@ -89,6 +85,7 @@ class Tracker:
         self.caution = require_caution("caution", caution)
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
+        self._preview: Instance | None = None  # what would be planned with another tire
         params = self.instance.params
         guards = guards or Guards()
         set_params(params, problem, guards)
@@ -143,20 +140,44 @@ class Tracker:
     def set_tire(self, tire: PredictionTire) -> None:
         """Go on with other weights, the car that they are of and the slip that is of use to it.
 
-        Parameters
-        ----------
-        tire : of the same structure.
+        Raises
+        ------
+        ValueError
+            Where the structure is another, or a number not finite.
+        """
+        self._write_tire(self.instance, tire)
+        self.tire = tire
+
+    def previewed_rate(self, tire: PredictionTire) -> float:
+        """Return the first steering rate of the plan after one more iteration with a tire [rad/s].
+
+        An instance of its own is asked, on the plan and the road of the last step; the one that
+        steers is read and not written.
 
         Raises
         ------
         ValueError
             Where the structure is another, or a number not finite.
         """
+        now = self.instance
+        if self._preview is None:
+            single = now.state["u"].dtype == np.float32
+            self._preview = Instance(self.tire.structure, self.problem.horizon, single=single)
+        asked = self._preview
+        for there, here in zip(asked.numbers, now.numbers, strict=True):
+            there[...] = here
+        self._write_tire(asked, tire)
+        asked.start[:] = now.state["x"][0]
+        asked.solve()
+        return float(asked.state["u"][0])
+
+    def _write_tire(self, instance: Instance, tire: PredictionTire) -> None:
+        """Write weights, car, and the slip that is of use; what was prepared is of another tire."""
         if tire.structure != self.tire.structure:
             raise ValueError(
                 f"the tracker is built for {self.tire.structure}, not {tire.structure}"
             )
-        weights, car, params = np.asarray(tire.weights), tire.car, self.instance.params
+        weights, car, params = np.asarray(tire.weights), tire.car, instance.params
         if weights.shape != params["weights"].shape:
             raise ValueError(f"weights must be {params['weights'].size}, not {weights.shape}")
         if not (np.isfinite(weights).all() and np.isfinite(car).all()):
@@ -165,8 +186,7 @@ class Tracker:
         valid = valid_slip(tire, self.problem.limits.slip)
         params["max_slip"], params["rise"] = valid.slip, valid.rise
         set_caution(params, tire, self.caution)
-        self.instance.state["prepared"] = 0  # by the tire before
-        self.tire = tire
+        instance.state["prepared"] = 0
 
     def reset(self, steering: float = 0.0) -> None:
         """Forget what was planned and steered; faults are kept.
@@ -178,10 +198,11 @@ class Tracker:
         Raises
         ------
         ValueError
-            Where the angle is not finite, or beyond 3.2 rad.
+            Where the angle is not finite, or beyond `Limits.steering`.
         """
         if self.instance.reset(steering) != Status.OK:
-            raise ValueError(f"steering must be finite and at most 3.2 rad, it is {steering}")
+            most = self.problem.limits.steering
+            raise ValueError(f"steering must be finite and at most {most:g} rad, it is {steering}")
 
     def prepare(self, kappa: ArrayLike, v_x: ArrayLike) -> float:
         """Do ahead of the next measurement what does not ask for it; return the time it took [s].
@@ -256,7 +277,6 @@ class Tracker:
         x0 : state at the beginning of the first stage (n_x,).
         kappa : curvature of the stages [1/m], (N,) or a number.
         v_x : speed of the stages [m/s], (N,) or a number.
-        most : iterations, after which the status is ITERATION_LIMIT.
         """
         instance = self.instance
         instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x

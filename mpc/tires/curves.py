@@ -123,7 +123,6 @@ class LaggedAxles:
 
     Parameters
     ----------
-    curve : whose slip and force it has.
     lagged : whether the slip lags; else σ does nothing.
     """
 

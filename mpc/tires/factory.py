@@ -7,13 +7,14 @@ import numpy as np
 
 from identifier.axle.model import AxleModel
 from identifier.baselines.curves import CurveModel
+from identifier.estimate.model import FittedModel
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
 from mpc.tires.curves import DugoffAxles, FialaAxles, LaggedAxles, MagicAxles, linear_tire
-from mpc.tires.ladder import axle_tire, mounted_tire
+from mpc.tires.ladder import axle_tire, fit_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
 from mpc.tires.tire import PredictionTire
 
@@ -50,12 +51,7 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
 
 
 def curve_tire(model: CurveModel) -> PredictionTire:
-    """Return the prediction tire of a frozen curve.
-
-    Parameters
-    ----------
-    model : its parameters.
-    """
+    """Return the prediction tire of a frozen curve."""
     plain = _plain_curve(model)
     if not (model.lagged or model.offset.any()):
         return plain
@@ -88,6 +84,7 @@ def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
     NetworkModel.kind: network_tire,
     AxleModel.kind: axle_tire,
+    FittedModel.kind: fit_tire,
     CurveModel.kind: curve_tire,
     OnnxModel.kind: onnx_tire,
 }

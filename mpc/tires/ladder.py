@@ -1,4 +1,4 @@
-"""Axles as ladders of tanh, lagged or not: the frozen axle model, and any curve fitted by one.
+"""Axles as ladders of tanh, lagged or not: frozen models, and any curve fitted by one.
 
 F = λ Σ_j w_j tanh(α'/α_j) cos δ per axle; lag σ = max(s λ Σ_j w_j/α_j (1 - tanh²) + σ_0, σ_least).
 λ = 1 + κ v_x² is the load of the axle over the static one, 1 where the car has no downforce.
@@ -11,8 +11,10 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
+from identifier.estimate.model import FittedModel
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
@@ -41,16 +43,18 @@ class Axle(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LadderAxles:
-    """Weights: [δ_0, b, σ_0], 1/α_j (n,), `Axle` in front and at the rear; where pressed, κ (2,).
+    """Weights: [δ_0, b, σ_0], 1/α_j (n,), `Axle` in front and at the rear; where pressed, κ (2,);
+    where mounted, [β, g].
 
-    δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. Both were learnt as offsets of sensors,
-    and the tracker reads the same sensors.
+    δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. β [rad]: mounting angle of its sensor.
+    g: relative error of the steering. They were learnt as errors of sensors, and the tracker reads
+    the same sensors.
 
     Parameters
     ----------
-    units : n of an axle.
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
     pressed : whether the loads of the axles change with speed.
+    mounted : whether v_y is off by more with speed, and the steering by more with its angle.
     """
 
     saturates = True
@@ -59,19 +63,24 @@ class LadderAxles:
     units: int
     lagged: bool = True
     pressed: bool = False
+    mounted: bool = False
 
     @property
     def n_weights(self) -> int:
-        """3 + n + 2 (2 + n), and 2 where pressed."""
-        return self._static + 2 * self.pressed
+        """3 + n + 2 (2 + n), 2 more where pressed, and 2 where mounted."""
+        return self._static + 2 * self.pressed + 2 * self.mounted
 
     @property
     def _static(self) -> int:
         return N_COMMON + self.units + 2 * (N_AXLE + self.units)
 
     def slip(self, at: Point) -> Pair:
-        """Return the slip angles, offsets of the sensors taken off [rad]."""
-        front, rear = wheel_slip(self, at._replace(v_y=at.v_y - at.w[1]))
+        """Return the slip angles, errors of the sensors taken off [rad]."""
+        v_y, delta = at.v_y - at.w[1], at.delta
+        if self.mounted:
+            angle, gain = at.w[self.n_weights - 2], at.w[self.n_weights - 1]
+            v_y, delta = v_y - angle * at.v_x, (1 + gain) * delta
+        front, rear = wheel_slip(self, at._replace(v_y=v_y, delta=delta))
         return front + at.w[0], rear
 
     def force(self, slip: Pair, at: Point) -> Pair:
@@ -175,6 +184,22 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     return PredictionTire(structure, weights, model.vehicle, doubt)
 
 
+def fit_tire(model: FittedModel) -> PredictionTire:
+    """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
+
+    Parameters
+    ----------
+    model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
+    """
+    units = model.in_units()
+    _, weights, vehicle, _ = axle_tire(units)
+    weights[1] = model["v_y_bias"]
+    weights = np.concatenate([weights, [model["v_y_angle"], model["steering_gain"]]])
+    doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    structure = LadderAxles(units=len(units.ladder), pressed=vehicle.has_downforce, mounted=True)
+    return PredictionTire(structure, weights, vehicle, doubt)
+
+
 def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
     return vehicle.downforce if vehicle.has_downforce else ()
 
@@ -188,7 +213,7 @@ SAMPLES = 400
 SMALL = 1e-3  # rad; the slope at zero is read here, well above rounding
 
 
-class CurveFitError(ValueError):
+class CurveFitError(TireidError, ValueError):
     """A force curve is not one that a ladder of tanh can follow."""
 
 
@@ -272,7 +297,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
 
@@ -301,7 +325,6 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     Parameters
     ----------
     vehicle : the car; it needs no chassis.
-    tire : of all four wheels.
 
     Raises
     ------
@@ -322,8 +345,6 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
 
     Parameters
     ----------
-    vehicle : the car, with chassis.
-    tire : of both wheels.
     axle : 0 in front, 1 at the rear.
     alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].

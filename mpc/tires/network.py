@@ -107,10 +107,8 @@ class OnnxAxles:
 
     Parameters
     ----------
-    program : the network as a serialized function of its inputs and w.
     inputs : signals that it reads, of `identifier.paper.network.SIGNALS`.
     slip_sign : 1 where it reads slip angles in the paper's sign, -1 for ISO 8855.
-    n_weights : numbers in w.
     """
 
     lagged = False
@@ -145,12 +143,7 @@ def _loaded(program: str) -> ca.Function:
 
 
 def onnx_tire(model: OnnxModel) -> PredictionTire:
-    """Return the prediction tire of a user's network.
-
-    Parameters
-    ----------
-    model : the network.
-    """
+    """Return the prediction tire of a user's network."""
     network, weights = _lifted(model.content, model.inputs)
     structure = OnnxAxles(
         program=network.serialize(),

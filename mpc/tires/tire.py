@@ -154,41 +154,23 @@ def one_friction(self: TireStructure, weights: Array, ratio: float) -> None:
     Parameters
     ----------
     weights : not looked at, (n_weights,).
-    ratio : not looked at.
     """
     del self, weights, ratio
 
 
 def as_it_is(self: TireStructure, at: Point, ratio: Any) -> Point:
-    """Return `at`: nothing but slip makes the force. A method `similar`.
-
-    Parameters
-    ----------
-    ratio : not looked at.
-    """
+    """Return `at`: nothing but slip makes the force. A method `similar`."""
     del self, ratio
     return at
 
 
 def not_similar(self: TireStructure, at: Point, ratio: Any) -> None:
-    """Return None: another friction is not offered. A method `similar`.
-
-    Parameters
-    ----------
-    at : not looked at.
-    ratio : not looked at.
-    """
+    """Return None: another friction is not offered. A method `similar`."""
     del self, at, ratio
 
 
 def no_lag(self: TireStructure, slip: Pair, at: Point) -> Pair:
-    """Return 0 m: force follows slip at once. A method `lag_length`.
-
-    Parameters
-    ----------
-    slip : not looked at.
-    at : not looked at.
-    """
+    """Return 0 m: force follows slip at once. A method `lag_length`."""
     del self, slip, at
     return 0.0, 0.0
 

@@ -3,19 +3,28 @@
 import pytest
 
 from benchmarks.mpc_cases import options_of
-from benchmarks.mpc_sensor_faults import FAULTS, TIRES, Outcome, Row, cases_of, fault_word, judge
+from benchmarks.mpc_sensor_faults import (
+    CAUTIOUS,
+    DRIVERS,
+    FAULTS,
+    Outcome,
+    Row,
+    cases_of,
+    fault_word,
+    judge,
+)
 from benchmarks.targets import Targets
 from models.faults import KINDS
 from mpc.loop import Measured
 from tireid.commands.drive_case import conditions_of, parse_fault
 from tireid.driving.runs import FROZEN, LEARNING
 
-
-def row(learning, frozen, begins=(3.0, 9.0)):
-    return Row("r", "r stuck", begins, {LEARNING: learning, FROZEN: frozen})
-
-
 KEPT, LEFT = Outcome(True, 0.1, (), 20.0), Outcome(False, 2.0, (), 12.0)
+
+
+def row(learning, frozen, cautious=(KEPT, KEPT), begins=(3.0, 9.0)):
+    outcomes = {LEARNING: learning, FROZEN: frozen, CAUTIOUS: list(cautious)}
+    return Row("r", "r stuck", begins, outcomes)
 
 
 def test_there_are_34_faults_of_every_channel_and_kind():
@@ -30,9 +39,9 @@ def test_a_fault_is_what_the_command_is_told(fault):
     assert (told.channel, told.kind, told.duration, told.size) == fault and told.start == 9.0
 
 
-@pytest.mark.parametrize("tires", TIRES)
-def test_every_drive_is_one_of_the_command_and_goes_on_after_its_fault_began(tires):
-    cases = cases_of(FAULTS[0], tires)
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_every_drive_is_one_of_the_command_and_goes_on_after_its_fault_began(driver):
+    cases = cases_of(FAULTS[0], driver)
     assert len(set(cases)) == len(cases) == 6
     for case in cases:
         conditions = conditions_of(options_of(case.words))
@@ -43,8 +52,8 @@ def test_every_drive_is_one_of_the_command_and_goes_on_after_its_fault_began(tir
 
 
 def test_only_what_learning_alone_loses_counts_as_worse():
-    assert row([KEPT, LEFT], [KEPT, KEPT]).worse == 1
-    assert row([KEPT, LEFT], [LEFT, LEFT]).worse == 0
+    assert row([KEPT, LEFT], [KEPT, KEPT]).worse(LEARNING) == 1
+    assert row([KEPT, LEFT], [LEFT, LEFT]).worse(LEARNING) == 0
     assert row([KEPT, LEFT], [KEPT, KEPT]).left(LEARNING) == 1
 
 
@@ -65,3 +74,26 @@ def test_a_drive_that_learning_alone_loses_misses_the_target():
     judge([row([KEPT, LEFT], [KEPT, KEPT])], [KEPT], targets)
     assert targets.values["worse"] == 1 and targets.finish(keep=False) == 1
     assert targets.values["r/noticed"] == 0 and "r/latest" not in targets.values
+
+
+def test_caution_may_neither_leave_the_path_nor_go_far_off_where_frozen_tires_do_not():
+    near, far = KEPT._replace(peak=0.5), KEPT._replace(peak=0.51)
+    for cautious, frozen, worse in (
+        (LEFT, KEPT, 1),
+        (LEFT, far, 1),
+        (far, near, 1),
+        (near, KEPT, 0),
+        (far, far, 0),
+        (LEFT, LEFT, 0),
+        (KEPT, LEFT, 0),
+    ):
+        targets = Targets("mpc_sensor_faults")
+        judge([row([KEPT, KEPT], [KEPT, frozen], [KEPT, cautious])], [KEPT], targets)
+        assert targets.values["worse_cautious"] == targets.values["r/worse_cautious"] == worse
+        assert targets.finish(keep=False) == worse
+
+
+def test_a_cautious_drive_is_one_on_frozen_tires_with_all_caution():
+    words = cases_of(FAULTS[0], CAUTIOUS)[0].words
+    options = options_of([*words, *DRIVERS[CAUTIOUS]])
+    assert options.tires == [FROZEN] and conditions_of(options).caution == 1.0

@@ -2,6 +2,7 @@
 
 import subprocess
 import tomllib
+from collections import Counter
 from itertools import chain
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 
 from benchmarks.mutants import PLANTED, plant, written_fault
 from benchmarks.mutation.c_faults import c_faults, changes_tokens, tokens
-from benchmarks.mutation.draw import C_FOLDERS, changes, draw, shares, strata
+from benchmarks.mutation.draw import C_FOLDERS, changes, draw, package_of, shares, strata
 from benchmarks.mutation.faults import Fault, function_at
 from benchmarks.mutation.python_faults import changes_bytecode, python_faults
 from benchmarks.mutation.selection import Traced
@@ -183,15 +184,31 @@ def test_drawing_is_deterministic_and_covers_every_package_and_its_c():
     again = draw(ROOT, seed=7, count=60)
     assert faults == again != draw(ROOT, seed=8, count=60)
     assert len(set(faults)) == 60
-    assert {fault.file.split("/")[0] for fault in faults} == {
-        "codegen",
-        "models",
-        "identifier",
-        "mpc",
-        "tireid",
-    }
     assert sum(fault.file.endswith(".c") for fault in faults) >= 2
     assert all(changes(ROOT, fault) for fault in faults)
+    files = strata(ROOT)
+    sizes = {name: sum(map(lines_of, some)) for name, some in files.items()}
+    drawn = Counter(package_of(fault.file) for fault in faults)
+    for name, size in sizes.items():
+        assert abs(drawn[name] - 60 * size / sum(sizes.values())) < 1.0, name
+
+
+def lines_of(file: str) -> int:
+    return len((ROOT / file).read_bytes().splitlines())
+
+
+def test_one_package_is_drawn_from_alone():
+    assert package_of("identifier/plan/search.py") == "identifier/plan"
+    assert package_of("identifier/run.py") == "identifier"
+    assert package_of("models/tires/a/b.py") == "models/tires"
+    assert package_of("mpc/c/tracker.c") == "mpc, C"
+    faults = draw(ROOT, seed=7, count=12, only="identifier/plan")
+    assert len(faults) == 12 and {package_of(one.file) for one in faults} == {"identifier/plan"}
+    assert strata(ROOT, "identifier/plan/plan.py") == {
+        "identifier/plan": ["identifier/plan/plan.py"]
+    }
+    with pytest.raises(ValueError, match="identifier/pla is no file or folder"):
+        draw(ROOT, seed=7, count=1, only="identifier/pla")
 
 
 def test_every_c_folder_has_files_and_every_share_is_given():

@@ -89,6 +89,20 @@ def test_a_drive_excites_both_axles_and_does_not_spin(kind):
     assert np.abs(exact.r[straight]).max() < 1e-9
 
 
+@pytest.mark.parametrize("kind", ["sedan", "tenth"])
+def test_a_driver_may_brake_and_pull_in_the_corners(kind):
+    one = random_car(kind, generator(1))
+    begin = Beginning(lead=2.0)
+    drive = random_drive(one, generator(2), begin, pull=0.5)
+    exact, most = drive.exact, 0.5 * min(one.friction) * GRAVITY
+    turning = (exact.t > begin.corner) & (np.abs(exact.a_y) > 0.2 * most)
+    # Tires that turn brake too, so that it may be a little more.
+    assert -1.6 * most < exact.a_x[turning].min() < -0.5 * most
+    assert 0.5 * most < exact.a_x[turning].max() < 1.1 * most
+    steady = exact.t < begin.lead
+    assert np.abs(exact.a_x[steady]).max() < 0.05 * most
+
+
 def test_a_drive_without_corners_and_one_that_spins_are_no_good(car):
     begin, speed = Beginning(lead=1.0), 20.0
     weak, wild = (

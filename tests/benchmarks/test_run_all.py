@@ -5,6 +5,7 @@ import json
 import pytest
 
 from benchmarks import run_all, targets
+from benchmarks.fingerprint import fingerprint
 from benchmarks.targets import Targets, keeps
 
 MISSES = """
@@ -22,8 +23,8 @@ def scripts(tmp_path, monkeypatch):
     """Give a checkout whose only benchmarks are those that a test writes."""
     folder = tmp_path / "benchmarks"
     folder.mkdir()
-    source = (run_all.ROOT / "benchmarks" / "targets.py").read_text()
-    (folder / "targets.py").write_text(source)
+    for name in ("targets.py", "fingerprint.py"):
+        (folder / name).write_text((run_all.ROOT / "benchmarks" / name).read_text())
     monkeypatch.setattr(run_all, "ROOT", tmp_path)
     monkeypatch.setattr(run_all, "BENCHMARKS", {"lap": [], "pit": []})
     (folder / "lap.py").write_text(MISSES.replace('3.0, 2.0, "s"', '1.0, 2.0, "s"'))
@@ -71,6 +72,7 @@ def test_record_is_handed_on_and_kept(scripts, tmp_path):
     kept = json.loads((scripts / "results" / "lap.json").read_text())
     assert kept["values"] == {"time": 1.0} and kept["units"] == {"time": "s"}
     assert kept["script"] == "benchmarks/lap.py"
+    assert kept["code"] == fingerprint("lap", tmp_path) and set(kept["code"]) == {"script"}
 
 
 def test_every_benchmark_that_is_listed_is_there():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from identifier.frozen import FrozenModelError
-from identifier.stored import load_model
-from models.recordings import Recording
+from identifier.tire_model import load_model
+from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
 CAR = Vehicle(
@@ -117,7 +117,7 @@ def pressed(lift, rng):
     t, v_x, delta, v_y, r, felt = pressed_down(lift)
     noise = rng.normal(size=(3, t.size)) * np.array([[0.02], [0.002], [0.05]])
     signals = {"v_y": v_y + noise[0], "r": r + noise[1], "a_y": felt + noise[2]}
-    log = Recording.from_dataframe({"t": t, "vx": v_x, "vy": signals["v_y"], "r": signals["r"],
+    log = read_recording({"t": t, "vx": v_x, "vy": signals["v_y"], "r": signals["r"],
                                     "delta_f": delta, "ay": signals["a_y"]})  # fmt: skip
     return log, RACE
 

@@ -7,6 +7,7 @@ import pytest
 
 from identifier.baselines import LinearBaseline
 from identifier.compare.course import (
+    INFINITE,
     Course,
     cross_replay,
     frozen_shares,
@@ -63,12 +64,32 @@ def test_the_forces_of_a_toy_car_count_and_silent_ones_are_refused(course, car):
             Course(vehicle=car, recordings=(dead,), min_speed=1.0)
 
 
+def test_without_true_forces_the_motion_judges(course, car):
+    """A force that is off by a constant is off by it in every mean; half of one is off by half."""
+    judged = Course(
+        vehicle=car,
+        recordings=tuple(replace(one, axle_force=None) for one in course.recordings),
+        min_speed=1.0,
+    )
+    assert judged.by_motion and not course.by_motion
+    for known, blind in zip(course.recordings, judged.recordings, strict=True):
+        size = judged.size(blind)
+        right = judged.error(blind, known.axle_force)
+        assert right.front < 0.1 * size.front and right.rear < 0.1 * size.rear
+        off = judged.error(blind, known.axle_force + np.array([3e3, 0.0]))
+        assert off.front == pytest.approx(3e3, rel=0.05) and off.rear == right.rear
+        half = judged.error(blind, 0.5 * known.axle_force)
+        assert judged.share(blind.name, half) == pytest.approx(50.0, abs=6.0)
+        lost = np.full_like(known.axle_force, np.inf)
+        assert judged.error(blind, lost) == INFINITE
+
+
 def test_a_comparison_needs_recordings_of_different_names_with_forces(course, car):
     one = course.recordings[0]
     for recordings, complaint in (
         ((), "at least one recording"),
         ((one, one), "a is given twice"),
-        ((replace(one, axle_force=None),), "needs the true forces"),
+        ((replace(one.between(0.0, 1.0), axle_force=None),), "fewer than 8 windows"),
     ):
         with pytest.raises(ValueError, match=complaint):
             Course(vehicle=car, recordings=recordings, min_speed=1.0)

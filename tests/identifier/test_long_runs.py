@@ -12,9 +12,11 @@ import pytest
 from codegen import Scan, arrays
 from identifier.axle import AxleIdentifier
 from identifier.methods import make_method
-from identifier.reproducibility import beyond_known, predict, reproduce
+from identifier.prediction import predict
+from identifier.reproducibility import beyond_known, reproduce
 from identifier.rerun import Recalled
 from identifier.run import identify, learn
+from identifier.verdict import judge
 from models.recordings import Recording, check_against_vehicle, evidence, portion
 from models.recordings.checks import check_physics
 from models.recordings.record import joined
@@ -255,14 +257,14 @@ def test_a_short_recording_is_its_own_portion(whole):
 
 
 def test_the_verdict_on_a_long_drive_says_that_a_portion_was_asked(long_drive, short_portions, rng):
-    verdict = identify(noisy(long_drive, rng), CAR, AxleIdentifier.for_vehicle(CAR)).verdict()
+    verdict = judge(identify(noisy(long_drive, rng), CAR, AxleIdentifier.for_vehicle(CAR)))
     assert [one.code for one in verdict.findings if one.code == "portion"]
     assert verdict.valid, verdict.findings
 
 
 def test_the_verdict_on_a_long_drive_finds_a_sensor_that_is_off(long_drive, short_portions, rng):
     moved = replace(long_drive, v_y=long_drive.v_y - 0.8 * long_drive.r)
-    verdict = identify(noisy(moved, rng), CAR, AxleIdentifier.for_vehicle(CAR)).verdict()
+    verdict = judge(identify(noisy(moved, rng), CAR, AxleIdentifier.for_vehicle(CAR)))
     assert not verdict.valid
 
 
@@ -276,7 +278,7 @@ def peak_of(recording):
         check_physics(recording)
         check_against_vehicle(recording, CAR)
         run = identify(recording, CAR, AxleIdentifier.for_vehicle(CAR))
-        run.verdict()
+        judge(run)
         reproduce(run, float(recording.t[-1]))
         beyond_known(run.freeze(), recording)
         return tracemalloc.get_traced_memory()[1]

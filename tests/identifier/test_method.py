@@ -16,10 +16,11 @@ from models.vehicle import sedan
 from tests.identifier.conftest import felt
 
 CAR = sedan()
+ONLINE = [name for name in METHODS if not make_method(name, CAR).whole]
 OBSERVING = {"integral", "instantaneous", "instantaneous_scaled", "pi_lead"}
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", ONLINE)
 def test_a_setup_carries_what_its_step_asks_for(name):
     setup = make_method(name, CAR).setup(CAR)
     step = setup.scan.step
@@ -28,6 +29,12 @@ def test_a_setup_carries_what_its_step_asks_for(name):
     for port, value in given.items():
         assert np.asarray(value).size == step.numel_in(port), port
     assert (setup.observe is not None) == (name in OBSERVING)
+
+
+def test_a_method_that_learns_from_whole_logs_has_no_step():
+    (name,) = set(METHODS) - set(ONLINE)
+    with pytest.raises(ValueError, match="fit learns from whole logs: in a car, the axle"):
+        make_method(name, CAR).setup(CAR)
 
 
 @pytest.mark.parametrize("name", sorted(OBSERVING))
@@ -45,7 +52,7 @@ def test_an_observer_begins_at_the_first_measurement(name, drive):
     assert history.outputs["xi_tilde"][1].any()
 
 
-@pytest.mark.parametrize("name", sorted(set(METHODS) - OBSERVING))
+@pytest.mark.parametrize("name", sorted(set(ONLINE) - OBSERVING))
 def test_a_method_without_an_observer_begins_alike_wherever_it_begins(name):
     setup = make_method(name, CAR).setup(CAR)
     assert setup.begin(np.array([1.0, 1.0])) is setup
@@ -63,7 +70,7 @@ def test_a_run_goes_to_another_process_and_tells_the_same_there(name, drive):
             np.testing.assert_array_equal(theirs[port], values)
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", ONLINE)
 def test_a_method_describes_every_output_and_state_of_its_step_and_no_more(name):
     method = make_method(name, CAR)
     setup = method.setup(CAR)

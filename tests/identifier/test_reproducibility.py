@@ -7,6 +7,7 @@ import pytest
 
 from identifier.frozen import FrozenModelError
 from identifier.paper.design import PaperIdentifier
+from identifier.prediction import predict
 from identifier.reproducibility import (
     AxleRmse,
     MotionError,
@@ -15,12 +16,11 @@ from identifier.reproducibility import (
     force_rms,
     freeze_key,
     online_error,
-    predict,
     replay,
     reproduce,
 )
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 
 
 @pytest.fixture(name="history")

@@ -9,8 +9,9 @@ import tireid as ti
 from identifier.axle.gate import GateState
 from identifier.compare.batch import identify_batch, replay_batch
 from identifier.methods import METHODS, make_method
+from identifier.prediction import predict
 from identifier.refused import GATE
-from identifier.reproducibility import counted_samples, motion_error, predict
+from identifier.reproducibility import counted_samples, motion_error
 from identifier.run import identify, learn
 from identifier.verdict.motion import Windows
 from models.recordings import Recording, RecordingError, Repair, joined

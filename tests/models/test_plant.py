@@ -295,6 +295,20 @@ def test_friction_sets_the_limit_of_the_front_axle(scale):
     assert 0.98 * limit < side_force < 1.001 * limit
 
 
+def test_the_axles_share_driving_and_braking_as_the_chassis_says():
+    straight = StepSteer(amplitude=0.0, onset=0.1, rate_limit=1.0, duration=6.0)
+    shares = replace(CHASSIS, drive_front_share=0.2, brake_front_share=0.7)
+    run = Plant(replace(CAR, chassis=shares)).simulate(
+        straight, speed=lambda t: 20.0 + np.interp(t, [1.0, 3.0, 5.0], [0.0, 4.0, 0.0])
+    )
+    along = body_forces(run)[0]
+    front, total = along[:, :2].sum(axis=1), along.sum(axis=1)
+    driven, braked = total > 0.1 * CAR.mass, total < -0.1 * CAR.mass
+    assert driven.sum() > 100 and braked.sum() > 100
+    np.testing.assert_allclose(front[driven] / total[driven], 0.2, atol=0.01)
+    np.testing.assert_allclose(front[braked] / total[braked], 0.7, atol=0.01)
+
+
 def test_a_friction_drop_lowers_the_limit():
     turn = StepSteer(amplitude=0.1, onset=0.1, rate_limit=1.0, duration=5.0)
     limits = [

@@ -14,9 +14,12 @@ from models.recordings import (
     LogMap,
     Recording,
     RecordingError,
+    Repair,
+    joined,
     read_recording,
     write_recording,
 )
+from models.vehicle import sedan
 
 N = 100
 
@@ -43,6 +46,19 @@ def test_signals_cannot_be_changed_and_do_not_follow_their_source() -> None:
     for array in (made.v_x, made.x, made.u):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
+
+
+def test_a_x_is_cut_and_joined_as_other_signals_are() -> None:
+    a_x = np.arange(N, dtype=np.float64)
+    made = recording(a_x=a_x)
+    assert np.array_equal(made.between(0.2, 0.4).a_x, a_x[20:41])
+    assert np.array_equal(made.taken(np.r_[0:20, 40:60]).a_x, np.r_[a_x[:20], a_x[40:60]])
+    assert np.array_equal(joined([made, made]).a_x, np.r_[a_x, a_x])
+    lacking = joined([made, recording(name="plain")])
+    assert lacking.a_x is None and "ax is left out, plain has none" in lacking.notes
+    assert np.array_equal(Repair(factor={"r": 2.0}).apply(made, sedan())[0].a_x, a_x)
+    with pytest.raises(RecordingError, match="a_x must be of a car"):
+        recording(a_x=np.full(N, 1e6))
 
 
 def test_x_and_u_stack_the_papers_vectors() -> None:
@@ -171,14 +187,15 @@ def test_what_is_written_reads_back_bit_for_bit(
         t=start + dt * np.arange(N),
         **{k: rng.normal(size=N) for k in ("v_x", "v_y", "r", "delta_f", "delta_r")},
         a_y=rng.normal(size=N) if full else None,
+        a_x=rng.normal(size=N) if full else None,
         axle_force=rng.normal(size=(N, 2)) if full else None,
     )
     path = write_recording(made, tmp_path_factory.mktemp("back") / f"back{ending}")
     again = read_recording(path, dt=dt, check=False)
     assert again.name == "back"
-    for name in ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force"):
+    for name in ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "a_x", "axle_force"):
         assert np.array_equal(getattr(again, name), getattr(made, name))
-    assert (again.a_y is None) is (not full)
+    assert (again.a_x is None) is (again.a_y is None) is (not full)
 
 
 def test_writing_leaves_one_file_and_refuses_other_endings(tmp_path: Path) -> None:

@@ -119,13 +119,13 @@ def test_parquet_gives_the_same_as_csv(tmp_path: Path) -> None:
     assert "r must be finite, 1 of 60" in refusal(path)
 
 
-def test_parquet_without_pyarrow_names_the_extra(
+def test_parquet_without_pyarrow_says_how_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "log.parquet"
     path.write_bytes(b"PAR1")
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert "pip install tireid[parquet]" in refusal(path)
+    assert "needs pyarrow: pip install pyarrow (" in refusal(path)
 
 
 @pytest.mark.parametrize(
@@ -310,6 +310,26 @@ def test_columns_of_another_name_are_read_when_named(tmp_path):
         read_recording(log, columns={"rate": "yaw_rate"})
 
 
+def test_ax_is_read_forward_in_either_axes_and_left_aside_where_it_cannot_be(tmp_path):
+    lines = [f"{k * 0.01:.6f},20,0.5,0,0,0.1,{0.01 * k:.2f}" for k in range(60)]
+    header = HEADER + ",ay,ax"
+    good = write(tmp_path / "good.csv", header, lines)
+    expected = 0.01 * np.arange(60)
+    np.testing.assert_allclose(read_recording(good, check=False).a_x, expected)
+    sae = read_recording(good, check=False, log_map=LogMap(axes="SAE"))
+    np.testing.assert_allclose(sae.a_x, expected)
+    np.testing.assert_allclose(sae.a_y, -0.1)
+    lines[30] = lines[30].rpartition(",")[0] + ","
+    holed = write(tmp_path / "holed.csv", header, lines)
+    got = read_recording(holed, check=False)
+    assert got.a_x is None and got.a_y is not None
+    assert sum(note.startswith("ax is left aside: ") for note in got.notes) == 1
+    with pytest.raises(RecordingError, match="ax must be finite"):
+        read_recording(holed, check=False, columns={"ax": "ax"})
+    twice = write(tmp_path / "twice.csv", header + ",ax", [line + ",0" for line in lines])
+    assert read_recording(twice, check=False).a_x is None
+
+
 def test_inverse_forces_stand_in_where_none_were_measured(tmp_path):
     log = tmp_path / "log.csv"
     rows = [f"{0.01 * k:.2f},10,0,0.01,0.002,3,4" for k in range(100)]
@@ -357,8 +377,8 @@ def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored
     names = {"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f", "ay": "a_y"}
     data = {column: getattr(log, name) for column, name in names.items()}
     with pytest.raises(RecordingError, match="ay "):
-        Recording.from_dataframe(data, log_map=STILL_WRONG)
-    assert len(Recording.from_dataframe(data, log_map=RIGHT)) == len(log)
+        read_recording(data, log_map=STILL_WRONG)
+    assert len(read_recording(data, log_map=RIGHT)) == len(log)
 
 
 def test_at_a_coarse_interval_a_stretch_of_too_few_samples_is_left_out(tmp_path: Path) -> None:

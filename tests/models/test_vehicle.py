@@ -10,7 +10,7 @@ import pytest
 from identifier.frozen import vehicle_from, vehicle_numbers
 from models.bicycle import BicycleParameters
 from models.tires import MagicFormula
-from models.vehicle import GRAVITY, Chassis, Vehicle, VehicleError, sedan
+from models.vehicle import GRAVITY, OF_CHASSIS, Chassis, Vehicle, VehicleError, sedan
 
 SIX = """mass = 1500
 yaw_inertia = 2500.0
@@ -41,6 +41,7 @@ def test_a_number_that_is_not_positive_and_finite_is_refused_by_name(key, value)
         ("roll_stiffness_front_share", 1.01),
         ("drive_front_share", -0.01),
         ("drive_front_share", math.nan),
+        ("brake_front_share", 1.01),
         ("roll_center_height_front", 0.6),
         ("roll_camber_rear", math.nan),
         ("relaxation_length_rear", 0.0),
@@ -108,7 +109,7 @@ def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):
 
 
 def test_a_missing_file_says_so(tmp_path):
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(VehicleError, match="there is no such file"):
         Vehicle.from_toml(tmp_path / "none.toml")
 
 
@@ -257,6 +258,43 @@ def test_a_downforce_that_no_car_has_is_refused_by_name(key, value):
         replace(sedan(), **{key: value})
     with pytest.raises(VehicleError, match=f"{key} must be a number"):
         replace(sedan(), **{key: "much"})
+
+
+TOLD = "cg_height = 0.5\ndrive_front_share = 0\nbrake_front_share = 0.7\ndrag_area = 0.66\n"
+
+
+def test_what_braking_wants_to_know_comes_back_from_files(tmp_path):
+    car = Vehicle.from_toml(written(tmp_path, SIX + TOLD))
+    assert (car.cg_height, car.drive_front_share, car.brake_front_share) == (0.5, 0.0, 0.7)
+    assert car.drag == pytest.approx(0.5 * 1.2 * 0.66 / 1500.0)
+    car.to_toml(tmp_path / "again.toml")
+    assert Vehicle.from_toml(tmp_path / "again.toml") == car == vehicle_from(vehicle_numbers(car))
+    plain = Vehicle.from_toml(written(tmp_path, SIX))
+    assert [plain.lengthwise(name) for name in OF_CHASSIS] == [None] * 3
+    assert plain.drag == pytest.approx(0.5 * 1.2 * 0.7 / 1500.0)
+
+
+def test_the_chassis_tells_what_the_car_does_not():
+    chassis = replace(sedan().require_chassis(), drive_front_share=0.4, brake_front_share=0.55)
+    car = replace(sedan(), chassis=chassis, cg_height=0.6)
+    alone = car.without_chassis()
+    assert [car.lengthwise(name) for name in OF_CHASSIS] == [0.6, 0.4, 0.55]
+    assert alone.chassis is None and alone.lengthwise("drive_front_share") == 0.4
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("cg_height", 2.0),
+        ("cg_height", -0.1),
+        ("drive_front_share", 1.1),
+        ("brake_front_share", math.nan),
+        ("drag_area", 70.0),
+    ],
+)
+def test_what_braking_wants_to_know_is_refused_by_name_where_no_car_has_it(key, value):
+    with pytest.raises(VehicleError, match=key):
+        replace(sedan(), **{key: value})
 
 
 def test_race_cars_have_a_downforce_that_is_believed():

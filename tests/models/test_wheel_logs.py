@@ -10,7 +10,7 @@ from models.logs.log import RecordingError
 from models.logs.signals import Signal
 from models.maneuvers import RandomSteer
 from models.plant import Plant
-from models.recordings import LogMap, Recording, Repair, read_recording
+from models.recordings import LogMap, Repair, read_recording
 from models.recordings.reader import read_repaired
 from models.recordings.rolled import rolled
 from models.recordings.wheels import Wheels
@@ -68,21 +68,17 @@ def test_turns_and_speeds_give_the_same_recording_whatever_their_unit(run, wheel
 
 
 def test_our_names_without_a_unit_are_in_si(run, wheels):
-    got = Recording.from_dataframe(
-        columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=()))
-    )
+    got = read_recording(columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=())))
     np.testing.assert_allclose(got.v_x, run.v_x, atol=0.5)
 
 
 def test_the_notes_say_of_what_the_speed_is_made_and_what_was_left_out(run, wheels):
-    (note,) = (
-        one for one in Recording.from_dataframe(columns(run, wheels)).notes if "vx is made" in one
-    )
+    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is made" in one)
     assert "wheel_fl, wheel_fr, wheel_rl, wheel_rr" in note
     share = float(note.split(" % of the samples")[0].split()[-1])
     assert 8.0 < share < 13.0  # 2 of 20 s
     calm = shown(run, gentle_slip(run))
-    assert any("at 0 % of" in one for one in Recording.from_dataframe(columns(run, calm)).notes)
+    assert any("at 0 % of" in one for one in read_recording(columns(run, calm)).notes)
 
 
 def test_wheels_are_told_by_words_and_by_a_map_that_is_written_and_read(run, wheels, tmp_path):
@@ -113,13 +109,13 @@ def test_a_speed_that_is_logged_is_used_and_tells_the_radius(run, wheels):
     turns = {name: one / RADIUS for name, one in wheels.items()}
     data = columns(run, turns, vx=run.v_x)
     told = {name: f"{name} [rad/s]" for name in CORNERS}
-    got = Recording.from_dataframe(data, columns=told)
+    got = read_recording(data, columns=told)
     np.testing.assert_array_equal(got.v_x, run.v_x)
     (note,) = (one for one in got.notes if "wheels roll by vx" in one)
     radii = [float(word) for word in note.replace(",", "").split() if word.startswith("0.3")]
     assert len(radii) == 4
     np.testing.assert_allclose(radii, RADIUS, rtol=0.005)
-    factors = Recording.from_dataframe(
+    factors = read_recording(
         columns(run, wheels, 0.97, vx=run.v_x), columns={name: f"{name} [m/s]" for name in CORNERS}
     )
     assert any("wheel_rl 1.031 times its speed" in one for one in factors.notes)
@@ -129,7 +125,7 @@ def test_wheels_that_nobody_told_leave_a_log_with_a_speed_as_it_is(run, wheels):
     data = columns(run, wheels, vx=run.v_x)
     data["wheel_fl"] = np.where(run.t > 5.0, np.nan, data["wheel_fl"])
     plain = {name: one for name, one in data.items() if "wheel" not in name}
-    ours, theirs = Recording.from_dataframe(data), Recording.from_dataframe(plain)
+    ours, theirs = read_recording(data), read_recording(plain)
     assert ours.notes == theirs.notes
     np.testing.assert_array_equal(ours.v_x, theirs.v_x)
 
@@ -138,10 +134,10 @@ def test_a_log_without_the_second_speed_is_read_by_the_same_map(run, wheels, tmp
     names = {name: Signal(channel=(name,), unit="rad/s") for name in CORNERS}
     told = LogMap(signals={"v_x": Signal(channel=("gnss",)), **names}, wheels=TRACK)
     turns = columns(run, wheels, 1.0 / RADIUS)
-    later = Recording.from_dataframe(turns, log_map=told)
+    later = read_recording(turns, log_map=told)
     np.testing.assert_allclose(later.v_x, run.v_x, atol=0.5)
     assert any("there is no column 'gnss': vx is made of the wheels" in one for one in later.notes)
-    first = Recording.from_dataframe({**turns, "gnss": run.v_x}, log_map=told)
+    first = read_recording({**turns, "gnss": run.v_x}, log_map=told)
     np.testing.assert_array_equal(first.v_x, run.v_x)
 
 
@@ -160,14 +156,12 @@ def test_axes_and_signs_that_a_map_turns_are_turned_before_wheels_are_brought_ov
     for name in ("r", "delta_f", "ay"):
         turned[name] = -turned[name]
     known = replace(TRACK, radius=())
-    right = Recording.from_dataframe(columns(run, rear), log_map=LogMap(wheels=known))
-    left = Recording.from_dataframe(turned, log_map=LogMap(wheels=known, axes="SAE"))
+    right = read_recording(columns(run, rear), log_map=LogMap(wheels=known))
+    left = read_recording(turned, log_map=LogMap(wheels=known, axes="SAE"))
     np.testing.assert_allclose(left.v_x, right.v_x, rtol=1e-12)
     wrong = {**columns(run, rear), "r": -run.r}
     repair = Repair(factor={"r": -1.0})
-    mended = Recording.from_dataframe(
-        wrong, log_map=LogMap(wheels=known, repair=repair), check=False
-    )
+    mended = read_recording(wrong, log_map=LogMap(wheels=known, repair=repair), check=False)
     np.testing.assert_allclose(mended.v_x, right.v_x, rtol=1e-12)
 
 
@@ -185,7 +179,7 @@ def test_what_wheels_cannot_be_is_refused_in_one_line(run, wheels, change, told,
     for name, value in change.items():
         data[name] = np.where(np.arange(run.t.size) == 7, value, data[name])
     with pytest.raises(RecordingError) as caught:
-        Recording.from_dataframe(data, columns=told)
+        read_recording(data, columns=told)
     assert rule in str(caught.value) and "\n" not in str(caught.value)
 
 

@@ -99,7 +99,7 @@ def test_without_the_track_an_axle_tells_it_by_its_mean(run):
 def test_slip_costs_a_fraction_of_what_it_costs_the_mean(run, driven, columns, event):
     slips = slipping(run, columns, event(run.t))
     ours, mean, result = against_mean(run, slips, replace(KNOWN, driven=driven))
-    assert ours < 0.3 * mean
+    assert ours < 0.4 * mean  # the wheels behind slip too, where the car brakes
     assert ours < 0.2
     assert result.gated > 50
 
@@ -109,7 +109,7 @@ def test_wheels_that_all_agree_are_all_trusted_but_driven_ones_stand_back(run):
     assert ours < 1.05 * mean
     assert result.gated < 0.01 * run.t.size and result.held == 0
     free, _, _ = against_mean(run, gentle_slip(run), replace(KNOWN, driven="front"))
-    assert free < 0.9 * ours  # the sedan drives and brakes by its front wheels in the plant
+    assert free < 0.9 * ours  # the sedan drives by its front wheels, and brakes by them more
 
 
 def test_a_lone_encoder_is_bounded_by_what_a_car_can_do(run):

@@ -5,14 +5,15 @@ import json
 import numpy as np
 import pytest
 
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from tests.conftest import without_ink
 from tireid.cli import main
 
 
 @pytest.fixture(scope="module")
 def words(logs):
-    return ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    log, car = str(logs / "slalom.csv"), str(logs / "car.toml")
+    return ["identify", log, "--vehicle", car, "--accept", "--method"]
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +21,7 @@ def result(words, tmp_path_factory):
     out = tmp_path_factory.mktemp("bound") / "out"
     with pytest.MonkeyPatch.context() as patch:
         without_ink(patch)
-        assert main([*words, "--bound", "--out", str(out)]) == 0
+        assert main([*words, "axle", "--bound", "--out", str(out)]) == 0
     return out
 
 
@@ -58,7 +59,7 @@ def test_another_drive_is_set_against_the_guarantee(result, logs, tmp_path, caps
 
 def test_a_bound_that_is_told_is_taken_or_refused_in_one_line(words, tmp_path, capsys, undrawn):
     out = tmp_path / "out"
-    assert main([*words, "--bound", "0.3", "0.02", "--out", str(out)]) == 0
+    assert main([*words, "axle", "--bound", "0.3", "0.02", "--out", str(out)]) == 0
     bound = load_model(out / "weights.json").guarantee.bound
     assert bound.error == (0.3, 0.3) and bound.lateness == (0.02, 0.02)
     for numbers, said in (
@@ -67,13 +68,13 @@ def test_a_bound_that_is_told_is_taken_or_refused_in_one_line(words, tmp_path, c
         (["0.1", "5"], "lateness must be"),
         (["0.1", "0.1", "0.1"], "it was given 3 numbers"),
     ):
-        assert main([*words, "--bound", *numbers, "--out", str(tmp_path / "no")]) == 2
+        assert main([*words, "axle", "--bound", *numbers, "--out", str(tmp_path / "no")]) == 2
         lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
         assert len(lines) == 1 and said in lines[0]
         assert not (tmp_path / "no").exists()
 
 
-def test_a_method_without_curves_says_so(words, tmp_path, capsys, undrawn):
-    out = tmp_path / "paper"
-    assert main([*words, "--paper", "--accept", "--bound", "--out", str(out)]) == 0
-    assert "no guaranteed band" in capsys.readouterr().out
+@pytest.mark.parametrize("method", ["fit", "integral"])
+def test_a_method_without_such_curves_says_so(words, tmp_path, capsys, undrawn, method):
+    assert main([*words, method, "--bound", "--out", str(tmp_path / "out")]) == 0
+    assert "no guaranteed band: it takes --method axle" in capsys.readouterr().out

@@ -110,18 +110,18 @@ def test_a_rear_or_right_wheel_is_not_taken_for_the_front_axle(log, tmp_path):
     columns = {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r}
     columns |= {"delta_fl": log.delta_f, "delta_fr": log.delta_f}
     with pytest.raises(RecordingError) as caught:
-        ti.Recording.from_dataframe(columns)
+        ti.read_recording(columns)
     assert "did you mean 'delta_fl + delta_fr' for delta_f (goes to 0.12; mean of two" in str(
         caught.value
     )
-    told = ti.Recording.from_dataframe(columns, columns={"delta_f": "delta_fl + delta_fr [rad]"})
+    told = ti.read_recording(columns, columns={"delta_f": "delta_fl + delta_fr [rad]"})
     assert np.array_equal(told.delta_f, log.delta_f)
 
 
 def test_sideslip_is_read_in_place_of_lateral_velocity(log):
     columns = {"t": log.t, "vx": log.v_x, "r": log.r, "delta_f": log.delta_f}
     columns["Schwimmwinkel"] = np.degrees(np.arctan2(log.v_y, log.v_x))
-    told = ti.Recording.from_dataframe(columns, columns={"beta": "Schwimmwinkel [deg]"})
+    told = ti.read_recording(columns, columns={"beta": "Schwimmwinkel [deg]"})
     assert np.allclose(told.v_y, log.v_y, atol=1e-12)
 
 
@@ -130,20 +130,20 @@ def test_a_filter_that_lets_nothing_pass_or_cannot_be_is_refused(log, cut_off):
     columns = {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
     said = "^mine: low_pass of the map must be at least 0.01 Hz and below half the sampling rate"
     with pytest.raises(RecordingError, match=said):
-        ti.Recording.from_dataframe(columns, name="mine", log_map=ti.LogMap(low_pass=cut_off))
+        ti.read_recording(columns, name="mine", log_map=ti.LogMap(low_pass=cut_off))
     slow = ti.LogMap(low_pass=0.01)
-    least = ti.Recording.from_dataframe(columns, log_map=slow, check=False)
+    least = ti.read_recording(columns, log_map=slow, check=False)
     assert np.ptp(least.v_x) < 0.5 * np.ptp(log.v_x)
 
 
 def test_mirrored_axes_and_a_filter_are_told_by_the_map(log):
     columns = {"t": log.t, "vx": log.v_x, "vy": -log.v_y, "r": -log.r, "delta_f": -log.delta_f}
     columns["ay"] = -log.a_y
-    told = ti.Recording.from_dataframe(columns, log_map=ti.LogMap(axes="SAE"))
+    told = ti.read_recording(columns, log_map=ti.LogMap(axes="SAE"))
     for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
         assert np.array_equal(getattr(told, name), getattr(log, name))
-    smooth = ti.Recording.from_dataframe(columns, log_map=ti.LogMap(axes="SAE", low_pass=5.0))
-    ahead = ti.Recording.from_dataframe(
+    smooth = ti.read_recording(columns, log_map=ti.LogMap(axes="SAE", low_pass=5.0))
+    ahead = ti.read_recording(
         {name: np.where(log.t > 20.0, 0.0, value) if name == "vy" else value
          for name, value in columns.items()},
         log_map=ti.LogMap(axes="SAE", low_pass=5.0), check=False,
@@ -174,7 +174,7 @@ def test_several_logs_teach_one_model_with_errors_of_each(log, folder, tmp_path,
 
 
 def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, tmp_path, capsys):
-    off = ti.Recording.from_dataframe(
+    off = ti.read_recording(
         {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": -log.r, "delta_f": log.delta_f},
         check=False,
     )

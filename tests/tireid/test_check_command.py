@@ -164,7 +164,7 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     """Boxes and properties are those of the identifier itself."""
     code, said = checked(capsys, "--out", tmp_path / "judged")
     assert code == 0
-    assert said.out.startswith("sedan: axle, the default of tireid identify\n")
+    assert said.out.startswith("sedan: axle, the default in a car\n")
     assert said.out.splitlines()[-1] == "verdict: pass"
     held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).held
     least, most = held["grip_static_axle_loads"]

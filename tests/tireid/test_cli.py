@@ -58,6 +58,21 @@ def test_an_option_that_was_renamed_leads_to_its_new_name(words, hint, capsys):
     assert hint in capsys.readouterr().err
 
 
+def helps(parser):
+    """The help of a parser and of all of its commands."""
+    yield parser.format_help()
+    for action in parser._subparsers._group_actions if parser._subparsers else ():
+        for one in action.choices.values():
+            yield from helps(one)
+
+
+def test_no_help_shows_the_percent_signs_of_its_source():
+    told = [text for name in COMMANDS for text in helps(build_parser([name]))]
+    assert len(told) > len(COMMANDS)
+    for text in told:
+        assert "%%" not in text, text
+
+
 def options_of():
     """Every option of every command, by its word."""
     found = {}

@@ -5,7 +5,9 @@ import os
 import socket
 import sys
 import time
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -18,7 +20,7 @@ from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import ClusterError, cluster
 
-pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[cluster]'")
+pytest.importorskip("distributed", reason="needs Dask")
 pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
 
 
@@ -109,6 +111,43 @@ def test_a_scheduler_without_workers_is_told_of(monkeypatch, tmp_path):
         process.wait(timeout=20)
 
 
+def test_a_worker_of_threads_is_told_how_to_start_as_processes(tmp_path, capsys):
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    running = [
+        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path),
+        start("worker", [address, "--nthreads", "3", "--no-nanny"], tmp_path),
+    ]
+    try:
+        with cluster(address) as elsewhere:
+            assert list(elsewhere(abs, [-1])) == [1]
+    finally:
+        for process in reversed(running):
+            process.terminate()
+            process.wait(timeout=20)
+    (line,) = [one for one in capsys.readouterr().err.splitlines() if "threads" in one]
+    assert "has 3 threads, of which one works" in line
+    assert line.endswith(f"dask worker {address} --nworkers -1 --nthreads 1")
+
+
+def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
+    address, logs, tmp_path, monkeypatch, capsys
+):
+    pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
+    for name in ("slalom", "quick"):
+        (tmp_path / f"{name}.csv").write_bytes((logs / f"{name}.csv").read_bytes())
+    replace(sedan(), chassis=None).to_toml(tmp_path / "car.toml")
+    monkeypatch.chdir(tmp_path)
+    words = ["fleet", "learn", "*.csv", "--vehicle", "car.toml", "--judge", "none"]
+    for out, more in (("here", ["--jobs", "1"]), ("there", ["--scheduler", address])):
+        assert main([*words, "--out", out, *more]) == 0
+        printed = capsys.readouterr()
+        assert "2 learnt now, 0 before; 0 not valid, 0 could not be used" in printed.out
+        assert "threads" not in printed.err
+    files = [sorted(Path(out).rglob("*.parquet")) for out in ("here", "there")]
+    assert [one.read_bytes() for one in files[0]] == [one.read_bytes() for one in files[1]]
+
+
 def wait_until_open(port, patience=20.0):
     until = time.monotonic() + patience
     while time.monotonic() < until:
@@ -148,5 +187,5 @@ def test_the_command_names_what_is_wrong_with_the_cluster(words, tmp_path, monke
     assert "--scheduler does sweeps only" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2
-    assert "pip install 'tireid[cluster]'" in capsys.readouterr().err
+    assert "needs Dask: pip install dask distributed (" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -115,6 +115,34 @@ def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, ca
         assert "linear: " not in text, "it has neither, and says nothing"
 
 
+def without_forces(log, target):
+    write_recording(replace(read_recording(log), axle_force=None), target)
+    return str(target)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_without_true_forces_methods_are_judged_by_the_motion(
+    words, logs, numbers, tmp_path, capsys
+):
+    """The order is that of the true forces, and the shares are near theirs."""
+    command, *_, vehicle, car, jobs, one = words
+    blind = [without_forces(logs / f"{n}.csv", tmp_path / f"{n}.csv") for n in ("slalom", "quick")]
+    out = tmp_path / "out"
+    line = [command, *blind, vehicle, car, jobs, one, "--method", *METHODS_TRIED]
+    assert main([*line, "--out", str(out)]) == 0
+    data = json.loads((out / "compare.json").read_text())
+    assert (data["judged_by"], numbers["judged_by"]) == ("motion", "truth")
+    assert data["floors"] == {}
+    shares = {name: data["methods"][name]["percent"]["online"] for name in METHODS_TRIED}
+    true = {name: numbers["methods"][name]["percent"]["online"] for name in METHODS_TRIED}
+    assert sorted(shares, key=shares.get) == sorted(true, key=true.get)
+    assert shares["linear"] == pytest.approx(true["linear"], rel=0.2)
+    said = capsys.readouterr()
+    assert "judged by the motion, without floors" in said.err
+    assert "means over 0.3 s by the motion" in said.out
+    assert "default learnt on" not in said.out, "it was not asked for"
+
+
 def without_a_y(log, target):
     write_recording(replace(read_recording(log), a_y=None), target)
     return str(target)
@@ -239,28 +267,25 @@ def test_the_same_seed_finds_the_same(words, numbers, tmp_path, undrawn):
 @pytest.mark.parametrize(
     ("extra", "said"),
     [
-        (["--method", "magic"], "--method magic is none of axle, "),
+        (["--method", "magic"], "--method magic is none of fit, axle, "),
         (["--sweep", "-1"], "--sweep must be at least 0, it is -1"),
         (["--jobs", "0"], "--jobs must be at least 1"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["slalom"], "slalom is given twice"),
-        (["blind"], "blind: a comparison needs the true forces Fyf, Fyr"),
+        (["blind", "--sweep", "2"], "--sweep needs the true forces Fyf, Fyr: blind has none"),
     ],
 )
 def test_wrong_words_are_one_clear_line_and_leave_nothing(
     words, logs, tmp_path, capsys, extra, said
 ):
-    if extra == ["blind"]:
-        cells = [line.split(",") for line in (logs / "slalom.csv").read_text().splitlines()]
-        keep = [i for i, name in enumerate(cells[0]) if not name.startswith("Fy")]
-        text = "\n".join(",".join(row[i] for i in keep) for row in cells)
-        (tmp_path / "blind.csv").write_text(text)
-        extra = [str(tmp_path / "blind.csv")]
+    if extra[0] == "blind":
+        extra = [without_forces(logs / "slalom.csv", tmp_path / "blind.csv"), *extra[1:]]
     elif extra == ["slalom"]:
         extra = [str(logs / "slalom.csv")]
     out = tmp_path / "out"
     first, *rest = words
-    named = [first, *extra, *rest] if extra[0].endswith(".csv") else [*words, *extra]
+    logs_named = [one for one in extra if one.endswith(".csv")]
+    named = [first, *logs_named, *rest, *(one for one in extra if one not in logs_named)]
     assert main([*named, "--out", str(out)]) == 2
     lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
     assert len(lines) == 1
@@ -286,24 +311,25 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
     logs, tmp_path, capsys, undrawn
 ):
     log = read_recording(logs / "slalom.csv")
-    write_recording(replace(log, v_y=log.v_y + 0.6), tmp_path / "biased.csv")
-    words = ["compare", str(tmp_path / "biased.csv"), "--vehicle", str(logs / "car.toml")]
+    write_recording(replace(log, v_y=-log.v_y), tmp_path / "mirrored.csv")
+    words = ["compare", str(tmp_path / "mirrored.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--jobs", "1", "--floor", "0", "--no-check", "--method", "linear"]
     assert main([*words, "--out", str(tmp_path / "another")]) == 0
     assert "verdict" not in capsys.readouterr().out
-    words.append("axle")
+    words.append("fit")
     assert main([*words, "--out", str(tmp_path / "refused")]) == 3
     assert "0 of 1" in (tmp_path / "refused" / "report.html").read_text(encoding="utf-8")
-    assert "default learnt on biased: verdict: NOT VALID" in capsys.readouterr().out
+    assert "default learnt on mirrored: verdict: NOT VALID" in capsys.readouterr().out
     assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
     found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]
-    assert found["biased"]["valid"] is False
+    assert found["mirrored"]["valid"] is False
 
 
 def test_the_registry_has_every_name_that_is_promised():
-    promised = "linear eso ekf_force stiffness_rls magic_formula_ekf dugoff_ekf instantaneous "
+    promised = "linear eso ekf_force stiffness_rls magic_formula_ekf textbook_ekf "
+    promised += "lagged_ekf dugoff_ekf instantaneous "
     promised += "integral instantaneous_scaled pi_lead kreisselmeier kreisselmeier_newton rls "
-    promised += "concurrent axle inertial linear_kf joint_ekf washout mhe"
+    promised += "concurrent fit axle inertial linear_kf joint_ekf washout mhe"
     assert set(METHODS) == set(promised.split())
 
 

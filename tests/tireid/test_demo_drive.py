@@ -85,7 +85,7 @@ def test_with_a_compiler_the_learnt_car_drives_both_roads(tmp_path, monkeypatch)
     monkeypatch.setattr(demo_drive, "known_curves", lambda *_: {})
     monkeypatch.setattr(demo_drive, "inputs_of", lambda *_: {})
     monkeypatch.setattr(demo_drive, "write_drives", written)
-    told = SimpleNamespace(car=sedan(), default=SimpleNamespace(learnt=learnt))
+    told = SimpleNamespace(car=sedan(), axle=SimpleNamespace(learnt=learnt))
     driven = drive_story(told, tmp_path)
     frozen = f"frozen at {FREEZE:g} s"
     assert asked == [

@@ -110,10 +110,12 @@ def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, 
     assert not (tmp_path / "out").exists()
 
 
-def test_nothing_sure_writes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
-    assert doctor(clinic, "good.csv", "--repair", tmp_path / "log.toml") == 0
+def test_nothing_sure_changes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
+    log_map = tmp_path / "log.toml"
+    assert doctor(clinic, "good.csv", "--repair", log_map) == 0
     assert "nothing is sure enough" in capsys.readouterr().out
-    assert not (tmp_path / "log.toml").exists()
+    assert LogMap.from_toml(log_map) == LogMap()
+    assert doctor(clinic, "good.csv", "--log", log_map) == 0  # the next command of docs/doctor.md
     (tmp_path / "mine.toml").write_text("mine")
     assert doctor(clinic, "bad.csv", "--repair", tmp_path / "mine.toml") == 2
     assert (tmp_path / "mine.toml").read_text() == "mine"
@@ -137,7 +139,7 @@ def test_sizes_have_the_digits_that_their_deviations_leave():
     delay = Finding(code="delay", channel="r", size=0.09123, deviation=0.0021, unit="s")
     assert size_text(delay) == "91.2 ± 2.1 ms"
     angle = Finding(code="offset", channel="delta_f", size=np.radians(1.0), unit="rad")
-    assert size_text(angle) == "1 deg"
+    assert size_text(angle) == "1.00 deg"
     assert size_text(Finding(code="straight")) == ""
 
 

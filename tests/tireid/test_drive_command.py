@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import tireid as ti
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.files import digest
 from models.friction import Friction
 from models.vehicle import sedan
@@ -225,10 +225,10 @@ def test_a_car_without_a_chassis_is_refused(bend, tmp_path, capsys):
     assert "chassis" in refusal(capsys, words)
 
 
-def test_a_plant_whose_package_is_missing_names_the_extra(bend, tmp_path, capsys, monkeypatch):
+def test_a_plant_whose_package_is_missing_says_what_to_install(bend, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "vehiclemodels.parameters_vehicle2", None)
     words = ["--path", bend, "--plant", "multi-body", "--out", tmp_path / "out"]
-    assert "tireid[commonroad]" in refusal(capsys, words)
+    assert "pip install commonroad-vehicle-models (" in refusal(capsys, words)
 
 
 def test_without_a_compiler_it_says_what_is_missing(bend, tmp_path, capsys, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tests.tireid.test_drive_command import bend, refusal, summary_of  # noqa: F401

@@ -12,12 +12,14 @@ from identifier.export.compiled import CompiledPackage
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
+from identifier.verdict import calibrated
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid import exporting
 from tireid.cli import main
 from tireid.commands import export as export_command
+from tireid.run import Run
 
 CAR = sedan()
 
@@ -184,14 +186,14 @@ def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch
 
 def test_the_band_is_exported_as_it_was_calibrated(tmp_path, logs, capsys):
     run = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR))
-    run.calibrated().save(tmp_path / "weights.json")
+    calibrated(run).save(tmp_path / "weights.json")
     words = ["export", "--band", "--weights", str(tmp_path / "weights.json")]
     assert main([*words, "--out", str(tmp_path / "told")]) == 0
     manifest = json.loads((tmp_path / "told" / "tireid.json").read_text())
-    assert manifest["band"] == run.calibrated().calibration.to_dict()
+    assert manifest["band"] == calibrated(run).calibration.to_dict()
     assert "half_band" in (tmp_path / "told" / "include" / "tireid_config.h").read_text()
     assert exporting.UNCALIBRATED not in capsys.readouterr().err
-    again = exporting.export(run, tmp_path / "run", band=True)
+    again = exporting.export(Run(history=run), tmp_path / "run", band=True)
     assert again.package.specialized.band == manifest["band"]
 
 

@@ -17,18 +17,22 @@ import pytest
 
 import tireid.commands.fleet as command
 import tireid.fleet.learn as learning
+import tireid.fleet.store as storing
 from benchmarks.local_cluster import free_port, start
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import reference_of
 from identifier.axle.prior import fiala_weights
-from identifier.stored import load_model
-from models.recordings import read_recording
+from identifier.tire_model import load_model
+from identifier.verdict import judge_prediction
+from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import cluster
 from tireid.exchange import claim
 from tireid.fleet.learn import (
+    Car,
     LearnSome,
+    Learnt,
     Telling,
     find_logs,
     learn_fleet,
@@ -36,12 +40,12 @@ from tireid.fleet.learn import (
     on_this_machine,
 )
 from tireid.fleet.merge import MergeError, excitation_of, fleet_prior, merge, usable
-from tireid.fleet.store import LogRow, Store, StoreError, information_columns
+from tireid.fleet.store import Store, StoreError, information_columns
 from tireid.fleet.watch import Watching, watch
 from tireid.learning import identify
 
 for name in ("pyarrow", "fsspec"):
-    pytest.importorskip(name, reason="needs a store: pip install 'tireid[fleet]'")
+    pytest.importorskip(name, reason="needs a store")
 pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
 
 DAYS = 3
@@ -59,7 +63,7 @@ def fleet(tmp_path_factory, logs):
         for day in range(DAYS):
             for drive in ("slalom", "quick"):
                 path = folder / car / "summer" / f"2026-03-{day + 1:02d}-{drive}.csv"
-                path.write_bytes((logs / f"{drive}.csv").read_bytes())
+                path.write_bytes((logs / f"{drive}.csv").read_bytes() + b"\n" * day)
     (folder / "red" / "summer" / "2026-03-09-broken.csv").write_text("t,vx\n0,1\n")
     return folder
 
@@ -86,6 +90,10 @@ def store(fleet, tmp_path_factory):
     return str(out)
 
 
+def used(rows):
+    return [row for row in rows if usable(row, refused=True)]
+
+
 def digest(out):
     """A hash of every file of a store."""
     files = sorted(path for path in Path(out).rglob("*") if path.is_file())
@@ -93,11 +101,12 @@ def digest(out):
 
 
 def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
-    rows = Store(store).rows(light=False)
+    rows = Store(store).rows()
     assert len(rows) == 4 * DAYS + 1
     (bad,) = [row for row in rows if row.error]
-    assert bad.log == "red/summer/2026-03-09-broken.csv" and "column" in bad.error
-    assert bad.date == "2026-03-09" and not bad.model and not usable([bad])
+    assert bad.log == str(Path("red/summer/2026-03-09-broken.csv").absolute())
+    assert "column" in bad.error
+    assert bad.date == "2026-03-09" and not bad.model and not usable(bad)
     good = rows[0]
     assert (good.vehicle, good.tires, good.date) == ("blue", "summer", "2026-03-01")
     assert isinstance(good.frozen, AxleModel) and good.parts[0].seconds > 3.0
@@ -109,7 +118,7 @@ def test_a_store_is_read_without_the_threads_of_a_dataset(store):
     # They may hold a file of Python's while Python ends, which aborts the program.
     program = (
         "import sys; from tireid.fleet.store import Store; "
-        f"assert Store({store!r}).rows(light=False); print('pyarrow._dataset' in sys.modules)"
+        f"assert Store({store!r}).rows(); print('pyarrow._dataset' in sys.modules)"
     )
     told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (told.returncode, told.stdout) == (0, "False\n"), told.stderr
@@ -122,7 +131,7 @@ def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_
     assert learnt(store, "--again") == 1
     assert "1 learnt now, 12 before" in capsys.readouterr().out
     extra = fleet / "blue" / "summer" / "2026-03-20-more.csv"
-    extra.write_bytes((fleet / "blue/summer/2026-03-01-quick.csv").read_bytes())
+    extra.write_bytes((fleet / "blue/summer/2026-03-01-quick.csv").read_bytes() + b"\n" * 9)
     try:
         before = digest(store)
         assert learnt(store) == 1
@@ -177,7 +186,7 @@ def test_a_car_and_an_excitation_that_are_none_are_named(store):
     with pytest.raises(StoreError, match=r"bucket-.*: car is none: vehicle\.mass is missing"):
         _ = replace(row, car="{}").told_car
     with pytest.raises(StoreError, match="excitation must hold 18 numbers, not 17"):
-        excitation_of([row, replace(row, excitation=row.excitation[1:])])
+        excitation_of(np.zeros((2, 9)), replace(row, excitation=row.excitation[1:]))
 
 
 def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):
@@ -189,12 +198,263 @@ def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):
         assert main([*words, "--out", str(tmp_path / "store")]) == 0
         assert told in capsys.readouterr().out
     rows = Store(str(tmp_path / "store")).rows()
-    assert [Path(row.log).name for row in rows] == ["two.csv:0", "two.csv:1"]
+    assert [Path(row.name).name for row in rows] == ["two.csv:0", "two.csv:1"]
+    assert {row.log for row in rows} == {str(tmp_path / "two.csv")}
     assert rows[0].stiffness_front != rows[1].stiffness_front
+
+
+def rows_in(store, *columns):
+    return Store(str(store)).rows(("log", "run", "content", "setting", *columns))
+
+
+@pytest.fixture
+def garage(tmp_path, logs):
+    """Two cars' folders that look alike: car.toml and logs of the same names."""
+    for k, car in enumerate(("one", "two")):
+        (tmp_path / car / "logs").mkdir(parents=True)
+        told = replace(sedan(), mass=1500.0 + 10.0 * k, chassis=None)
+        told.to_toml(tmp_path / car / "car.toml")
+        for day in range(4):
+            path = tmp_path / car / "logs" / f"{day}.csv"
+            path.write_bytes((logs / "quick.csv").read_bytes() + b"\n" * day)
+    return tmp_path
+
+
+def learns(pattern, out, *more, vehicle="car.toml"):
+    words = ["--vehicle", str(vehicle), "--out", str(out), "--jobs", "1", "--judge", "none", *more]
+    return main(["fleet", "learn", str(pattern), *words])
+
+
+def test_the_same_logs_from_another_folder_are_known_and_counted_once(garage, monkeypatch, capsys):
+    store, car, merged = garage / "store", garage / "one" / "car.toml", garage / "merged"
+    for folder, pattern, told in (
+        (garage, garage / "one" / "logs" / "*.csv", "4 learnt now, 0 before"),
+        (garage / "two", garage / "one" / "logs" / "*.csv", "0 learnt now, 4 before"),
+        (garage / "one" / "logs", "*.csv", "0 learnt now, 4 before"),
+        (garage, "two/../one/logs/*.csv", "0 learnt now, 4 before"),
+    ):
+        monkeypatch.chdir(folder)
+        assert learns(pattern, store, vehicle=car) == 0
+        assert told in capsys.readouterr().out
+    assert [row.log for row in rows_in(store)] == [
+        str(garage / "one" / "logs" / f"{day}.csv") for day in range(4)
+    ]
+    assert main(["fleet", "merge", str(store), "--out", str(merged)]) == 0
+    (model,) = json.loads((merged / "models.json").read_text())
+    assert model["logs"] == 4
+
+
+def test_two_cars_whose_folders_look_alike_lose_no_log(garage, monkeypatch, capsys):
+    store = garage / "store"
+    for car in ("one", "two"):
+        monkeypatch.chdir(garage / car)
+        assert learns("logs/*.csv", garage / "named", "--root", "logs") == 0
+        assert "4 learnt now, 0 before" in capsys.readouterr().out
+        assert learns("logs/*.csv", store) == 0
+        assert "4 learnt now, 0 before" in capsys.readouterr().out
+    assert len(rows_in(store)) == 8
+    names = [row.log for row in rows_in(garage / "named")]
+    assert names == sorted(2 * [f"{day}.csv" for day in range(4)])
+    assert main(["fleet", "merge", str(store), "--out", str(garage / "no")]) == 2
+    assert "are of cars whose files differ" in capsys.readouterr().err
+    words = ["--by", "setting", "--out", str(garage / "merged")]
+    assert main(["fleet", "merge", str(store), *words]) == 0
+    assert [one["logs"] for one in json.loads((garage / "merged/models.json").read_text())] == [
+        4,
+        4,
+    ]
+
+
+def test_a_copy_counts_once_whichever_is_learnt_and_is_named(garage, monkeypatch, capsys):
+    monkeypatch.chdir(garage / "one")
+    shutil.copy("logs/2.csv", "logs/a.csv")
+    assert learns("logs/*.csv", "store") == 0
+    assert [Path(row.log).name for row in rows_in("store")] == ["0.csv", "1.csv", "2.csv", "3.csv"]
+    shutil.copy("logs/2.csv", "logs/b.csv")
+    capsys.readouterr()
+    assert learns("logs/b.csv", "store") == 0
+    printed = capsys.readouterr()
+    assert "1 logs" in printed.out and "0 learnt now, 1 before" in printed.out
+    assert f"{garage}/one/logs/b.csv: is in the store as {garage}/one/logs/2.csv" in printed.err
+
+
+def test_what_was_learnt_otherwise_is_told_of_and_replaced_where_asked(garage, monkeypatch, capsys):
+    monkeypatch.chdir(garage / "one")
+    assert learns("logs/*.csv", "store") == 0
+    changed = Path("logs/3.csv")
+    changed.write_bytes(changed.read_bytes() + b"\n")
+    capsys.readouterr()
+    assert learns("logs/*.csv", "store") == 0
+    printed = capsys.readouterr()
+    assert "1 learnt now, 3 before" in printed.out and len(rows_in("store")) == 5
+    assert "3.csv and 0 others stand in the store with another car, other options" in printed.err
+    assert learns("logs/*.csv", "store", "--part", "60") == 0
+    assert len(rows_in("store")) == 9
+    assert main(["fleet", "merge", "store", "--out", "merged"]) == 2
+    assert "was learnt with two settings" in capsys.readouterr().err
+    for _ in range(2):
+        assert learns("logs/*.csv", "store", "--part", "60", "--replace") == 0
+    assert len(rows_in("store")) == 4 and len({row.setting for row in rows_in("store")}) == 1
+    assert "taken out of the store, as were 4 others" in capsys.readouterr().err
+    assert main(["fleet", "merge", "store", "--out", "merged"]) == 0
+
+
+def test_a_log_that_could_not_be_read_is_learnt_once_it_can(garage, monkeypatch):
+    monkeypatch.chdir(garage / "one")
+    telling, store = Telling(log_map=learning.LogMap(), judging="none"), Store("store")
+    tasks, _ = find_logs(["logs/0.csv"], "car.toml")
+    dead = LearnSome(telling, {Path("car.toml"): Car.read(Path("car.toml"), telling)}).died(
+        tasks[0]
+    )
+    learn_fleet(tasks, telling, store, lambda work, portions: [dead])
+    (row,) = store.rows()
+    assert not row.content and "died" in row.error
+    assert learn_fleet(tasks, telling, store, map).learnt == 0  # it would die again
+    assert learn_fleet(tasks, telling, store, map, again=True).learnt == 1
+    (row,) = store.rows()
+    assert (
+        row.content == hashlib.blake2b(Path("logs/0.csv").read_bytes(), digest_size=16).hexdigest()
+    )
+    assert not row.error and row.seconds > 3.0
+
+
+def test_a_setting_is_what_files_hold_and_not_where_they_lie(garage, monkeypatch):
+    monkeypatch.chdir(garage)
+    for name in ("a.dbc", "b.dbc"):
+        Path(name).write_text("VERSION")
+    one = sedan()
+
+    def of(vehicle=one, **told):
+        return Telling(log_map=learning.LogMap(**told)).digest(vehicle)
+
+    assert of(dbc="a.dbc") == of(dbc="b.dbc") == of(dbc=str(garage / "a.dbc")) != of()
+    told = Telling(log_map=learning.LogMap(dbc="a.dbc"))
+    assert told.log_map.dbc == str(garage / "a.dbc")
+    before = of(dbc="a.dbc")
+    Path("a.dbc").write_text("VERSION 2")
+    assert of(dbc="a.dbc") != before
+    others = [of(replace(one, mass=1501.0)), of(axes="SAE")]
+    plain = Telling(log_map=learning.LogMap())
+    start = reference_of(AxleIdentifier.for_vehicle(one, dt=0.01), one)
+    for change in ({"judging": "none"}, {"check": False}, {"part": 60.0}, {"start": start}):
+        others.append(replace(plain, **change).digest(one))
+    assert len({of(), *others}) == 1 + len(others)
+    read = [Car.read(garage / name / "car.toml", plain) for name in ("one", "two", "one")]
+    assert read[0] == read[2] and read[0].setting != read[1].setting
+
+
+def test_a_store_of_an_older_version_is_refused_in_one_line(store, tmp_path, capsys):
+    from pyarrow import parquet
+
+    out = Path(shutil.copytree(store, tmp_path / "old"))
+    path = sorted((out / "logs").iterdir())[0]
+    table = parquet.read_table(path)
+    parquet.write_table(table.replace_schema_metadata({"format": "tireid fleet 1"}), path)
+    assert main(["fleet", "merge", str(out), "--out", str(tmp_path / "merged")]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert f"{path}: is of another version's store (tireid fleet 1, not tireid fleet 2)" in said[-1]
 
 
 class StoppedError(Exception):
     pass
+
+
+def test_a_row_tells_how_its_log_was_driven_and_what_was_learnt(store, logs):
+    row = next(one for one in Store(store).rows() if one.log.endswith("quick.csv"))
+    log = read_recording(logs / "quick.csv")
+    a_y = [v * r for v, r in zip(log.v_x, log.r, strict=True)]
+    assert row.a_y_rms == pytest.approx(math.sqrt(sum(one * one for one in a_y) / len(a_y)))
+    assert row.a_y_most == pytest.approx(max(map(abs, a_y)))
+    assert row.v_x_mean == pytest.approx(sum(log.v_x) / len(log.v_x))
+    assert (row.v_x_most, row.steering_most) == (max(log.v_x), max(map(abs, log.delta_f)))
+    assert row.seconds == log.t[-1] - log.t[0] and row.estimated_v_y is False
+    model = row.frozen
+    for i, axle in enumerate(("front", "rear")):
+        assert getattr(row, f"stiffness_{axle}") == model.cornering_stiffness[i]
+        assert getattr(row, f"grip_{axle}") == pytest.approx(sum(model.W[i]))
+        assert getattr(row, f"relaxation_{axle}") == model.relaxation_length[i]
+        assert getattr(row, f"known_{axle}") == model.known_slip[i]
+    assert (np.reshape(row.excitation, (2, 9)) == model.excitation).all()
+    judged = judge_prediction(model, log, another_road=False)
+    assert row.valid is judged.valid and len(row.findings) == len(judged.findings)
+    assert [row.missed_front, row.missed_rear] == list(judged.measures["force_missed"])
+    assert all(one.code in told for one, told in zip(judged.findings, row.findings, strict=True))
+    assert row.part_begin == [0.0] and 3.0 < row.part_seconds[0] < row.seconds
+
+
+def test_a_log_without_v_y_a_full_verdict_and_a_date_of_its_file(garage, monkeypatch):
+    monkeypatch.chdir(garage / "one")
+    log = replace(read_recording("logs/0.csv"), v_y=None)
+    Path("logs").rename("before")
+    write_recording(log, "without.csv")
+    os.utime("without.csv", (1.7e9, 1.7e9))
+    shutil.copy("before/1.csv", "with.csv")
+    assert learns("without.csv", "none") == 0
+    (alone,) = Store("none").rows()
+    assert (alone.error, alone.valid) == ("", None)
+    assert learns("*.csv", "s", "--judge", "full") == 0
+    other, row = Store("s").rows()
+    assert (other.estimated_v_y, row.estimated_v_y) == (False, True)
+    assert None not in (other.valid, row.valid) and not row.error
+    assert row.model == alone.model
+    assert (row.date, row.vehicle, row.tires) == ("2023-11-14T22:13:20+00:00", sedan().name, "")
+
+
+def test_logs_at_an_address_are_known_by_what_their_file_system_says(garage, logs, monkeypatch):
+    from fsspec.implementations.memory import MemoryFileSystem
+
+    monkeypatch.chdir(garage / "one")
+    fs, text = MemoryFileSystem(), (logs / "quick.csv").read_bytes()
+    telling, store = Telling(log_map=learning.LogMap(), judging="none"), Store("store")
+
+    def learnt_now():
+        tasks, left = find_logs(
+            ["memory://drives/*/*.csv"], "car.toml", "{tires}/{date}-*.csv", "memory://drives"
+        )
+        assert list(left) == ["wet/0.csv", "wet/last.csv"]
+        return learn_fleet(tasks, telling, store, map).learnt
+
+    try:
+        fs.pipe_file("/drives/wet/2026-03-01T10:00-a.csv", text)
+        for name in ("0", "last"):
+            fs.pipe_file(f"/drives/wet/{name}.csv", text)
+        assert (learnt_now(), learnt_now()) == (1, 0)
+        fs.pipe_file("/drives/wet/2026-03-01T10:00-a.csv", text[:-1] + b" ")  # of the same size
+        assert learnt_now() == 1
+        rows = store.rows()
+        assert {row.log for row in rows} == {"wet/2026-03-01T10:00-a.csv"} and len(rows) == 2
+        assert (rows[0].tires, rows[0].date, rows[0].size) == ("wet", "2026-03-01T10:00", len(text))
+        assert json.loads(rows[0].tags) == {"tires": "wet", "date": "2026-03-01T10:00"}
+        (task,), _ = find_logs(["memory://drives/wet/last.csv"], "car.toml")
+        assert task.log == task.address == fs.unstrip_protocol("/drives/wet/last.csv")
+        assert task.date == fs.info("/drives/wet/last.csv")["created"].isoformat(timespec="seconds")
+    finally:
+        fs.rm("/drives", recursive=True)
+    silent = {"name": "a", "size": 3, "type": "file"}
+    assert learning._stamp("http://host/a", silent) == ""
+    told = [{**silent, "ETag": "x"}, {**silent, "ETag": "y"}, {**silent, "LastModified": "x"}]
+    stamps = {learning._stamp("s3://host/a", one) for one in [*told, {**told[0], "size": 4}]}
+    assert len(stamps) == 4 and "" not in stamps
+
+
+def test_a_store_is_sorted_in_rounds_and_emptied_row_by_row(store, tmp_path, monkeypatch):
+    rows, whole, parts = Store(store).rows(), Store(str(tmp_path / "a")), Store(str(tmp_path / "b"))
+    for out in (whole, parts):
+        for row in rows:
+            out.keep([row])
+        monkeypatch.setattr(storing, "AT_ONCE", 2 if out is parts else 1000)
+        out.settle()
+    assert digest(tmp_path / "a") == digest(tmp_path / "b") == digest(store)
+    parts.drop(rows[:3])
+    assert parts.rows() == rows[3:]
+    parts.drop(rows[3:])
+    assert not parts.exists and not list((tmp_path / "b" / "logs").iterdir())
+
+
+def test_few_logs_are_shared_into_as_many_portions_and_many_by_eight():
+    sizes = {n: [len(one) for one in learning._portions(range(n))] for n in (0, 5, 40, 500)}
+    assert sizes[0] == [] and sizes[5] == [1] * 5 and sizes[40] == [2] * 20
+    assert set(sizes[500][:-1]) == {8} and sum(sizes[500]) == 500
 
 
 def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bytes(tmp_path, monkeypatch):
@@ -225,46 +485,50 @@ def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bytes(tmp_path, m
     assert digest(tmp_path / "halted") == digest(tmp_path / "whole")
 
 
-def kill_at(log, portion):
-    if any(task.log == log for task in portion):
-        os.kill(os.getpid(), signal.SIGKILL)
-    return [LogRow(log=task.log, setting="", size=0, vehicle="", tires="", date="", tags="{}")
-            for task in portion]  # fmt: skip
+DEADLY = "red/summer/2026-03-02-quick.csv"
 
 
 class Deadly(LearnSome):
     def __call__(self, tasks):
-        return kill_at("red/summer/2026-03-02-quick.csv", tasks)
+        if any(task.log.endswith(DEADLY) for task in tasks):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Learnt([learning.row_of(task, self.cars[task.vehicle]) for task in tasks], [])
+
+
+def harmless(tasks):
+    telling = Telling(log_map=learning.LogMap(), judging="none")
+    return telling, {task.vehicle: Car.read(task.vehicle, telling) for task in tasks}
 
 
 def test_a_log_that_kills_its_process_costs_its_own_row_alone():
     tasks, _ = find_logs(["red/summer/2026-03-02-*.csv", "red/summer/*-03-quick.csv"], CAR, TAGS)
-    telling = Telling(log_map=learning.LogMap())
-    work = Deadly(telling, {task.vehicle: "told" for task in tasks})
-    rows = [row for some in on_this_machine(2)(work, [tuple(tasks)]) for row in some]
+    work = Deadly(*harmless(tasks))
+    rows = [row for some in on_this_machine(2)(work, [tuple(tasks)]) for row in some.rows]
     assert sorted(row.log for row in rows) == [task.log for task in tasks]
-    assert [row.log for row in rows if "died" in row.error] == ["red/summer/2026-03-02-quick.csv"]
+    (dead,) = [row for row in rows if "died" in row.error]
+    assert dead.log.endswith(DEADLY) and (dead.vehicle, dead.date) == ("red", "2026-03-02")
+    assert dead.setting == rows[0].setting != "" and dead.stamp == tasks[0].stamp
 
 
 def test_a_log_that_kills_workers_of_a_cluster_costs_its_own_row_alone():
     tasks, _ = find_logs(["red/summer/*.csv"], CAR, TAGS)
-    deadly = "red/summer/2026-03-02-quick.csv"
 
     def elsewhere(work, portions, *, lost):
         for portion in portions:
-            if any(task.log == deadly for task in portion):
+            if any(task.log.endswith(DEADLY) for task in portion):
                 lost(portion)
             else:
                 yield work(portion)
 
-    work = LearnSome(Telling(log_map=learning.LogMap()), {tasks[0].vehicle: "told"})
-    rows = [row for some in on_a_cluster(elsewhere)(work, [tuple(tasks)]) for row in some]
+    work = LearnSome(*harmless(tasks))
+    found = list(on_a_cluster(elsewhere)(work, [tuple(tasks)]))
+    rows = [row for some in found for row in some.rows]
     assert sorted(row.log for row in rows) == [task.log for task in tasks]
-    assert [row.log for row in rows if "died" in row.error] == [deadly]
+    assert [row.log for row in rows if "died" in row.error] == [str(Path(DEADLY).absolute())]
 
 
-def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(tmp_path, fleet):
-    pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[fleet]'")
+def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(tmp_path):
+    pytest.importorskip("distributed", reason="needs Dask")
     tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
     telling = Telling(log_map=learning.LogMap())
     here, there = Store(str(tmp_path / "here")), Store(str(tmp_path / "there"))
@@ -273,8 +537,8 @@ def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(t
     address = f"tcp://127.0.0.1:{port}"
     options = [address, "--nthreads", "1", "--no-nanny"]
     running = [
-        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], fleet),
-        *(start("worker", options, fleet) for _ in range(2)),
+        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path),
+        *(start("worker", options, tmp_path) for _ in range(2)),
     ]
     killed = []
 
@@ -294,18 +558,32 @@ def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(t
     assert digest(tmp_path / "there") == digest(tmp_path / "here")
 
 
-def test_a_store_lies_at_any_address_of_fsspec(store):
-    away = Store("memory://fleet")
-    rows = Store(store).rows(light=False)
-    by_bucket = {}
-    for row in rows:
-        by_bucket.setdefault(learning.bucket_of(row.log), []).append(row)
-    for some in by_bucket.values():
-        away.keep(some)
-    assert away.exists and len(away.rows(("log",))) == len(rows)
-    away.settle()
-    assert [row.log for row in away.rows(("log",))] == [row.log for row in rows]
-    assert away.rows(light=False)[0] == rows[0]
+def test_a_store_lies_at_any_address_and_each_portion_costs_one_request(store, monkeypatch):
+    memory = pytest.importorskip("fsspec.implementations.memory").MemoryFileSystem
+    asked = []
+
+    def counted(name, of):
+        return lambda *words, **more: (asked.append(name), of(*words, **more))[1]
+
+    for name in ("pipe_file", "cat_file", "open", "mv", "rm", "ls", "makedirs", "info"):
+        monkeypatch.setattr(memory, name, counted(name, getattr(memory, name)))
+    away, rows = Store("memory://fleet"), Store(store).rows()
+    try:
+        for k in range(0, len(rows), 5):
+            away.keep(rows[k : k + 5])
+        assert asked.count("pipe_file") == len(range(0, len(rows), 5))
+        assert set(asked) <= {"pipe_file", "open"}  # by which the memory itself is written
+        assert away.exists and away.rows(("log",)) == Store(store).rows(("log",))
+        asked.clear()
+        away.settle()
+        buckets = len({row.bucket for row in rows})
+        assert asked.count("pipe_file") == buckets and asked.count("cat_file") == 3
+        assert asked.count("ls") <= 2 and "makedirs" not in asked and "mv" not in asked
+        assert away.rows() == rows
+        monkeypatch.setattr(storing, "SMALL", 0)  # then what is asked for is fetched alone
+        assert away.rows(("log", "vector")) == Store(store).rows(("log", "vector"))
+    finally:
+        away._place[0].rm("/fleet", recursive=True)
 
 
 def test_models_are_merged_by_what_logs_have_in_common(store, tmp_path, capsys):
@@ -322,16 +600,18 @@ def test_models_are_merged_by_what_logs_have_in_common(store, tmp_path, capsys):
 
 
 def test_a_question_in_sql_chooses_rows_and_sees_nothing_else(store):
-    pytest.importorskip("duckdb", reason="needs DuckDB: pip install 'tireid[fleet]'")
+    pytest.importorskip("duckdb", reason="needs DuckDB")
     rows = Store(store).rows(where="vehicle = 'red' AND error = ''")
     assert {row.vehicle for row in rows} == {"red"} and len(rows) == 2 * DAYS
+    some = Store(store).rows(("log",), where="len(part_seconds) = 1 AND model LIKE '%axle%'")
+    assert len(some) == 4 * DAYS and {row.model for row in some} == {""}
     for wrong in ("nobody > 3", "log IN (SELECT content FROM read_text('cars/red.toml'))"):
         with pytest.raises(StoreError, match=r"all: "):
             Store(store).rows(where=wrong)
 
 
 def test_stiffness_of_a_small_car_has_digits_in_the_table(store):
-    (group, *_) = merge(usable(Store(store).rows(where="vehicle = 'red'"), refused=True), [])
+    (group, *_) = merge(used(Store(store).rows(where="vehicle = 'red'")), [])
     small = replace(group.model, W=1e-3 * group.model.W)
     words = command._table([replace(group, model=small)]).split("kN/rad")[0].replace(",", "")
     told = [float(one) for one in words.split()[-2:]]
@@ -339,7 +619,7 @@ def test_stiffness_of_a_small_car_has_digits_in_the_table(store):
 
 
 def test_cars_of_another_kind_are_not_merged(store):
-    rows = usable(Store(store).rows(), refused=True)
+    rows = used(Store(store).rows())
     with pytest.raises(MergeError, match="are of cars whose files differ: merge --by vehicle"):
         merge(rows, [])
     with pytest.raises(
@@ -357,7 +637,7 @@ def test_the_next_car_starts_where_the_fleet_is(store, tmp_path):
     words = ["fleet", "prior", store, "--all", "--vehicle", "cars/red.toml", "--out", str(out)]
     assert main(words) == 0
     prior = load_model(out)
-    groups = merge(usable(Store(store).rows(), refused=True), ["vehicle"])
+    groups = merge(used(Store(store).rows()), ["vehicle"])
     fleet = np.mean([one.model.cornering_stiffness for one in groups], axis=0)
     told = reference_of(AxleIdentifier.for_vehicle(sedan()), sedan()).cornering_stiffness
     assert np.abs(prior.cornering_stiffness - fleet).max() < 0.5 * np.abs(told - fleet).max()
@@ -393,8 +673,9 @@ def rows_of(store, truths, *, noise=0.004, seed=0):
             square=np.einsum("ai,aij,aj->a", theta, told.matrix, theta) + 0.01 * told.samples,
         )
         made.append(
-            replace(row, log=f"{k:03d}", date=f"2026-{k // 28 + 1:02d}-{k % 28 + 1:02d}",
-                    part_begin=[0.0], **information_columns([one]))
+            replace(row, log=f"{k:03d}", content=f"{k:032x}",
+                    date=f"2026-{k // 28 + 1:02d}-{k % 28 + 1:02d}", part_begin=[0.0],
+                    **information_columns([one]))
         )  # fmt: skip
     return made
 
@@ -448,7 +729,7 @@ def test_watch_and_report_write_pages(store, tmp_path, undrawn, capsys):
 
 def test_alarms_are_told_and_drawn(store, tmp_path, laid_out, monkeypatch, capsys):
     rows = rows_of(store, [SAME] * 40 + [(0.9, 0.9, 1.0)] * 30)
-    monkeypatch.setattr(command.Store, "rows", lambda *_, **__: rows)
+    monkeypatch.setattr(command.Store, "stream", lambda *_, **__: iter(rows))
     assert main(["fleet", "watch", store, "--out", str(tmp_path / "out")]) == 1
     assert "both axles alike" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -468,6 +749,7 @@ def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatc
     assert "{vehicle} is no tag" in said(*learn, CAR)
     assert "each name once" in said(*learn, "cars/red.toml", "--tags", "{a}/{a}.csv")
     assert "at least 10 s" in said(*learn, "cars/red.toml", "--part", "1")
+    assert "does not lie under --root cars" in said(*learn, "cars/red.toml", "--root", "cars")
     assert "is no store" in said("merge", str(tmp_path / "nothing"))
     assert "no such file" in said(*learn, "cars/green.toml")
     (tmp_path / "x").mkdir()
@@ -478,9 +760,9 @@ def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatc
     with claim(tmp_path / ".held-claim"):
         assert "another run of tireid learns into" in said(*words, str(tmp_path / "held"))
     monkeypatch.setitem(sys.modules, "duckdb", None)
-    assert "pip install 'tireid[fleet]'" in said("merge", store, "--where", "seconds > 1")
+    assert "needs duckdb: pip install" in said("merge", store, "--where", "seconds > 1")
     monkeypatch.setitem(sys.modules, "fsspec.core", None)
-    assert "pip install 'tireid[fleet]'" in said("merge", store)
+    assert "pip install '.[fleet]'" in said("merge", store)
 
 
 def test_a_file_that_is_none_of_a_store_is_named(tmp_path):

@@ -183,7 +183,5 @@ def test_a_parquet_table_in_parts_holds_every_digit_of_every_column(tmp_path):
 def test_without_pyarrow_parquet_is_refused_before_anything_is_learnt(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     require_curves("csv")
-    with pytest.raises(
-        ValueError, match=r"--curves parquet needs pyarrow: pip install tireid\[parquet\]"
-    ):
+    with pytest.raises(ValueError, match="--curves parquet needs pyarrow: pip install pyarrow"):
         require_curves("parquet")

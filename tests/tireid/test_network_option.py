@@ -10,7 +10,7 @@ from identifier.methods import make_method
 from identifier.own_network import FrozenMethod, OnnxModel, UnusableNetworkError, read_network
 from identifier.paper.network import Network, NetworkModel, Weights
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main

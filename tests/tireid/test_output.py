@@ -468,3 +468,47 @@ def test_a_full_disk_leaves_the_old_folder_whole(tmp_path):
     print(*os.listdir())
     """
     assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == ["out"]
+
+
+def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
+    pytest.importorskip("resource")
+    pytest.importorskip("pyarrow", reason="needs the package pyarrow")
+    program = """
+    import resource
+    from pathlib import Path
+    import numpy as np
+    from matplotlib.figure import Figure
+    from codegen.writing import write_file
+    from models.files import write_atomically
+    from tireid.cli import one_line
+    from tireid.figures.style import save_figure
+    from tireid.output import output_folder, write_csv, write_json, write_table
+
+    columns = {"t_s": np.random.default_rng(0).random(9999)}
+    here, text = Path.cwd(), "x" * 9999
+
+    def folder(path):
+        with output_folder(path, force=False) as new:
+            write_json(new / "deep.json", [text])
+
+    writers = {
+        "data.json": lambda path: write_json(path, [text]),
+        "rows.csv": lambda path: write_csv(path, columns),
+        "rows.parquet": lambda path: write_table(path, [columns]),
+        "model.json": lambda path: write_atomically(path, text),
+        "figure.png": lambda path: save_figure(Figure(), path),
+        "page.html": lambda path: write_file(path, text),
+        "results": folder,
+    }
+    save_figure(Figure(), here / "warm.png")
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
+    for name, write in writers.items():
+        try:
+            write(here / name)
+        except OSError as error:
+            print(one_line(error).replace(f"{here}/", ""))
+    """
+    told = " ".join(ran(textwrap.dedent(program), tmp_path))
+    names = ("data.json", "rows.csv", "rows.parquet", "model.json", "figure.png", "page.html")
+    wanted = [f"{name}: file too large" for name in (*names, "results/deep.json")]
+    assert told == " ".join(wanted)

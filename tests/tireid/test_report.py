@@ -11,7 +11,9 @@ from tests.pages import faults_of, outline
 from tireid.figures import figure_png, figure_svg
 from tireid.report import (
     FINE,
+    STYLE,
     Headline,
+    Marked,
     Paragraph,
     Picture,
     Report,
@@ -107,6 +109,42 @@ def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path: P
         Picture(image=tmp_path / "a.png", caption="c")
     with pytest.raises(FileNotFoundError):
         Picture(image=tmp_path / "missing.png", caption="c")
+
+
+def test_what_something_is_worth_is_seen() -> None:
+    table = Table(
+        caption="c",
+        header=["", "front"],
+        rows=[["stiffness", Marked("127 ± 5", "struck", "not valid")]],
+    )
+    page = report_html(
+        Report(
+            title="t",
+            sections=[Section(heading="h", blocks=[table])],
+            numbers=[
+                Headline("NOT VALID", "the verdict", "bad"),
+                Headline([Marked("1"), Marked("2", "unknown", "not <known>")], "two axles"),
+            ],
+            lead=[Picture(image=PNG, caption="the curve")],
+            warnings=[Marked("not valid: a", "bad"), "note: b"],
+        )
+    )
+    assert '<div class="bad"><dt>the verdict</dt><dd>NOT VALID</dd></div>' in page
+    assert '<span class="unknown">2</span><small class="unknown">not &lt;known&gt;</small>' in page
+    struck = (
+        '<td class="number"><span class="struck">127 ± 5</span><small class="unknown">not valid'
+    )
+    assert struck in page
+    assert '<ul class="warnings refusals">' in page
+    assert '<li class="bad">not valid: a</li>' in page and "<li>note: b</li>" in page
+    assert page.index("NOT VALID") < page.index("Figure 1.") < page.index("note: b")
+    assert faults_of(page) == []
+
+
+def test_no_figure_is_wider_than_a_small_screen() -> None:
+    small = STYLE[STYLE.index("@media screen") : STYLE.index("@media print")]
+    assert "img" not in small
+    assert "figure img { display: block; width: 100%; height: auto; }" in STYLE
 
 
 def test_a_film_is_embedded_as_what_it_is() -> None:

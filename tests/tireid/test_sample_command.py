@@ -23,7 +23,7 @@ def test_the_log_reads_back_as_the_recording_that_was_driven(written):
 def test_the_car_is_the_one_that_drove_and_both_can_be_learnt_from(written):
     car, log = ti.Vehicle.from_toml(written / "car.toml"), ti.read_recording(written / "log.csv")
     assert car == ti.sedan()
-    missed = ti.replay(ti.identify(log, car).freeze(), ti.sample_recording(car, seed=1))
+    missed = ti.replay(ti.sample_recording(car, seed=1), ti.identify(log, car).freeze())
     assert missed.against_truth.front < 0.1 * missed.true_force.front
     assert missed.against_truth.rear < 0.1 * missed.true_force.rear
 

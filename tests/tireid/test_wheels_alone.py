@@ -11,7 +11,7 @@ import pytest
 import tireid as ti
 from models.maneuvers import RandomSteer
 from models.plant import Plant
-from models.recordings import LogMap, Recording
+from models.recordings import LogMap, read_recording
 from models.recordings.wheels import Wheels
 from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, shown, spin
 from tireid.cli import main
@@ -74,10 +74,10 @@ def errors(run, recording):
 def test_side_slip_and_forces_stay_right_while_driven_wheels_spin(run, wheels):
     signals = imu(run)
     known = LogMap(wheels=Wheels().completed(CAR))
-    gated = Recording.from_dataframe({**signals, **wheels}, log_map=known)
+    gated = read_recording({**signals, **wheels}, log_map=known)
     mean = np.mean([*wheels.values()], axis=0)
-    ungated = Recording.from_dataframe({**signals, "vx": mean}, check=False)
-    exact = Recording.from_dataframe({**signals, "vx": run.v_x})
+    ungated = read_recording({**signals, "vx": mean}, check=False)
+    exact = read_recording({**signals, "vx": run.v_x})
     slip, force = errors(run, gated)
     slip_of_exact, force_of_exact = errors(run, exact)
     slip_of_mean, force_of_mean = errors(run, ungated)
@@ -162,12 +162,8 @@ def test_one_encoder_is_enough_where_it_does_not_slip(run):
     slips = shown(run, gentle_slip(run), np.random.default_rng(0))
     encoder = np.mean([*slips.values()], axis=0)
     known = replace(Wheels().completed(CAR), radius=(0.316,))
-    one = Recording.from_dataframe(
-        {**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known)
-    )
+    one = read_recording({**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known))
     slip, force = errors(run, one)
-    slip_of_exact, force_of_exact = errors(
-        run, Recording.from_dataframe({**imu(run), "vx": run.v_x})
-    )
+    slip_of_exact, force_of_exact = errors(run, read_recording({**imu(run), "vx": run.v_x}))
     assert slip < 1.3 * slip_of_exact + 0.02
     assert force < 1.2 * force_of_exact + 0.01

@@ -12,7 +12,7 @@ from identifier.axle import AxleIdentifier
 from identifier.inertial import InertialIdentifier
 from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
-from models.recordings import Recording, RecordingError, read_recording, write_recording
+from models.recordings import RecordingError, read_recording, write_recording
 from models.recordings.record import joined
 from tireid.cli import main
 
@@ -66,7 +66,7 @@ def missed(model, exact):
 
 
 def test_a_log_without_v_y_is_learnt_on_by_the_inertial_identifier(history, exact):
-    assert isinstance(history.design, InertialIdentifier)
+    assert isinstance(history.method, InertialIdentifier)
     assert (missed(history.freeze(), exact) < 0.08).all()
     away = np.degrees((history.recording.v_y - exact.v_y)[500:] / 20.0)
     assert np.sqrt(np.mean(away**2)) < 0.25
@@ -83,7 +83,7 @@ def test_what_was_estimated_is_said_to_be_and_never_shown_to_a_method(history, e
 
 
 def test_a_right_answer_is_valid_and_says_what_it_cannot_see(history):
-    verdict = history.verdict()
+    verdict = history.verdict
     assert verdict.valid
     assert "l_f and l_r swapped" in " ".join(verdict.lines)
     assert any("l_f and l_r swapped" in line for line in verdict.to_dict()["unseen"])
@@ -96,7 +96,7 @@ def test_a_right_answer_is_valid_and_says_what_it_cannot_see(history):
 def test_a_channel_that_is_scaled_is_not_valid(exact, channel, factor, code):
     log = as_logged(exact)
     wrong = replace(log, **{channel: factor * getattr(log, channel)})
-    verdict = ti.identify(wrong, CAR, check=False).verdict()
+    verdict = ti.identify(wrong, CAR, check=False).verdict
     assert not verdict.valid
     assert code in [one.code for one in verdict.findings]
 
@@ -116,29 +116,29 @@ def swept():
 def test_a_y_is_held_against_the_change_of_v_y_too(swept, factor, right):
     log = as_logged(swept)
     run = ti.identify(replace(log, a_y=factor * log.a_y), CAR, check=False)
-    assert ("a_y_disagrees" not in [one.code for one in run.verdict().findings]) == right
+    assert ("a_y_disagrees" not in [one.code for one in run.verdict.findings]) == right
     if right:
-        assert run.verdict().valid
+        assert run.verdict.valid
         assert (missed(run.freeze(), swept) < 0.08).all()
 
 
 def test_a_car_with_three_times_the_inertia_is_not_valid(exact):
     heavy = replace(CAR, yaw_inertia=3.0 * CAR.yaw_inertia)
-    assert not ti.identify(as_logged(exact), heavy, check=False).verdict().valid
+    assert not ti.identify(as_logged(exact), heavy, check=False).verdict.valid
 
 
 def test_a_model_says_the_forces_of_a_drive_without_v_y(history):
     other = driven(8)
-    prediction = ti.replay(history.freeze(), replace(as_logged(other), axle_force=other.axle_force))
+    prediction = ti.replay(replace(as_logged(other), axle_force=other.axle_force), history.freeze())
     assert prediction.recording.estimated == ("v_y",)
     assert prediction.against_truth.both < 0.1 * prediction.true_force.both
-    assert prediction.verdict().valid
+    assert prediction.verdict.valid
 
 
 def test_the_motion_is_judged_by_the_accelerometer_where_no_v_y_was_measured(history):
     wrong = replace(history.recording, a_y=-history.recording.a_y)
-    prediction = ti.replay(history.freeze(), wrong)
-    assert not prediction.verdict().valid
+    prediction = ti.replay(wrong, history.freeze())
+    assert not prediction.verdict.valid
     assert prediction.motion.explained[0] < 0.0
 
 
@@ -146,7 +146,7 @@ def test_several_logs_of_which_one_has_no_v_y_are_a_drive_without(exact):
     both = joined([exact, as_logged(exact)])
     assert both.v_y is None
     assert "vy is left out, drive3 has none" in both.notes
-    parts = ti.identify(both, CAR).parts([exact, as_logged(exact)])
+    parts = ti.identify(both, CAR).history.parts([exact, as_logged(exact)])
     assert [one.recording.estimated for one in parts] == [(), ("v_y",)]
 
 
@@ -159,19 +159,19 @@ def test_without_v_y_there_are_no_slip_angles(exact):
 
 def test_a_frame_without_vy_is_taken_where_ay_is_there(exact):
     columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
-    told = Recording.from_dataframe(columns | {"ay": exact.a_y})
+    told = read_recording(columns | {"ay": exact.a_y})
     assert told.v_y is None
     assert "no lateral velocity is read" in " ".join(told.notes)
     with pytest.raises(RecordingError, match=r"column vy \(or ay, from which it is estimated\)"):
-        Recording.from_dataframe(columns)
+        read_recording(columns)
 
 
 def test_a_log_that_contradicts_itself_without_v_y_is_refused(exact):
     columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
     with pytest.raises(RecordingError, match="change the sign of ay"):
-        Recording.from_dataframe(columns | {"ay": -exact.a_y})
+        read_recording(columns | {"ay": -exact.a_y})
     with pytest.raises(RecordingError, match="delta_f must be in rad"):
-        Recording.from_dataframe(columns | {"ay": exact.a_y, "delta_f": 10 * exact.delta_f})
+        read_recording(columns | {"ay": exact.a_y, "delta_f": 10 * exact.delta_f})
 
 
 def test_a_written_recording_leaves_out_what_was_estimated(history, tmp_path):

@@ -11,6 +11,7 @@ from matplotlib import style
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
 from codegen.arrays import Array
+from codegen.writing import naming
 from mpc.loop import Drive
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
@@ -82,9 +83,7 @@ def write_film(
     ----------
     file : ends in .webp, .gif or .mp4.
     drives : by the name in the legend, along one path; the camera follows the first.
-    curves : tire curves behind the forces of the first.
     drops : arc length [m] and friction from there on.
-    title : what the film is about.
     known : of the tires while the first drove; None where nothing was learnt.
 
     Raises
@@ -120,7 +119,8 @@ class WebpWriter(PillowWriter):
         first, *others = self._frames
         words: dict[str, Any] = {"quality": QUALITY, "minimize_size": True, "loop": 0}
         time = round(1000.0 / RATE)
-        first.save(self.outfile, save_all=True, append_images=others, duration=time, **words)
+        with naming(self.outfile):
+            first.save(self.outfile, save_all=True, append_images=others, duration=time, **words)
 
 
 def _writer(file: FilePath) -> AbstractMovieWriter:

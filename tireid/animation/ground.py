@@ -57,12 +57,7 @@ class Instant(NamedTuple):
 
 
 class Camera:
-    """Follows a path.
-
-    Parameters
-    ----------
-    path : that is driven.
-    """
+    """Follows a path."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -112,7 +107,6 @@ class Ground:
 
     Parameters
     ----------
-    axes : in meters of the picture.
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     """

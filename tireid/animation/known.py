@@ -21,7 +21,6 @@ class Curves:
 
     Parameters
     ----------
-    model : one of the tires.
     v_x : speed [m/s], which a network may look at.
     """
 
@@ -49,7 +48,6 @@ def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
 
     Parameters
     ----------
-    label : what legends call it.
     v_x : speed [m/s], which a network may look at.
     """
     curves = Curves(model, v_x)
@@ -78,8 +76,6 @@ def known_over_time(
 
     Parameters
     ----------
-    known : what a witness kept.
-    model : tire of the start, whose structure all of them have.
     v_x : speed at which curves are drawn [m/s].
     """
     if not known:

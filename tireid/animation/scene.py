@@ -48,7 +48,6 @@ class ForcePanel:
 
     Parameters
     ----------
-    curves : the tires.
     axle : 0 is the front axle, 1 the rear.
     known : what was known over time; None where nothing was learnt, so that nothing changes.
     drop : arc length [m] from which the true tire is that of the end; infinite for never.
@@ -236,10 +235,7 @@ class Scene:
     Parameters
     ----------
     drives : by the name in the legend, along one path; the first is in the middle.
-    curves : tire curves behind the forces of the first.
     drops : arc length [m] and friction from there on.
-    pace : of the film, said in the picture.
-    title : what the film is about.
     known : of the tires while the first drove; None where nothing was learnt.
 
     Attributes: figure.

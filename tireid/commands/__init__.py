@@ -43,6 +43,5 @@ def add_command(name: str, commands: Any) -> None:
     Parameters
     ----------
     name : one of `COMMANDS`.
-    commands : subparsers of `tireid`.
     """
     importlib.import_module(f"tireid.commands.{name}").add_parser(commands)

@@ -7,7 +7,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.driving import Driving
-from identifier.methods import DEFAULT, certify
+from identifier.methods import LIVE, certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.setup import force_unit_name
@@ -66,15 +66,8 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
 
 
 def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: Driving) -> str:
-    """Return what is certified of a method without gains: its properties and its boxes.
-
-    Parameters
-    ----------
-    name : of the method.
-    certificate : what is proven of it.
-    driving : conditions of the drop of friction.
-    """
-    default = ", the default of tireid identify" if name == DEFAULT else ""
+    """Return what is certified of a method without gains: its properties and its boxes."""
+    default = ", the default in a car" if name == LIVE else ""
     rows = [
         [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
         for title, value in certificate.held.items()
@@ -93,7 +86,7 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
         [
             *lines,
             f"verdict: {certificate.verdict}; no margin and no bound of its error is proven, of "
-            f"{DEFAULT}, the default, there are: tireid check",
+            f"{LIVE}, the default in a car, there are: tireid check",
         ]
     )
 
@@ -128,11 +121,6 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
     """Return what the certificate says of resumed weights: nothing where it covers them.
 
     Its bounds hold from first weights that keep them.
-
-    Parameters
-    ----------
-    design : with its projection.
-    first : weights that learning begins with.
     """
     known = {entry.name: entry.value for entry in certificate.properties}
     W, V = known.get("weight_bound", math.inf), known.get("V_bound", math.inf)
@@ -163,12 +151,7 @@ def unit_text(unit: str, force_unit: float) -> str:
 
 
 def number(value: float | None) -> str:
-    """Return four significant digits, a dash for none, "inf" for infinity.
-
-    Parameters
-    ----------
-    value : the number.
-    """
+    """Return four significant digits, a dash for none, "inf" for infinity."""
     if value is None or math.isnan(value):
         return "-"
     return "inf" if math.isinf(value) else f"{value:.4g}"
@@ -202,12 +185,7 @@ class Row(NamedTuple):
 
 
 def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
-    """Return every proven bound that the certificate holds, beside what was seen.
-
-    Parameters
-    ----------
-    observed : the drives.
-    """
+    """Return every proven bound that the certificate holds, beside what was seen."""
     known = {entry.name: entry for entry in certificate.properties}
     rows = []
     for name, what, title in BOUNDS:
@@ -229,8 +207,6 @@ def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit:
     Parameters
     ----------
     rows : from `bound_rows`.
-    observed : the drives.
-    seed : that they were drawn with.
     force_unit : the unit U of the design [N].
     """
     unit = unit_text("U s", force_unit)
@@ -255,8 +231,6 @@ def monte_carlo_numbers(rows: list[Row], observed: Observed, seed: int) -> dict[
     Parameters
     ----------
     rows : from `bound_rows`.
-    observed : the drives.
-    seed : that they were drawn with.
     """
     return {
         "drives": observed.xi_tilde.size,

@@ -48,12 +48,7 @@ LONGEST_NAME = 48  # letters of a channel in the table
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "channels",
         help=COMMANDS["channels"],
@@ -173,16 +168,7 @@ def channels_text(
     proposal: Proposal,
     told: frozenset[str] = frozenset(),
 ) -> str:
-    """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for.
-
-    Parameters
-    ----------
-    listed : channels as the file lists them.
-    seen : those that were read, by name.
-    signals : how each signal would be read.
-    proposal : what the channels probably are.
-    told : names of the signals that nobody had to guess.
-    """
+    """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for."""
     rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
     for one in listed:
         channel = seen.get(one.name)
@@ -230,7 +216,6 @@ def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> st
     Parameters
     ----------
     seen : channels that were read, by name.
-    signals : how each signal would be read.
     """
     said = []
     for name, signal in signals.items():
@@ -248,15 +233,7 @@ def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> st
 def missing_text(
     log: str, missing: Sequence[str], proposal: Proposal, signals: Mapping[str, Signal]
 ) -> str:
-    """Return what is missing, and the words that would tell it.
-
-    Parameters
-    ----------
-    log : as it was typed.
-    missing : signals that are needed and not sure.
-    proposal : what the channels probably are.
-    signals : that are sure.
-    """
+    """Return what is missing, and the words that would tell it."""
     if not missing:
         there = told_by(signals)
         needed = [name for name in NEEDED if name in there]
@@ -281,13 +258,7 @@ def missing_text(
 
 
 def unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:
-    """Return the tables of what is missing as comments, to be completed.
-
-    Parameters
-    ----------
-    missing : signals that are needed and not sure.
-    proposal : what the channels probably are.
-    """
+    """Return the tables of what is missing as comments, to be completed."""
     blocks = []
     for name in (one for lack in missing for one in stand_ins(lack, proposal) or [lack]):
         guess = proposal.guesses.get(name)

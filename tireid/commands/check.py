@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
-from identifier.methods import REFERENCE, certify
+from identifier.methods import LIVE, REFERENCE, certify
 from identifier.paper.design import (
     PHASE_MARGIN,
     VARIANTS,
@@ -89,7 +90,6 @@ def draw_check(
     ----------
     folder : where to, made if missing.
     recording : a drive, for the error to compare the bounds with.
-    operation : what its certificate knows.
     """
     folder.mkdir(parents=True, exist_ok=True)
     chosen = LAWS[design.law]
@@ -109,11 +109,8 @@ def draw_check(
 
 
 def error_bounds(certificate: Certificate) -> dict[str, float]:
-    """Return the bounds of the error norm that a certificate holds, by the name in a legend [U s].
-
-    Parameters
-    ----------
-    certificate : the properties.
+    """Return the bounds of the error norm that a certificate holds, by the name in a legend [U
+    s].
     """
     known = {entry.name: entry.value for entry in certificate.properties}
     return {title: known[name] for name, title in BOUNDS.items() if name in known}
@@ -138,25 +135,20 @@ TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
-        description="Say what is certified of an identifier; without options, of the default of "
-        "tireid identify: boxes, curve, jumps, the time to follow a drop of friction; with --along "
-        "LOG, also of the tires that it learns there: sector, and the largest error of the force. "
-        "Gains of the paper's laws (--paper, --method NAME, --design FILE) are "
-        "judged at the worst regressor: poles, sampling, gain and phase margin, damping, drift, "
-        "proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With --tune, "
-        "find gains and write them.",
+        description="Say what is certified of an identifier; without options, of the axle "
+        "identifier, the default in a car: boxes, curve, jumps, the time to follow a drop of "
+        "friction; with --along LOG, also of the tires that it learns there: sector, and the "
+        "largest error of the force. Gains of the paper's laws (--paper, --method NAME, --design "
+        "FILE) are judged at the worst regressor: poles, sampling, gain and phase margin, damping, "
+        "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
+        "--tune, find gains and write them.",
     )
     add_vehicle(parser)
-    add_method(parser)
+    add_method(parser, LIVE)
     parser.add_argument(
         "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
     )
@@ -211,7 +203,7 @@ def run(options: argparse.Namespace) -> int:
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
         certificate = replace(certificate, properties=certificate.properties + along.properties)
-    text = _with_estimates(method_text(name, certificate, vehicle, driving), vehicle)
+    text = method_text(name, certificate, vehicle, driving)
     numbers = {
         "method": name,
         "conditions": {field: getattr(driving, field) for field in OF_ALL},
@@ -242,7 +234,7 @@ def _require_drive(options: argparse.Namespace) -> None:
 def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
-        return chosen_method(options, vehicle)
+        return chosen_method(options, vehicle, online=True)
     if options.design is not None:
         raise ValueError("--tune finds gains: give no --design FILE to judge with it")
     law = options.method or REFERENCE
@@ -296,7 +288,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
-    text = _with_estimates("\n".join(texts), vehicle)
+    text = "\n".join(texts)
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
@@ -309,13 +301,9 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     return FAILS if certificate.verdict == "fail" or passed else DONE
 
 
-def _with_estimates(text: str, vehicle: Vehicle) -> str:
-    return "\n".join(part for part in (text, vehicle.estimates) if part)
-
-
 def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
     write_json(folder / NUMBERS, numbers)
-    (folder / TEXT).write_text(f"{text}\n", encoding="utf-8")
+    write_file(folder / TEXT, f"{text}\n")
 
 
 def _say_written(options: argparse.Namespace) -> None:

@@ -52,23 +52,19 @@ FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
         help=COMMANDS["compare"],
         description="Learn on each recording, freeze at its end and replay on all of them, with "
         "every method; write report.html, compare.json, compare.csv, tables.txt and figures. "
-        "Methods that estimate lateral velocity are judged on side slip too. Recordings need the "
-        "true forces. Without a LOG the plant of the car drives slaloms, a step steer and a lane "
+        "Methods that estimate lateral velocity are judged on side slip too. Where a recording has "
+        "no true forces, all are judged by the force that the motion shows, without floors and "
+        "sweep. Without a LOG the plant of the car drives slaloms, a step steer and a lane "
         "change with noisy sensors.",
         epilog=f"methods: {', '.join(METHODS)}",
     )
-    parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings with true forces")
+    parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
     add_vehicle(parser)
     parser.add_argument(
         "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
@@ -128,6 +124,13 @@ def run(options: argparse.Namespace) -> int:
         recordings = _recordings(options, vehicle, seed)
         for recording in recordings:
             recording.needed("v_y")  # of the slip at which every method is asked
+        starts = options.floor
+        blind = [recording.name for recording in recordings if recording.axle_force is None]
+        if blind and options.sweep:
+            raise RecordingError(f"--sweep needs the true forces Fyf, Fyr: {blind[0]} has none")
+        if blind:
+            say(f"{', '.join(blind)}: no true forces; judged by the motion, without floors")
+            starts = 0
         left_out = cannot_learn(names, vehicle, recordings)
         for name, why in left_out.items():
             say(f"{name}: {why}")
@@ -138,7 +141,7 @@ def run(options: argparse.Namespace) -> int:
             names,
             len(recordings),
             designs=options.sweep,
-            starts=options.floor,
+            starts=starts,
             others=len(others),
         )
         comparison = run_comparison(
@@ -147,7 +150,7 @@ def run(options: argparse.Namespace) -> int:
             recordings,
             seed=seed,
             designs=options.sweep,
-            starts=options.floor,
+            starts=starts,
             workers=jobs,
             progress=work.along(lengths),
             note=say,
@@ -171,7 +174,6 @@ def run(options: argparse.Namespace) -> int:
         told = [comparison_text(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
             told.append(pair_tables(comparison))
-    told += [vehicle.estimates] if vehicle.estimates else []
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
@@ -179,14 +181,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
-    """Return the verdict on what the default learns on each recording, by its name.
-
-    Parameters
-    ----------
-    recordings : that are compared on.
-    vehicle : that drove them.
-    """
-    return {one.name: identify(one, vehicle, check=False).verdict() for one in recordings}
+    """Return the verdict on what the default learns on each recording, by its name."""
+    return {one.name: identify(one, vehicle, check=False).verdict for one in recordings}
 
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:

@@ -1,6 +1,7 @@
 """The files of `tireid compare`: compare.json, whose keys are stable, tables, CSV and figures.
 
-compare.json: recordings (samples, duration, rms_force_N); methods: by name online_N by recording,
+compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or motion: mean forces
+over 0.3 s that the motion shows); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
 recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
 methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio; left_out: by
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from codegen.writing import naming, write_file
 from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
@@ -79,24 +81,15 @@ def _slip_cells(trial: Trial) -> list[str]:
 
 
 def summary_table(comparison: Comparison) -> str:
-    """Return the same as text.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the same as text."""
     n, lines = len(comparison.names), summary_rows(comparison)
-    title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
+    measure = comparison.course.measure
+    title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
     return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
 
 
 def remarks(comparison: Comparison) -> list[str]:
-    """Return what the methods say of themselves below the table, those alike in one line.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return what the methods say of themselves below the table, those alike in one line."""
     told: dict[str, list[str]] = {}
     for name in comparison.trials:
         if name in METHODS:
@@ -110,12 +103,7 @@ def remarks(comparison: Comparison) -> list[str]:
 
 
 def pair_tables(comparison: Comparison) -> str:
-    """Return one table for each recording learnt on and recording replayed.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return one table for each recording learnt on and recording replayed."""
     blocks = []
     for learnt in comparison.names:
         for replayed in comparison.names:
@@ -134,12 +122,7 @@ def pair_tables(comparison: Comparison) -> str:
 
 
 def sweep_table(comparison: Comparison) -> str:
-    """Return the best design of every method's sweep [% of rms, both axles].
-
-    Parameters
-    ----------
-    comparison : with a sweep.
-    """
+    """Return the best design of every method's sweep [% of rms, both axles]."""
     lines = [["method", "designs", "diverged", "default", "best", "online then", "on the front"]]
     for name, candidates in comparison.sweeps.items():
         best, own = best_candidate(candidates), frozen_share(comparison.shares(name))
@@ -174,8 +157,6 @@ def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
 
     Parameters
     ----------
-    comparison : knows the true forces.
-    name : of the recording.
     error : over it [N].
     """
     return _mean(comparison, [(name, error)])
@@ -230,15 +211,12 @@ def write_comparison(
     Parameters
     ----------
     folder : an empty folder.
-    comparison : the methods.
     verdicts : on what the default learns, by recording.
     """
     numbers = comparison_numbers(comparison)
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
-    (folder / "tables.txt").write_text(
-        comparison_text(comparison) + pair_tables(comparison), encoding="utf-8"
-    )
+    write_file(folder / "tables.txt", comparison_text(comparison) + pair_tables(comparison))
     _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
     if comparison.sweeps:
         _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
@@ -257,23 +235,13 @@ def write_comparison(
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Return the summary, and that of the sweep, as lines of text.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the summary, and that of the sweep, as lines of text."""
     text = summary_table(comparison)
     return text + (sweep_table(comparison) if comparison.sweeps else "")
 
 
 def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
-    """Return what compare.json holds.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return what compare.json holds."""
     course = comparison.course
     return {
         "recordings": {
@@ -284,6 +252,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             }
             for recording in course.recordings
         },
+        "judged_by": "motion" if course.by_motion else "truth",
         "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
         "left_out": dict(comparison.left_out),
         "floors": {
@@ -420,7 +389,7 @@ def _words(values: Mapping[str, float]) -> str:
 
 
 def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with naming(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, judge, judge_prediction
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -61,8 +61,19 @@ from tireid.report import (
     write_report,
 )
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.reports.identify import identify_headlines, identify_warnings, learnt_blocks
-from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
+from tireid.reports.identify import (
+    curve_drawing,
+    identify_headlines,
+    identify_warnings,
+    learnt_blocks,
+)
+from tireid.verdicts import (
+    missed_headline,
+    number_headlines,
+    verdict_headline,
+    verdict_section,
+    verdict_warnings,
+)
 
 # The demo's report: what was driven, learnt, frozen and predicted, in order.
 
@@ -86,30 +97,25 @@ def demo_report(
 
     Parameters
     ----------
-    story : the noisy drives, learnt by both methods.
-    verdict : on what the default learnt.
     shipped : what was learnt, as a C package.
-    study : the paper's study.
-    driven : on what was learnt, by folder.
-    figures : by folder and name.
-    folder : with films and the figures of the certificate.
-    command : as it was typed.
     """
-    learnt = story.default.learnt
-    model, runs = learnt.freeze(FREEZE), [learnt, *story.default.others]
+    learnt = story.axle.learnt
+    model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
     return Report(
         title=TITLE,
         summary=SUMMARY,
         numbers=[
             verdict_headline(verdict),
-            *identify_headlines(model, runs, story.default.frozen[FREEZE]),
+            *missed_headline(verdict),
+            *number_headlines(verdict),
+            *identify_headlines(model, runs, story.axle.frozen[FREEZE]),
             *drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
         sections=[
             verdict_section(verdict),
             drive_section(driven, folder),
-            _learn(figures["identify"], model),
+            _learn(figures["identify"], model, verdict),
             _predict(story),
             package_section(shipped),
             Section(
@@ -127,7 +133,7 @@ def demo_report(
     )
 
 
-def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
+def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> Section:
     return Section(
         heading="What was learnt",
         blocks=[
@@ -142,9 +148,12 @@ def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
-                "from motion alone; what was never excited keeps what is believed of any tire."
+                "from motion alone; what was never excited keeps what is believed of any tire. It "
+                "learns sample by sample, in a car too; tireid identify makes one "
+                "estimate of a whole log."
             ),
-            *learnt_blocks("the default method", model, figures)[1:],
+            curve_drawing(figures, verdict),
+            *learnt_blocks("the axle identifier", model, figures)[1:],
             drawing(
                 figures["forces"],
                 "Axle forces: online above, and below replayed with the weights frozen at "
@@ -167,7 +176,7 @@ def _predict(story: Story) -> Section:
             "share of the rms force.",
             header=[
                 "drive",
-                "default, online",
+                "axle, online",
                 "frozen",
                 "of rms",
                 "paper, online",
@@ -177,7 +186,7 @@ def _predict(story: Story) -> Section:
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    for history in story.default.others:
+    for history in story.axle.others:
         name = history.recording.name
         said = name.replace("_", " ")
         figure = side_by_side_figure(story.side_by_side(name))
@@ -227,8 +236,8 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
             "The law is the integral law of the paper: A_d is "
             f"{gains.A_d[0][0]:.4g} s⁻¹ times the identity, λ = {gains.forgetting:.4g} s⁻¹, η₁ = "
             f"{gains.eta_W:.4g} s⁻⁴, η₂ = {gains.eta_V:.4g} kN⁻² s⁻⁴, ρ₁ = {gains.rho_W:.4g} and "
-            f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the default "
-            "method above; its figures are in the folder paper_network."
+            f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the axle "
+            "identifier above; its figures are in the folder paper_network."
         ),
         drawing(
             paper[SCHEME],
@@ -316,12 +325,7 @@ PARTS = {LEARNING: 15.0, EXPORTING: 20.0, TESTING: 20.0, DRIVING: 40.0, REPORTIN
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "demo",
         help=COMMANDS["demo"],
@@ -344,10 +348,11 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
-        parts = {"identify": story.default, "paper_network": story.paper}
-        verdicts = {name: part.learnt.verdict(FREEZE) for name, part in parts.items()}
+        parts = {"identify": story.axle, "paper_network": story.paper}
+        verdicts = {name: judge(part.learnt, FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in parts.items():
+            model = part.learnt.freeze(FREEZE)
             figures[name] = write_results(
                 folders[name],
                 part.law,
@@ -355,6 +360,7 @@ def run(options: argparse.Namespace) -> None:
                 part.others,
                 part.frozen,
                 verdicts[name],
+                {one.recording.name: judge_prediction(model, one.recording) for one in part.others},
             )
         operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(

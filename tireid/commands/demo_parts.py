@@ -50,12 +50,8 @@ class Driven(NamedTuple):
 
 
 def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
-    """Drive the cases of the demo and write what `tireid drive` writes; nothing without a compiler.
-
-    Parameters
-    ----------
-    story : what was learnt.
-    folder : of the report.
+    """Drive the cases of the demo and write what `tireid drive` writes; nothing without a
+    compiler.
     """
     if find_compiler() is None:
         return {}
@@ -68,24 +64,13 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
 
 
 def drive_text(driven: dict[str, Driven]) -> str:
-    """Return what came of the drives, as lines of text.
-
-    Parameters
-    ----------
-    driven : by folder.
-    """
+    """Return what came of the drives, as lines of text."""
     blocks = [f"{headline(one.conditions)}\n{drive_lines(one.runs)}" for one in driven.values()]
     return "\n\n".join(["Driving on what was learnt:", *blocks]) if blocks else NOT_DRIVEN
 
 
 def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
-    """Return the section of the report.
-
-    Parameters
-    ----------
-    driven : by folder.
-    folder : of the report, with the film.
-    """
+    """Return the section of the report."""
     heading = "The car drives on what it learnt"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
@@ -121,12 +106,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
 
 
 def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
-    """Return the headline numbers of the drives.
-
-    Parameters
-    ----------
-    driven : by folder.
-    """
+    """Return the headline numbers of the drives."""
     said = {
         LANE_CHANGE: "in the lane change at 90 % of the grip",
         SLIPPERY: "where friction drops to half",
@@ -152,7 +132,7 @@ def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, floa
 
 
 def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> Driven:
-    learnt = story.default.learnt.freeze(FREEZE)
+    learnt = story.axle.learnt.freeze(FREEZE)
     conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
     runs = [run_drive(label, conditions, learnt) for label in labels]
     folder.mkdir()
@@ -198,11 +178,10 @@ class Shipped(NamedTuple):
 
 
 def ship(story: Story, folder: Path) -> Shipped:
-    """Export what the default method learnt, compile it and test it.
+    """Export what the axle identifier learnt, compile it and test it.
 
     Parameters
     ----------
-    story : the drives and what was learnt.
     folder : an empty folder for the package.
 
     Raises
@@ -210,7 +189,7 @@ def ship(story: Story, folder: Path) -> Shipped:
     SelfTestError
         Where the package does not compile or does not pass.
     """
-    learnt = story.default.learnt
+    learnt = story.axle.learnt
     model = learnt.freeze(FREEZE)
     package = build_package(learnt.design, story.car, model)
     costs = measure(package)
@@ -229,12 +208,7 @@ def ship(story: Story, folder: Path) -> Shipped:
 
 
 def shipped_text(shipped: Shipped) -> str:
-    """Return what came of the package, as lines of text.
-
-    Parameters
-    ----------
-    shipped : the package.
-    """
+    """Return what came of the package, as lines of text."""
     about = shipped.package.about
     lines = [f"As a C package ({FOLDER}/, hash {about['hash']}):"]
     lines += [
@@ -252,16 +226,11 @@ def shipped_text(shipped: Shipped) -> str:
 
 
 def package_section(shipped: Shipped) -> Section:
-    """Return the section of the report.
-
-    Parameters
-    ----------
-    shipped : the package.
-    """
+    """Return the section of the report."""
     name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(
-            text="The default method, beginning with what it has just learnt, is written as a C99 "
+            text="The axle identifier, beginning with what it has just learnt, is written as a C99 "
             f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
             f"README, every symbol begins with {name}_; hash {about['hash']}. It is what "
             "tireid export writes."

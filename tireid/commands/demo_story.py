@@ -1,4 +1,7 @@
-"""What the demo drives: the sedan learns on a slalom with sensor noise and is asked elsewhere."""
+"""What the demo drives: the sedan learns on a slalom with sensor noise and is asked elsewhere.
+
+It learns while it drives: with the axle identifier, the default in a car, and with the paper's.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identifier.method import Method
-from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.methods import LIVE, REFERENCE, make_method
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import Replay, force_rms, online_error, replay, reproduce
 from identifier.run import History, identify
@@ -49,8 +52,6 @@ class Learning:
 
     Parameters
     ----------
-    law : name of the method.
-    learnt : the online run that the weights come from.
     others : online runs over the drives that the frozen model predicts.
     frozen : freeze time [s] to recording name to replay.
     """
@@ -75,19 +76,11 @@ class Learning:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Story:
-    """The demo's drives, learnt by the default method and by the paper's beside it.
-
-    Parameters
-    ----------
-    car : what drives, and what the identifier is told of.
-    design : the design of the paper's identifier.
-    default : what the default method learnt.
-    paper : what the paper's network and law learnt.
-    """
+    """The demo's drives, learnt by the axle identifier and by the paper's beside it."""
 
     car: Vehicle
     design: PaperIdentifier
-    default: Learning
+    axle: Learning
     paper: Learning
 
     @property
@@ -96,9 +89,9 @@ class Story:
         return certificate_of(self.design, self.car)
 
     def rows(self) -> list[list[str]]:
-        """Return by drive, for default and paper: online and frozen error, share of the force."""
+        """Return by drive, for axle and paper: online and frozen error, share of the force."""
         rows = []
-        methods = self.default, self.paper
+        methods = self.axle, self.paper
         for drives in zip(*([m.learnt, *m.others] for m in methods), strict=True):
             row = [drives[0].recording.name]
             for method, drive in zip(methods, drives, strict=True):
@@ -108,14 +101,9 @@ class Story:
         return rows
 
     def side_by_side(self, drive: str) -> dict[str, Replay]:
-        """Return the replays of both methods over a drive, by the name in a legend.
-
-        Parameters
-        ----------
-        drive : name of the recording.
-        """
+        """Return the replays of both methods over a drive, by the name in a legend."""
         return {
-            "default (axle curves)": self.default.frozen[FREEZE][drive],
+            "axle identifier (curves of slip)": self.axle.frozen[FREEZE][drive],
             "paper (network, integral law)": self.paper.frozen[FREEZE][drive],
         }
 
@@ -126,19 +114,14 @@ class Story:
         return "\n".join(
             [
                 "Frozen after the slalom, asked about drives that were not learnt: RMSE [kN]; the "
-                "default (axle) and the paper's (network, integral law)",
+                "axle identifier and the paper's (network, integral law)",
                 text_table([*rows, *self.rows()], "<>>>>>>", indent="  "),
             ]
         )
 
 
 def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
-    """Drive the sedan; sensors are noisy with a fixed seed.
-
-    Parameters
-    ----------
-    maneuvers : by the name of the recording.
-    """
+    """Drive the sedan; sensors are noisy with a fixed seed."""
     plant, rng = Plant(sedan()), np.random.default_rng(1)
     return {
         name: plant.simulate(maneuver, speed=SPEED, name=name).recording(SENSORS, rng)
@@ -164,7 +147,7 @@ def run_story(progress: Callable[[], None] = lambda: None) -> Story:
     return Story(
         car=car,
         design=design,
-        default=_learning(DEFAULT, make_method(DEFAULT, car), car, recordings, progress),
+        axle=_learning(LIVE, make_method(LIVE, car), car, recordings, progress),
         paper=_learning(REFERENCE, design, car, recordings, progress),
     )
 
@@ -232,7 +215,6 @@ def plant_recordings(
 
     Parameters
     ----------
-    vehicle : the car, with a chassis.
     rng : of the noise of `SENSORS`; None measures exactly.
 
     Raises

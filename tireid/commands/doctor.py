@@ -25,12 +25,7 @@ from tireid.progress import say, tell
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "doctor",
         help=COMMANDS["doctor"],
@@ -74,9 +69,8 @@ def run(options: argparse.Namespace) -> int:
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:
         _tell_repair(options, repair, after)
-        if repair:
-            write_repair(options.repair, told, diagnosis)
-            say(f"wrote {options.repair}; read the log with --log {options.repair}")
+        write_repair(options.repair, told, diagnosis)
+        say(f"wrote {options.repair}; read the log with --log {options.repair}")
     if options.out is not None:
         say(f"wrote {options.out}/")
     left = diagnosis if after is None else after
@@ -90,7 +84,7 @@ def _tell_repair(
 ) -> None:
     """Say what the repair is, and what is left after it."""
     if after is None:
-        tell(f"nothing is sure enough to be repaired: {options.repair} is not written")
+        tell(f"nothing is sure enough to be repaired: with {options.repair} the log stays as it is")
         return
     tell(f"repaired: {repair_text(repair)}")
     tell(f"after the repair, {diagnosis_text(after, unseen=False)}")
@@ -101,8 +95,6 @@ def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> di
 
     Parameters
     ----------
-    diagnosis : of the log as it was read.
-    repair : that was applied.
     after : diagnosis of the repaired log, None where nothing was repaired.
     """
     return {

@@ -46,12 +46,7 @@ from tireid.reports.drive import write_drive_report
 
 
 def headline(conditions: Conditions) -> str:
-    """Return a case in one line.
-
-    Parameters
-    ----------
-    conditions : of the drives.
-    """
+    """Return a case in one line."""
     setup = conditions.setup
     v = setup.speeds()
     speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else f"{v.min():.1f} to {v.max():.1f} m/s"
@@ -77,10 +72,7 @@ def inputs_of(
 
     Parameters
     ----------
-    conditions : of the drives.
-    labels : what the trackers are told.
     source : where the frozen tires come from.
-    learnt : the frozen tires.
     """
     setup = conditions.setup
     v = setup.speeds()
@@ -140,12 +132,7 @@ EPILOG = (
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "drive",
         help=COMMANDS["drive"],
@@ -191,7 +178,7 @@ def add_parser(commands: Any) -> None:
         choices=PLANTS,
         default=PLANTS[0],
         metavar="NAME",
-        help=f"what is driven: {', '.join(PLANTS)}; the last two need the extra commonroad "
+        help=f"what is driven: {', '.join(PLANTS)}; the last two need commonroad-vehicle-models "
         "(%(default)s)",
     )
     parser.add_argument(
@@ -293,7 +280,6 @@ def run(options: argparse.Namespace) -> int:
             command=options.words,
         )
         told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
-        told = "\n".join(part for part in (told, setup.vehicle.estimates) if part)
     tell(told)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else NOT_COMPLETED

@@ -9,8 +9,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from identifier.frozen import VEHICLE_KEYS
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, load_model
 from models.faults import SIZED, FaultError, SensorFault
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
@@ -137,12 +136,7 @@ LONGEST_DELAY = 100.0  # ms
 
 
 def labels_of(words: Sequence[str]) -> list[str]:
-    """Return the tires in order, each once; all begins with the frozen ones.
-
-    Parameters
-    ----------
-    words : names of tires, or all.
-    """
+    """Return the tires in order, each once; all begins with the frozen ones."""
     wanted = [FROZEN, LINEAR, ORACLE, LEARNING] if ALL in words else list(words)
     return list(dict.fromkeys(wanted))
 
@@ -209,10 +203,6 @@ def _require_one_source(options: argparse.Namespace) -> None:
 def named_path(name: str) -> Path:
     """Return a built-in path, or one from way-points in a file.
 
-    Parameters
-    ----------
-    name : one of the built-in paths, or the name of a CSV file.
-
     Raises
     ------
     ValueError
@@ -238,12 +228,10 @@ def make_setup(
 
     Parameters
     ----------
-    path : to follow.
     vehicle : the car; None takes the built-in sedan, or the car of the plant.
     plant : of `PLANTS`.
     mu : friction before the first drop [-].
     drops : arc length [m] and friction from there on.
-    wish : how fast.
 
     Raises
     ------
@@ -275,11 +263,6 @@ def frozen_tires(
 ) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed.
 
-    Parameters
-    ----------
-    labels : what the trackers are told.
-    conditions : of the drives.
-
     Raises
     ------
     ValueError
@@ -307,10 +290,10 @@ def frozen_tires(
             lateral=conditions.lateral(),
             progress=progress,
         )
-    history = identify(recording, setup.vehicle, method, check=False)
-    warn_of(history.verdict(), f"what {law} learnt to drive on")
+    run = identify(recording, setup.vehicle, method, check=False)
+    warn_of(run.verdict, f"what {law} learnt to drive on")
     assert recording.a_y is not None
-    learnt = history.calibrated() if conditions.caution > 0.0 else history.freeze()
+    learnt = run.tire if conditions.caution > 0.0 else run.freeze()
     return (
         f"frozen ones learnt by {law} on {recording.duration:.0f} s of random steering on an open "
         f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"

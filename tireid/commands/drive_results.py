@@ -52,12 +52,9 @@ def write_drives(
     Parameters
     ----------
     folder : an empty folder.
-    runs : the drives, the one that it is about first.
-    curves : tires to draw behind the forces of the first.
     inputs : all that went in, ready for JSON.
     drops : arc length [m] and friction from there on.
     film : webp, gif, mp4 or none.
-    faults : of the sensors on the path.
     """
     first = runs[0]
     write_json(folder / "summary.json", summarize_drives(runs, inputs))
@@ -102,7 +99,6 @@ def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str
 
     Parameters
     ----------
-    runs : the drives.
     inputs : all that went in, ready for JSON.
     """
     by_label = {run.label: _scores(run) for run in runs}
@@ -174,14 +170,7 @@ def drive_columns(drive: Drive) -> dict[str, Array]:
 
 
 def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
-    """Return what the trackers were told, and the linear and the true tire beside it.
-
-    Parameters
-    ----------
-    runs : the drives.
-    setup : path, car and road.
-    learnt : the frozen tires, if there are any.
-    """
+    """Return what the trackers were told, and the linear and the true tire beside it."""
     models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
         models[FROZEN] = prediction_tire(learnt, setup.vehicle)
@@ -205,12 +194,7 @@ COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", TIMES)
 
 
 def drive_table(runs: Sequence[Run]) -> str:
-    """Return the scores of drives as lines of text.
-
-    Parameters
-    ----------
-    runs : the drives.
-    """
+    """Return the scores of drives as lines of text."""
     rows = [list(COLUMNS)]
     for run in runs:
         score = run.scores
@@ -226,12 +210,7 @@ def drive_table(runs: Sequence[Run]) -> str:
 
 
 def told_words(run: Run) -> str:
-    """Return how right the v_y was that was told, in one line.
-
-    Parameters
-    ----------
-    run : of a car whose v_y was told.
-    """
+    """Return how right the v_y was that was told, in one line."""
     told = told_scores(run.drive)
     assert told is not None
     return (

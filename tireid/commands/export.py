@@ -4,9 +4,8 @@ import argparse
 from typing import Any
 
 from identifier.method import Method
-from identifier.methods import continuing
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.methods import LIVE, continuing
+from identifier.tire_model import TireModel, load_model
 from models.vehicle import Vehicle
 from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS
@@ -18,6 +17,7 @@ from tireid.commands.options import (
     chosen_method,
     method_is_given,
     read_vehicle,
+    say_estimates,
 )
 from tireid.exporting import export_method
 from tireid.progress import say
@@ -25,12 +25,7 @@ from tireid.verdicts import warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "export",
         help=COMMANDS["export"],
@@ -39,7 +34,7 @@ def add_parser(commands: Any) -> None:
         "that went in.",
     )
     add_vehicle(parser)
-    add_method(parser)
+    add_method(parser, LIVE)
     add_weights(parser, "begin with it, as identified")
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
     parser.add_argument("--single", action="store_true", help="float unless the build says double")
@@ -100,11 +95,14 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
-    return start.vehicle if start is not None and options.vehicle is None else read_vehicle(options)
+    if start is None or options.vehicle is not None:
+        return read_vehicle(options)
+    say_estimates(start.vehicle, options.weights)
+    return start.vehicle
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     """Return the method that is asked for; else the one that goes on from the model."""
     if start is None or method_is_given(options):
-        return chosen_method(options, vehicle).method
+        return chosen_method(options, vehicle, online=True).method
     return continuing(start, vehicle)

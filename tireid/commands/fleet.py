@@ -4,9 +4,10 @@ import argparse
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from identifier.stored import load_model
+from identifier.tire_model import STIFFNESS, load_model
+from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
@@ -20,29 +21,25 @@ from tireid.commands.options import (
 )
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
-from tireid.fleet.merge import BY, Merged, fleet_prior, merge, usable
-from tireid.fleet.store import LogRow, Store, StoreError, file_of
+from tireid.fleet.merge import BY, COLUMNS, Merged, fleet_prior, merge, usable
+from tireid.fleet.store import LogRow, Store, StoreError
 from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.verdicts import warn_of_stored
 
 SHOWN = 5  # logs with errors that are named
+SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "fleet",
         help=COMMANDS["fleet"],
         description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
         "each log, and ask it: one model of many logs, where the next car starts, which car's "
-        "tires changed. Needs pip install 'tireid[fleet]'.",
+        f"tires changed. {needs('A store', 'libraries', 'fleet')}.",
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
     _add_learn(tasks)
@@ -79,6 +76,12 @@ def _add_learn(tasks: Any) -> None:
         "(2026-03-31) are known by name, the others stand in the column tags",
     )
     parser.add_argument(
+        "--root",
+        default="",
+        metavar="DIR",
+        help="name logs as they lie under this folder or address, not by their absolute paths",
+    )
+    parser.add_argument(
         "--weights", type=Path, metavar="FILE", help="stored model or prior: begin with it"
     )
     parser.add_argument(
@@ -97,6 +100,12 @@ def _add_learn(tasks: Any) -> None:
     )
     parser.add_argument(
         "--again", action="store_true", help="also learn logs whose row holds an error"
+    )
+    parser.add_argument(
+        "--replace",
+        action="store_true",
+        help="take out of the store what these logs were learnt with before: another car or other "
+        "options, or another content of the same file",
     )
     add_log_map(parser)
     parser.add_argument(
@@ -248,12 +257,12 @@ def _claimed(store: str) -> Iterator[None]:
 def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
     clock, jobs = Stopwatch(), jobs_of(options)
-    tasks, left = find_logs(options.logs, options.vehicle, options.tags)
+    tasks, left = find_logs(options.logs, options.vehicle, options.tags, options.root)
     for log, why in list(left.items())[:SHOWN]:
         say(f"{log}: left out, {why}")
     telling = Telling(
         log_map=told_map(options),
-        weights=options.weights,
+        start=None if options.weights is None else load_model(options.weights),
         judging=options.judge,
         check=not options.no_check,
         part=options.part,
@@ -263,7 +272,6 @@ def _learn(options: argparse.Namespace) -> int:
         if vehicle.estimates:
             say(f"{car}: {vehicle.estimates}")
     if options.weights is not None:
-        load_model(options.weights)
         warn_of_stored(options.weights)
     store = Store(options.out)
     store.require_ours()
@@ -274,16 +282,29 @@ def _learn(options: argparse.Namespace) -> int:
             progress(ready / max(of, 1), f"{ready} of {of} logs")
 
         spread = on_a_cluster(elsewhere) if options.scheduler else on_this_machine(jobs)
-        learnt, of = learn_fleet(tasks, telling, store, spread, again=options.again, done=done)
-    wanted = {task.log for task in tasks}
-    rows = [r for r in store.rows(("log", "error", "valid", "seconds")) if file_of(r.log) in wanted]
+        became = learn_fleet(
+            tasks, telling, store, spread, again=options.again, replacing=options.replace, done=done
+        )
+    wanted = {task.log for task in tasks} | {name for _, name in became.copies}
+    rows = [row for row in store.stream(SUMMED) if row.log in wanted]
     errors = [row for row in rows if row.error]
     for row in errors[:SHOWN]:
-        say(f"{row.log}: {row.error}")
+        say(f"{row.name}: {row.error}")
+    for log, name in became.copies[:SHOWN]:
+        say(f"{log}: is in the store as {name}, of the same content")
+    if became.others:
+        count, first = len(became.others), became.others[0].name
+        say(
+            f"{first}: taken out of the store, as were {count - 1} others"
+            if options.replace
+            else f"{first} and {count - 1} others stand in the store with another car, other "
+            "options or another content: fleet learn --replace takes them out"
+        )
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)
     tell(
-        f"{of} logs, {hours:.3g} h: {learnt} learnt now, {of - learnt} before; "
+        f"{became.of} logs, {hours:.3g} h: {became.learnt} learnt now, "
+        f"{became.of - became.learnt} before; "
         f"{refused} not valid, {len(errors)} could not be used"
         + (f", the column error of {options.out} says why" if errors else "")
     )
@@ -291,39 +312,39 @@ def _learn(options: argparse.Namespace) -> int:
     return FAILS if errors else DONE
 
 
-class Asked(NamedTuple):
-    """All rows that --where takes, those of them that are used, and what groups them."""
+class _Used:
+    """The rows of a store that --where takes and that can be used, counted as they are read."""
 
-    rows: list[LogRow]
-    used: list[LogRow]
-    by: list[str]
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options, self.store = options, Store(options.store)
+        self.by = [one for one in options.by.split(",") if one]
+        self.store.require()
 
+    def rows(self) -> Iterator[LogRow]:
+        used = of = 0
+        for row in self.store.stream(COLUMNS, where=self.options.where):
+            of += 1
+            if usable(row, refused=self.options.all):
+                used += 1
+                yield row
+        if not used:
+            raise ValueError(
+                f"{self.options.store}: none of {of} logs can be used"
+                + ("" if self.options.all else "; --all takes those too that the verdict refuses")
+            )
+        say(f"{used} of {of} logs")
 
-def _asked(options: argparse.Namespace) -> Asked:
-    store = Store(options.store)
-    store.require()
-    rows = store.rows(where=options.where)
-    used = usable(rows, refused=options.all)
-    if not used:
-        raise ValueError(
-            f"{options.store}: none of {len(rows)} logs can be used"
-            + ("" if options.all else "; --all takes those too that the verdict refuses")
-        )
-    say(f"{len(used)} of {len(rows)} logs")
-    return Asked(rows, used, [one for one in options.by.split(",") if one])
-
-
-def _groups(options: argparse.Namespace) -> list[Merged]:
-    asked = _asked(options)
-    return merge(asked.used, asked.by)
+    @property
+    def groups(self) -> list[Merged]:
+        return merge(self.rows(), self.by)
 
 
 def _watch(options: argparse.Namespace) -> int:
     """Tell whose tires changed; return 1 where a change lasts."""
     from tireid.reports.fleet import write_watch_report  # draws, which learning does not
 
-    watching, asked = _watching(options), _asked(options)
-    watched = watch(asked.used, asked.by, watching)
+    watching, used = _watching(options), _Used(options)
+    watched = watch(used.rows(), used.by, watching)
     with output_folder(options.out, force=options.force) as folder:
         write_json(folder / "alarms.json", [alarm.to_dict() for alarm in watched.alarms])
         write_watch_report(folder, options.store, watched, command=options.words)
@@ -336,15 +357,14 @@ def _watch(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     """Write a page on what a store holds."""
-    from tireid.reports.fleet import write_fleet_report
+    from tireid.reports import fleet as page
 
-    watching, asked = _watching(options), _asked(options)
-    groups = merge(asked.used, asked.by)
-    watched = watch(asked.used, asked.by, watching)
+    watching, used = _watching(options), _Used(options)
+    groups = used.groups
+    watched = watch(used.rows(), used.by, watching)
+    rows = used.store.rows(page.COLUMNS, where=options.where)
     with output_folder(options.out, force=options.force) as folder:
-        write_fleet_report(
-            folder, options.store, asked.rows, groups, watched, command=options.words
-        )
+        page.write_fleet_report(folder, options.store, rows, groups, watched, command=options.words)
     tell(_table(groups))
     say(f"wrote {options.out}/")
     return DONE
@@ -352,7 +372,7 @@ def _report(options: argparse.Namespace) -> int:
 
 def _merge(options: argparse.Namespace) -> int:
     """Merge the logs of each group into a model."""
-    groups = _groups(options)
+    groups = _Used(options).groups
     with output_folder(options.out, force=options.force) as folder:
         table = []
         for k, one in enumerate(groups):
@@ -379,13 +399,14 @@ def _merge(options: argparse.Namespace) -> int:
 def _table(groups: list[Merged]) -> str:
     rows = [["group", "logs", "learning", "stiffness front, rear", "known to"]]
     for one in groups:
-        C, known = one.model.cornering_stiffness / 1e3, one.model.known_slip * 57.29578
+        known = one.model.known_slip * 57.29578
+        C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
         rows.append(
             [
                 one.name,
                 str(one.logs),
                 f"{one.told.seconds / 60.0:.1f} min",
-                f"{C[0]:.3g}, {C[1]:.3g} kN/rad",
+                f"{C[0]}, {C[1]} kN/rad",
                 f"{known[0]:.1f}, {known[1]:.1f} deg",
             ]
         )
@@ -396,7 +417,7 @@ def _prior(options: argparse.Namespace) -> int:
     """Write where the next car starts."""
     require_free(options.out, force=options.force)
     vehicle = Vehicle.from_toml(options.vehicle)
-    prior = fleet_prior(_groups(options))
+    prior = fleet_prior(_Used(options).groups)
     model = prior.model(vehicle)
     model.save(options.out)
     tell(f"where {vehicle.name} starts, from {prior.cars} cars:\n{model.summary()}")

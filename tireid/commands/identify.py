@@ -20,8 +20,8 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History, check_recording
-from identifier.stored import load_model
-from identifier.verdict import judge_prediction
+from identifier.tire_model import TireModel, load_model
+from identifier.verdict import Verdict, judge, judge_prediction
 from models.recordings import (
     Recording,
     Repair,
@@ -39,6 +39,7 @@ from tireid.commands.identify_results import (
     file_name,
     guaranteed_text,
     network_table,
+    no_truth,
     write_network_results,
     write_results,
 )
@@ -61,7 +62,7 @@ from tireid.commands.options import (
 )
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
-from tireid.learning import identify
+from tireid.learning import identify, with_v_y
 from tireid.output import (
     output_folder,
     require_curves,
@@ -71,19 +72,14 @@ from tireid.output import (
 )
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
-from tireid.verdicts import verdict_text, warn_of_stored
+from tireid.verdicts import asked_text, verdict_text, warn_of_stored
 
 LEARNING, JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
 OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
         help=COMMANDS["identify"],
@@ -116,7 +112,7 @@ def add_parser(commands: Any) -> None:
         action="extend",
         default=[],
         metavar="LOG[:RUN]",
-        help="recordings to predict",
+        help="recordings to predict, each with a verdict",
     )
     parser.add_argument(
         "--bound",
@@ -144,10 +140,11 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return 3 where what was learnt is not valid."""
+    """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = read_vehicle(options)
     seed = None if options.seed is None else seed_of(options)
-    law, design = chosen_method(options, vehicle, seed)
+    beside = options.network is not None  # of which something learns online
+    law, design = chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     bound = None if options.bound is None else AskedBound.of(options.bound)
@@ -176,7 +173,7 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
-        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y)
+        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y, online=beside)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
@@ -198,18 +195,22 @@ def run(options: argparse.Namespace) -> int:
         histories: list[History] = []
         pieces: list[History] = []
         for k, one in enumerate((recording, *others)):
+            if design.whole and histories:
+                histories.append(histories[0].asked(one, freeze_times[-1]))
+                continue
             share = progress.within(k / count, (k + 1) / count)
             histories.append(  # checked when they were read
-                identify(one, vehicle, design, start=start, check=False, progress=share)
+                identify(one, vehicle, design, start=start, check=False, progress=share).history
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(JUDGING)
         if network is not None:
             verdict = judge_prediction(network, histories[0].recording)
             verdict = with_doctor(verdict, diagnosis, repair)
+            asked = _asked(network, others)
             progress.begin(DRAWING)
             replays, figures = write_network_results(
-                folder, options.network, law, network, histories, verdict, options.curves
+                folder, options.network, law, network, histories, verdict, asked, options.curves
             )
             by_key = {NETWORK: replays}
             told = network_table(law, histories, replays)
@@ -218,7 +219,8 @@ def run(options: argparse.Namespace) -> int:
             for t in freeze_times:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = with_doctor(learnt.verdict(freeze_times[-1]), diagnosis, repair)
+            verdict = with_doctor(judge(learnt, freeze_times[-1]), diagnosis, repair)
+            asked = _asked(learnt.freeze(freeze_times[-1]), others)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
             figures = write_results(
                 folder,
@@ -227,6 +229,7 @@ def run(options: argparse.Namespace) -> int:
                 histories[1:],
                 frozen,
                 verdict,
+                asked,
                 pieces,
                 curves=options.curves,
                 bound=bound,
@@ -238,7 +241,8 @@ def run(options: argparse.Namespace) -> int:
         doctor = doctor_text(diagnosis, repair, options.repair)
         model = network or load_model(folder / "weights.json")
         sure = "" if bound is None else guaranteed_text(model)
-        parts_told = (told, sure, vehicle.estimates, doctor, verdict_text(verdict))
+        of_others = asked_text(asked)
+        parts_told = (told, sure, doctor, of_others, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(
@@ -252,13 +256,19 @@ def run(options: argparse.Namespace) -> int:
             pieces,
             diagnosis=diagnosis,
             command=options.words,
+            asked=asked,
         )
     if repair:
         write_repair(options.repair, told_map(options), diagnosis)
         say(f"wrote {options.repair}")
     tell(told)
     say(f"wrote {options.out}/")
-    return exit_code(verdict, options)
+    return max(exit_code(one, options) for one in (verdict, *asked.values()))
+
+
+def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
+    """Return the verdict of `tireid predict` on a model over each replayed log, by its name."""
+    return {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
@@ -291,11 +301,13 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
+    reach = f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)"
+    if not learnt.online:
+        return reach
     told = side_slip_text(learnt)
     return (f"{told}\n" if told else "") + (
-        f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)\n"
-        f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
-        "covariance stay in their boxes by construction (summary.json lists them)"
+        f"{reach}\ncertificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets "
+        "and covariance stay in their boxes by construction (summary.json lists them)"
     )
 
 
@@ -350,7 +362,6 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
 
     Parameters
     ----------
-    histories : the online runs over all recordings.
     frozen : freeze time [s] to recording name to replay.
     """
     sizes = {history.recording.name: force_rms(history) for history in histories}
@@ -358,7 +369,7 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            note = "" if sizes[name] is not None else "(against online, no truth)"
+            note = no_truth(error, sizes[name])
             cells = error_cells(error, sizes[name])
             rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
             sides = result.reproduction

@@ -27,7 +27,7 @@ from identifier.reproducibility import (
 from identifier.run import History
 from identifier.setup import Block
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, calibrated, guaranteed
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -63,8 +63,13 @@ def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
     }
 
 
-def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any]:
-    """Return the verdict on a method, and which bounds hold of it whatever is measured."""
+def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | None:
+    """Return the verdict on a method, and which bounds hold of it whatever is measured.
+
+    None of a method that learns from whole logs: nothing learns in a car.
+    """
+    if design.whole:
+        return None
     certificate = certify(design, vehicle)
     return {"verdict": certificate.verdict, "held_by_construction": certificate.held}
 
@@ -76,6 +81,7 @@ def summarize(
     others: Sequence[History],
     frozen: Mapping[float, Mapping[str, Replay]],
     verdict: Verdict,
+    asked: Mapping[str, Verdict],
     parts: Sequence[History] = (),
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
@@ -87,15 +93,11 @@ def summarize(
 
     Parameters
     ----------
-    law : the law as the user named it.
-    learnt : the online run that the weights come from.
-    others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
-    verdict : on the model of the last freeze.
     parts : of the online run, over each of several logs that were learnt on.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict)
+    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict, asked)
 
 
 def summarize_replays(
@@ -103,19 +105,13 @@ def summarize_replays(
     runs: Sequence[History],
     frozen: Mapping[str, Mapping[str, Replay]],
     verdict: Verdict | None,
+    asked: Mapping[str, Verdict],
 ) -> dict[str, Any]:
-    """Return the same of any replays.
-
-    Parameters
-    ----------
-    law : the law as the user named it.
-    runs : online runs of one design, the first the one that was learnt.
-    frozen : key in the summary to recording name to replay.
-    verdict : on the model that was replayed last.
-    """
+    """Return the same of any replays."""
     learnt = runs[0]
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
+        "replay_verdicts": {name: one.to_dict() for name, one in asked.items()},
         "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
         "rmse_N": {
             "online": {h.recording.name: _axles(online_error(h)) for h in runs},
@@ -170,15 +166,10 @@ class AskedBound(NamedTuple):
 
 
 def guaranteed_text(model: TireModel) -> str:
-    """Return what is guaranteed of a model, in words.
-
-    Parameters
-    ----------
-    model : frozen, asked for a guaranteed band.
-    """
+    """Return what is guaranteed of a model, in words."""
     sentence = guaranteed_sentence(model)
     return sentence or (
-        "no guaranteed band: it takes a method that learns curves of slip, a lateral velocity that "
+        "no guaranteed band: it takes --method axle, a lateral velocity that "
         "was measured, and enough driving"
     )
 
@@ -201,6 +192,7 @@ def write_results(
     others: Sequence[History],
     frozen: Frozen,
     verdict: Verdict,
+    asked: Mapping[str, Verdict],
     parts: Sequence[History] = (),
     *,
     curves: str = "csv",
@@ -212,11 +204,8 @@ def write_results(
     Parameters
     ----------
     folder : an empty folder.
-    law : the law as the user named it.
-    learnt : the online run that the weights come from.
     others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
-    verdict : on the model of the last freeze.
     parts : of the online run, over each of several logs that were learnt on.
     curves : "csv" or "parquet", as what curves over time are written.
     bound : of the guaranteed band of the last freeze; None asks for none.
@@ -227,18 +216,24 @@ def write_results(
     BoundViolatedError
         Where no curve keeps a bound that was told.
     """
-    calibrated = learnt.calibrated(max(frozen))
+    tire = calibrated(learnt, max(frozen))
     if bound is not None:
-        calibrated = learnt.guaranteed(bound.told, max(frozen), calibrated)
+        tire = guaranteed(learnt, bound.told, max(frozen), tire)
     write_json(
         folder / "summary.json",
         summarize(
-            law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict, parts=parts
+            law=law,
+            learnt=learnt,
+            others=others,
+            frozen=frozen,
+            verdict=verdict,
+            asked=asked,
+            parts=parts,
         ),
     )
     for t in frozen:
         last = "" if t == max(frozen) else f"_{freeze_key(t)}s"
-        model = learnt.freeze(t) if last else calibrated
+        model = learnt.freeze(t) if last else tire
         judged = verdict if t == max(frozen) else None
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
@@ -247,27 +242,37 @@ def write_results(
     told = progress or Progress("curves")
     _write_curves(folder, learnt, others, frozen, curves, told, tracks)
     say("drawing figures")
-    return _draw(folder, learnt, others, frozen, calibrated, tracks)
+    return _draw(folder, learnt, others, frozen, tire, tracks)
 
 
 def file_name(recording: Recording) -> str:
-    """Return the name of a recording as part of a file name.
-
-    Parameters
-    ----------
-    recording : named FILE or FILE:RUN.
-    """
+    """Return the name of a recording as part of a file name."""
     return re.sub(r"[^\w.-]+", "_", recording.name)
 
 
-def error_cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
+def no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
+    """Return the note beside an error: against what, where there is no true force.
+
+    Parameters
+    ----------
+    error : None where there is none.
+    size : rms of the true forces [N], None without truth.
+    """
+    if size is not None:
+        return ""
+    return "(no truth)" if error is None else "(against online, no truth)"
+
+
+def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str]:
     """Return front and rear error as text, with their share of the rms force where it is known.
 
     Parameters
     ----------
-    error : [N].
+    error : [N]; None leaves a dash.
     size : rms of the true forces [N], None without truth.
     """
+    if error is None:
+        return "-", "-"
     forces = (0.0, 0.0) if size is None else (size.front, size.rear)
     front, rear = (
         f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
@@ -297,6 +302,9 @@ def _write_curves(
     if OBSERVED in learnt.outputs:
         found = learnt.blocks()
         write_table(folder / f"errors.{curves}", (_error_columns(learnt, one) for one in found))
+
+    if not learnt.online:
+        return
 
     def weights() -> Iterator[dict[str, Array]]:
         for block in learnt.blocks():
@@ -340,7 +348,6 @@ def write_forces(
 
     Parameters
     ----------
-    history : an online run.
     replays : replays of the same recording by the name of their columns.
     progress : called now and then with the share that is done, 0 to 1.
     """
@@ -376,7 +383,7 @@ def _force_columns(
         "alpha_r_rad": alpha[:, 1],
     }
     columns |= {name: values[part] for name, values in told.items()}
-    curves = {"online": history.axle_force}
+    curves = {"online": history.axle_force} if history.online else {}
     curves |= {label: replay.axle_force for label, replay in replays.items()}
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
@@ -390,12 +397,7 @@ FARTHER = 1.25  # than the slip that was driven, or is known
 
 
 def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
-    """Return curve.csv: the steady force of each axle over slip, and whether it is known there.
-
-    Parameters
-    ----------
-    recordings : that were driven, which say how far the curve goes.
-    """
+    """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
     for recording in recordings:
@@ -426,14 +428,14 @@ def _draw(
     learnt: History,
     others: Sequence[History],
     frozen: Frozen,
-    calibrated: TireModel,
+    tire: TireModel,
     tracks: DrawnRun | None,
 ) -> dict[str, Figure]:
     name, last = learnt.recording.name, max(frozen)
     own = {t: replays[name] for t, replays in frozen.items()}
     figures = {
         "forces": force_figure(learnt, own),
-        "slip": slip_figure(calibrated, learnt.recording, learnt),
+        "slip": slip_figure(tire, learnt.recording, _beside(learnt)),
         "inputs": inputs_figure(learnt.recording),
     }
     if OBSERVED in learnt.outputs:
@@ -446,10 +448,15 @@ def _draw(
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen), tracks)
     for other in others:
         replay = frozen[last][other.recording.name]
-        figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, other)
+        figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, _beside(other))
     for label, figure in figures.items():
         save_figure(figure, folder / f"{label}.png")
     return figures
+
+
+def _beside(run: History) -> History | None:
+    """Return a run where it has forces of its own to compare with."""
+    return run if run.online else None
 
 
 # What `tireid identify --network` finds: a network of one's own over recordings.
@@ -467,6 +474,7 @@ def write_network_results(
     model: OnnxModel,
     histories: Sequence[History],
     verdict: Verdict,
+    asked: Mapping[str, Verdict],
     curves: str = "csv",
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
     """Write everything that is known of a network into a folder; return replays and figures.
@@ -474,11 +482,6 @@ def write_network_results(
     Parameters
     ----------
     folder : an empty folder.
-    file : where the network came from.
-    law : what learns beside it, as the user named it.
-    model : the network.
-    histories : what was identified online over each recording.
-    verdict : on the network.
     curves : "csv" or "parquet", as what curves over time are written.
     """
     replays = {history.recording.name: replay(model, history) for history in histories}
@@ -487,7 +490,7 @@ def write_network_results(
         "inputs": list(model.signals),
         "slip_sign": model.slip_sign,
     }
-    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict)
+    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict, asked)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json", valid=verdict.valid)
     columns = curve_columns(model, [history.recording for history in histories])
@@ -499,8 +502,8 @@ def write_network_results(
         name, own = file_name(recording), replays[recording.name]
         last = "" if history is histories[0] else f"_{name}"
         write_forces(folder / f"forces{last}.{curves}", history, {NETWORK: own})
-        figures[f"slip{last}"] = slip_figure(model, recording, history)
-        figures[f"replay_{name}"] = prediction_figure(own, history)
+        figures[f"slip{last}"] = slip_figure(model, recording, _beside(history))
+        figures[f"replay_{name}"] = prediction_figure(own, _beside(history))
     figures["inputs"] = inputs_figure(histories[0].recording)
     for label, figure in figures.items():
         save_figure(figure, folder / f"{label}.png")
@@ -508,20 +511,15 @@ def write_network_results(
 
 
 def network_table(law: str, histories: Sequence[History], replays: Mapping[str, Replay]) -> str:
-    """Return the errors of the network, and of what was learnt online beside it, as text.
-
-    Parameters
-    ----------
-    law : what learns beside it.
-    histories : what was identified online over each recording.
-    replays : of the network, by recording.
-    """
+    """Return the errors of the network, and of what was learnt online beside it, as text."""
     table = [["", "replayed on", "front", "rear"]]
     for history in histories:
         name, size, online = history.recording.name, force_rms(history), online_error(history)
         own = replays[name]
+        rows: list[tuple[str, AxleRmse | None]]
         rows = [(NETWORK, own.against_truth or own.against_online)]
         rows += [] if online is None else [(f"{law}, learning online", online)]
-        note = "" if size is not None else "(against online, no truth)"
-        table += [[title, name, *error_cells(error, size), note] for title, error in rows]
+        table += [
+            [title, name, *error_cells(error, size), no_truth(error, size)] for title, error in rows
+        ]
     return text_table(table, "<<>>")

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from identifier.method import Method
 from identifier.methods import (
     DEFAULT,
+    LIVE,
     METHODS,
     REFERENCE,
     WITHOUT_V_Y,
@@ -48,7 +49,6 @@ def add_vehicle(
 
     Parameters
     ----------
-    parser : of a command.
     required : whether it cannot be left out.
     default : what it is where it is left out.
     """
@@ -65,18 +65,18 @@ def read_vehicle(options: argparse.Namespace) -> Vehicle:
             "fill in"
         )
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
-    if vehicle.estimates:
-        say(f"{options.vehicle}: {vehicle.estimates}")
+    say_estimates(vehicle, options.vehicle)
     return repaired_vehicle(vehicle, options)
 
 
-def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
-    """Return a car with the numbers that the repair of --log tells of it, and say which.
+def say_estimates(vehicle: Vehicle, source: Path | None) -> None:
+    """Say which numbers of a car are estimated, where any are: once in a command."""
+    if vehicle.estimates:
+        say(f"{source}: {vehicle.estimates}")
 
-    Parameters
-    ----------
-    vehicle : as it was told.
-    """
+
+def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
+    """Return a car with the numbers that the repair of --log tells of it, and say which."""
     path = _map_path(options)
     numbers: dict[str, Any] = {} if path is None else dict(LogMap.from_toml(path).repair.vehicle)
     if not numbers:
@@ -91,7 +91,6 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
 
     Parameters
     ----------
-    parser : of the command.
     command : its name, which the folder bears by default; None writes a folder only where asked.
     """
     folder = None if command is None else Path(f"tireid-{command}")
@@ -101,22 +100,12 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add --force.
-
-    Parameters
-    ----------
-    parser : of a command.
-    """
+    """Add --force."""
     parser.add_argument("--force", action="store_true", help="replace what is there")
 
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
-    """Add the option that takes an answer as it is.
-
-    Parameters
-    ----------
-    parser : of a command that ends with a verdict.
-    """
+    """Add the option that takes an answer as it is."""
     parser.add_argument(
         "--accept",
         action="store_true",
@@ -135,35 +124,17 @@ def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --weights.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : what the command does with the model.
-    """
+    """Add --weights."""
     parser.add_argument("--weights", type=Path, metavar="FILE", help=f"stored model: {what}")
 
 
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --seed; None where it is not given.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : is drawn with it.
-    """
+    """Add --seed; None where it is not given."""
     parser.add_argument("--seed", type=int, metavar="N", help=f"of {what} (0)")
 
 
 def seed_of(options: argparse.Namespace) -> int:
-    """Return --seed, 0 where it is not given.
-
-    Raises
-    ------
-    ValueError
-        Where it is negative.
-    """
+    """Return --seed, 0 where it is not given."""
     seed = int(options.seed or 0)
     if seed < 0:
         raise ValueError(f"--seed must not be negative, it is {seed}")
@@ -171,12 +142,7 @@ def seed_of(options: argparse.Namespace) -> int:
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Add --jobs.
-
-    Parameters
-    ----------
-    parser : of a command.
-    """
+    """Add --jobs."""
     count = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=int, default=count, metavar="N", help="processes (%(default)s)"
@@ -201,18 +167,18 @@ def jobs_of(options: argparse.Namespace) -> int:
 # What learns: a method by its name, the paper's, or the design in a file.
 
 
-def add_method(parser: argparse.ArgumentParser) -> None:
+def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
     Parameters
     ----------
-    parser : of a command.
+    usual : the default.
     """
     parser.add_argument(
         "--method",
         choices=METHODS,
         metavar="NAME",
-        help=f"what learns: {', '.join(METHODS)} (default: {DEFAULT})",
+        help=f"what learns: {', '.join(METHODS)} (default: {usual})",
     )
     parser.add_argument(
         "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"
@@ -249,6 +215,7 @@ def chosen_method(
     seed: int | None = None,
     *,
     without_v_y: bool = False,
+    online: bool = False,
 ) -> Chosen:
     """Return what --method, --paper or --design say, the default where none is given.
 
@@ -256,6 +223,7 @@ def chosen_method(
     ----------
     seed : of initial weights; None where nobody asks for one.
     without_v_y : whether a log has no lateral velocity, which changes the default.
+    online : whether the default is the one that learns sample by sample.
 
     Raises
     ------
@@ -268,7 +236,7 @@ def chosen_method(
             raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
         design = read_design(options.design)
         return Chosen(design.law, design)
-    usual = WITHOUT_V_Y if without_v_y else DEFAULT
+    usual = WITHOUT_V_Y if without_v_y else LIVE if online else DEFAULT
     name = options.method or (REFERENCE if options.paper else usual)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
@@ -279,12 +247,7 @@ def chosen_method(
 
 
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns and --no-check.
-
-    Parameters
-    ----------
-    parser : of a command that reads logs.
-    """
+    """Add --log, --columns and --no-check."""
     add_log_map(parser)
     parser.add_argument(
         "--no-check", action="store_true", help="accept a log that contradicts physics"
@@ -292,12 +255,7 @@ def add_log_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns, --dbc, --cut-holes and --mend-clock: how a log is read.
-
-    Parameters
-    ----------
-    parser : of a command that reads logs.
-    """
+    """Add --log, --columns, --dbc, --cut-holes and --mend-clock: how a log is read."""
     parser.add_argument(
         "--log",
         dest="log_map",
@@ -372,9 +330,6 @@ def read_log(
 
     Parameters
     ----------
-    log : path, or path:run.
-    vehicle : the car that is said to have driven, as the map repairs it.
-    told : how it is read.
     run_name : run of the file, if `log` does not name it.
     check : whether a log that contradicts physics or the vehicle is refused.
     dt : sampling interval that it is brought to [s].
@@ -432,13 +387,7 @@ CONVENTIONS = (
 
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option and what belongs to it.
-
-    Parameters
-    ----------
-    parser : of a command.
-    what : what the command does with the network, for the help.
-    """
+    """Add the option and what belongs to it."""
     group = parser.add_argument_group("a tire network of your own", CONVENTIONS)
     group.add_argument("--network", type=Path, metavar="FILE.onnx", help=what)
     group.add_argument(
@@ -461,7 +410,6 @@ def network_model(
 
     Parameters
     ----------
-    vehicle : the car, which makes slip angles.
     min_speed : below this speed [m/s] the forces read zero.
 
     Raises

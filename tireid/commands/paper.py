@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from codegen.writing import write_file
 from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
@@ -174,7 +175,6 @@ def settings(gains: Gains, network: Network) -> str:
     Parameters
     ----------
     gains : of both laws; the third column divides the learning rates by the forgetting factor.
-    network : its size.
     """
     a = -gains.A_d[0][0]
     scaled = gains.scaled_by_forgetting()
@@ -223,12 +223,11 @@ def write_study(folder: Path, study: Study) -> dict[str, Figure]:
 
     Parameters
     ----------
-    folder : where to.
     study : its errors over all seeds.
     """
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
-    (folder / "tables.txt").write_text(study_text(study) + "\n", encoding="utf-8")
+    write_file(folder / "tables.txt", study_text(study) + "\n")
     say("drawing figures")
     figures = {SCHEME: scheme_figure()}
     for maneuver in study.errors:
@@ -280,12 +279,7 @@ STUDY, DRAWING = "the study", "figures"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "paper",
         help=COMMANDS["paper"],

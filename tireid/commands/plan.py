@@ -12,13 +12,20 @@ from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
 from identifier.plan import STEERING_LAG, Plan, hold_of
 from identifier.plan.search import REAR
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.files import digest
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 from tireid import __version__
 from tireid.commands import COMMANDS
-from tireid.commands.options import add_output, add_seed, add_vehicle, read_vehicle, seed_of
+from tireid.commands.options import (
+    add_output,
+    add_seed,
+    add_vehicle,
+    read_vehicle,
+    say_estimates,
+    seed_of,
+)
 from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.planning import (
@@ -42,18 +49,13 @@ METERS, KILOMETERS = "m/s", "km/h"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "plan",
         help=COMMANDS["plan"],
         description="Plan the steering that narrows the band of the tires' forces most, within an "
         "area, with a margin, for every tire that the car may have (stiffness and grip within "
-        "30 %%, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
+        "30 %, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
         "and report.html, which compares it with a slalom and with random steering.",
     )
     add_vehicle(parser, default="the sedan; with --after that of the model")
@@ -139,9 +141,11 @@ def run(options: argparse.Namespace) -> int:
     if options.after is not None:
         model = load_model(options.after)
         warn_of_stored(options.after)
-    vehicle = (
-        model.vehicle if model is not None and options.vehicle is None else read_vehicle(options)
-    )
+    if model is not None and options.vehicle is None:
+        vehicle = model.vehicle
+        say_estimates(vehicle, options.after)
+    else:
+        vehicle = read_vehicle(options)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
             found = plan(
@@ -254,7 +258,6 @@ def inputs_of(
 
     Parameters
     ----------
-    vehicle : the car.
     area : length and width [m].
     speed : [m/s].
     """
@@ -280,7 +283,6 @@ def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
 
     Parameters
     ----------
-    found : the plan.
     ratio : hand wheel over front wheels; None tells no hand wheel.
     """
     rows = []
@@ -302,7 +304,6 @@ def path_columns(found: Plan, k: int) -> dict[str, Array]:
 
     Parameters
     ----------
-    found : the plan.
     k : which pass, from 0.
     """
     one, car = found.passes[k], found.tires.vehicle
@@ -320,9 +321,7 @@ def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float |
     Parameters
     ----------
     folder : an empty folder.
-    found : the plan.
     inputs : all that went in, ready for JSON.
-    ratio : hand wheel over front wheels.
     """
     write_csv(folder / "steering.csv", steering_columns(found, ratio))
     for k in range(len(found.passes)):
@@ -336,7 +335,6 @@ def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    found : the plan.
     inputs : all that went in, ready for JSON.
     """
     slips, before, after = found.deviations()

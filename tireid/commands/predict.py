@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
 from codegen.escape import visible
 from identifier.frozen import vehicle_numbers
-from identifier.reproducibility import Prediction, beyond_known
-from identifier.stored import load_model
-from identifier.tire_model import TireModel
+from identifier.prediction import Prediction
+from identifier.reproducibility import beyond_known
+from identifier.tire_model import UNCALIBRATED, TireModel, load_model
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__
@@ -28,29 +29,33 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     repaired_vehicle,
+    say_estimates,
     told_map,
+)
+from tireid.figures import (
+    friction_figure,
+    motion_figure,
+    prediction_figure,
+    save_figure,
+    slip_figure,
 )
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_csv, write_json, write_long_csv
 from tireid.progress import say, tell
+from tireid.reports.predict import write_predict_report
 from tireid.verdicts import verdict_text, warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : subparsers of `tireid`.
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "predict",
         help=COMMANDS["predict"],
         description="Predict the axle forces of LOG with a stored model, which learns nothing from "
-        "it; write forces.csv, summary.json and, where it can be told, friction.csv, of the road "
-        "over that of the drive that taught. Where LOG has true forces, say how much is missed; "
-        "else how much of the measured lateral and yaw acceleration the forces explain, in means "
-        "over 0.2 s.",
+        "it; write report.html, figures, forces.csv, summary.json and, where it can be told, "
+        "friction.csv, of the road over that of the drive that taught. Where LOG has true forces, "
+        "say how much is missed; else how much of the measured lateral and yaw acceleration the "
+        "forces explain, in means over 0.2 s.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
@@ -72,11 +77,11 @@ def run(options: argparse.Namespace) -> int:
         run_name=options.run_name,
         check=not options.no_check,
     )
-    prediction = replay(model, recording)
+    prediction = replay(recording, model)
     recording = prediction.recording
     if recording.estimated:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
-    verdict = prediction.verdict()
+    verdict = prediction.verdict
     half, friction = model.half_band_over(recording), verdict.friction
     with output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))
@@ -88,8 +93,20 @@ def run(options: argparse.Namespace) -> int:
             columns |= {"another": friction.another, "unexplained": friction.unexplained}
             write_csv(folder / "friction.csv", columns)
         write_json(folder / "summary.json", summary(model, prediction, verdict, half))
-        told = prediction_text(model, prediction, half, friction)
-    tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
+        lines = prediction_text(model, prediction, half, friction)
+        say("drawing figures")
+        figures = draw(folder, prediction, verdict)
+        write_predict_report(
+            folder,
+            prediction,
+            verdict,
+            figures,
+            told=lines,
+            source=options.model,
+            command=options.words,
+        )
+    table = error_table(prediction)
+    tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
     say(f"wrote {options.out}/")
     return exit_code(verdict, options)
 
@@ -99,6 +116,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     model = load_model(options.model)
     warn_of_stored(options.model)
     if options.vehicle is None:
+        say_estimates(model.vehicle, options.model)
         vehicle = repaired_vehicle(model.vehicle, options)
     else:
         vehicle = read_vehicle(options)
@@ -119,7 +137,6 @@ def truth_within_band(prediction: Prediction, half: Array | None) -> Array | Non
 
     Parameters
     ----------
-    prediction : of a recording.
     half : width of its band (n, 2) [N]; samples without one do not count.
     """
     truth = prediction.recording.axle_force
@@ -137,10 +154,7 @@ def force_columns(
 
     Parameters
     ----------
-    model : that predicted.
-    prediction : of a recording.
     half : width of its band (n, 2) [N]; None where the model has none.
-    part : samples that are asked for.
     """
     recording, car = prediction.recording, model.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
@@ -163,9 +177,6 @@ def summary(
 
     Parameters
     ----------
-    model : that predicted.
-    prediction : of a recording.
-    verdict : on the model over that recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
@@ -207,28 +218,45 @@ def summary(
     }
 
 
+def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Figure]:
+    """Write the figures of a prediction; return them by the name of their file."""
+    figures = {
+        "slip": slip_figure(prediction.model, prediction.recording),
+        "forces": prediction_figure(prediction),
+    }
+    if verdict.shown is not None:
+        figures["motion"] = motion_figure(verdict.shown, prediction.model.vehicle)
+    if verdict.friction is not None:
+        figures["friction"] = friction_figure(verdict.friction)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return figures
+
+
+def error_table(prediction: Prediction) -> str:
+    """Return the errors against the true forces as a table; empty where there are none."""
+    error, size = prediction.against_truth, prediction.true_force
+    if error is None:
+        return ""
+    name = visible(prediction.recording.name)
+    return text_table([["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>")
+
+
 def prediction_text(
     model: TireModel,
     prediction: Prediction,
     half: Array | None,
     friction: RoadFriction | None,
 ) -> str:
-    """Return what is to be said of a prediction, as lines of text.
+    """Return what is to be said of a prediction beside its errors, as lines of text.
 
     Parameters
     ----------
-    model : that predicted.
-    prediction : of a recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     friction : of the drive's road; None where nobody can tell.
     """
-    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
-    lines = []
-    if error is not None:
-        rows = [["predicted", "front", "rear"]]
-        rows.append([visible(prediction.recording.name), *error_cells(error, size)])
-        lines.append(text_table(rows, "<>>"))
-    else:
+    motion, lines = prediction.motion, []
+    if prediction.against_truth is None:
         lines.append("no true forces in the log: what the forces miss cannot be said in newtons")
     if motion is not None:
         lines.append(
@@ -258,14 +286,14 @@ def prediction_text(
     against = contradictions(model, prediction.recording)
     if against is not None:
         lines.append(contradiction_line(*against))
+    if model.has_band and not model.band_calibrated:
+        lines.append(f"friction: cannot be told, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
         lines.append(
             "friction: that of the drive that taught, as far as the tires show it"
             if friction.as_taught
             else "friction: the tires slide too little to show it"
         )
-    if model.vehicle.estimates:
-        lines.append(model.vehicle.estimates)
     return "\n".join(lines)
 
 

@@ -47,13 +47,7 @@ class Witness:
         self._learner, self._period, self._samples = learner, period, 0
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
-        """Ask the learner; return what it said.
-
-        Parameters
-        ----------
-        measured : by the sensors, before the tracker steps.
-        tracker : which steers.
-        """
+        """Ask the learner; return what it said."""
         said = self._learner.observe(measured, tracker)
         if self._samples % EVERY == 0:
             self._look(tracker.tire)

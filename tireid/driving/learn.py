@@ -40,10 +40,7 @@ def learning_drive(
 
     Parameters
     ----------
-    car : to drive.
-    rng : of their noise.
     grip : largest lateral acceleration [m/s²], which sizes the steering.
-    seed : of the steering.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
         they show.
     progress : called with the share of the time.

@@ -45,24 +45,13 @@ from tireid.progress import Progress
 
 
 class Informer:
-    """Tells the tracker of an oracle the true tire of the road that the car is on.
-
-    Parameters
-    ----------
-    setup : path, car and road.
-    """
+    """Tells the tracker of an oracle the true tire of the road that the car is on."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup, self._friction, self._mu = setup, setup.friction(), setup.mu
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
-        """Change the tire where the friction has changed; return that it was done.
-
-        Parameters
-        ----------
-        measured : by the sensors.
-        tracker : which steers.
-        """
+        """Change the tire where the friction has changed; return that it was done."""
         mu = friction_now(self._friction, measured)
         if mu == self._mu:
             return None
@@ -86,13 +75,7 @@ class BacksOff:
         self._beside, self._noted = beside, 1.0
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
-        """Ask what learns; return what it said, and the grip where that changed.
-
-        Parameters
-        ----------
-        measured : by the sensors.
-        tracker : which steers.
-        """
+        """Ask what learns; return what it said, and the grip where that changed."""
         said = None if self._beside is None else self._beside.observe(measured, tracker)
         if abs(tracker.grip - self._noted) < NOTED:
             return said
@@ -102,13 +85,7 @@ class BacksOff:
 
 
 def friction_now(friction: Friction, measured: Measured) -> float:
-    """Return the friction where the car is, of a road whose changes are steps [-].
-
-    Parameters
-    ----------
-    friction : of the road.
-    measured : time and place of the car.
-    """
+    """Return the friction where the car is, of a road whose changes are steps [-]."""
     mu = friction.scale
     for change in friction.changes:
         here = measured.t if change.at_time is not None else measured.X
@@ -122,7 +99,6 @@ def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> Later
 
     Parameters
     ----------
-    vehicle : the car.
     learnt : what it begins with, where these are curves of axles; else it begins afresh.
     """
     method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
@@ -134,10 +110,6 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
     v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
-
-    Parameters
-    ----------
-    learnt : what the tracker is told at the start.
 
     Raises
     ------
@@ -159,12 +131,7 @@ ASKED = 0.5  # s between two looks
 
 
 def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
-    """Return what tells how much of the tires is unknown, 0 to 1; None where nobody learns.
-
-    Parameters
-    ----------
-    learner : beside the tracker.
-    """
+    """Return what tells how much of the tires is unknown, 0 to 1; None where nobody learns."""
     if not isinstance(learner, Learner):
         return None
     last, calls = 1.0, 0
@@ -198,12 +165,6 @@ class Conditions:
 
     Parameters
     ----------
-    setup : path, car and road.
-    delay : periods from a measurement until what follows from it acts.
-    noise : whether sensors are noisy.
-    seed : of the noise.
-    laps : of a closed path.
-    faults : of the sensors, while the path is driven.
     kind : of the sensors, of `SENSORS`; imu measures no v_y.
     dither : deviation that a weave may make which teaches [m]; 0 keeps to the path.
     caution : share of what is not known of the tires that the tracker fears, from 0 to 1.
@@ -229,12 +190,7 @@ class Conditions:
         return inertial_unit() if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
-        """Return what tells v_y on a drive, None where a sensor shows it.
-
-        Parameters
-        ----------
-        learnt : what is known of the tires before.
-        """
+        """Return what tells v_y on a drive, None where a sensor shows it."""
         return None if self.kind == FULL else lateral_velocity(self.setup.vehicle, learnt)
 
     @property
@@ -249,11 +205,6 @@ class Run:
 
     Parameters
     ----------
-    label : the tire that the tracker was told.
-    model, final : that tire, at the start and at the end.
-    problem : of the tracker.
-    drive : what happened.
-    scores : what it is worth.
     learner : what changed the tire on the way, if anything could.
     known : what was known of the tires over time, where it goes on learning.
     """
@@ -280,7 +231,6 @@ def require_dither(name: str, dither: float) -> None:
 
     Parameters
     ----------
-    name : of the number.
     dither : deviation that it may make [m].
 
     Raises
@@ -313,7 +263,6 @@ def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionT
     Parameters
     ----------
     label : of `TIRES`.
-    setup : path, car and road.
     learnt : what was learnt before the drive, for `frozen` and, where there is any, `learning`.
     """
     if label == LINEAR:
@@ -321,7 +270,7 @@ def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionT
     if label == ORACLE:
         return setup.oracle()
     assert learnt is not None
-    return prediction_tire(learnt, setup.vehicle)
+    return prediction_tire(learnt.beside_v_y() if label == LEARNING else learnt, setup.vehicle)
 
 
 def run_drive(
@@ -336,9 +285,6 @@ def run_drive(
     Parameters
     ----------
     label : of `TIRES`.
-    conditions : what is alike for every tire.
-    learnt : what was learnt before the drive.
-    linearizations : a step of the tracker.
 
     Raises
     ------

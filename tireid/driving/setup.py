@@ -39,12 +39,9 @@ class Setup:
 
     Parameters
     ----------
-    path : to follow.
-    vehicle : the car as its tracker is told of it.
     plant : which equations drive, of `PLANTS`.
     mu : friction of the road over that of the tire's measurement, before the first drop [-].
     drops : arc length [m] and friction from there on.
-    wish : how fast.
     """
 
     path: Path
@@ -55,12 +52,7 @@ class Setup:
     wish: SpeedWish
 
     def car(self, *, open_field: bool = False) -> Car:
-        """Return a car on the road, or on a field that has the friction of the start everywhere.
-
-        Parameters
-        ----------
-        open_field : leave the drops out.
-        """
+        """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
         if self.plant == "double-track":
             return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
@@ -155,7 +147,6 @@ def require_friction(word: str, mu: float) -> float:
 
     Parameters
     ----------
-    word : that it was given by.
     mu : the friction [-].
 
     Raises

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     )
     from tireid.figures.paper import comparison_figure, error_figure, locus_figure, weights_figure
     from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
+    from tireid.figures.predict import friction_figure, motion_figure
     from tireid.figures.scheme import scheme_figure
     from tireid.figures.side_slip import drive_lateral_figure, side_slip_figure
     from tireid.figures.style import figure_png, figure_svg, save_figure
@@ -44,6 +45,7 @@ _HOMES = {
     "forces": ("force_figure", "inputs_figure", "prediction_figure", "side_by_side_figure"),
     "paper": ("comparison_figure", "error_figure", "locus_figure", "weights_figure"),
     "plan": ("plan_area_figure", "plan_band_figure", "plan_steering_figure"),
+    "predict": ("friction_figure", "motion_figure"),
     "scheme": ("scheme_figure",),
     "side_slip": ("drive_lateral_figure", "side_slip_figure"),
     "style": ("figure_png", "figure_svg", "save_figure"),
@@ -63,11 +65,13 @@ __all__ = [
     "figure_png",
     "figure_svg",
     "force_figure",
+    "friction_figure",
     "inputs_figure",
     "learnt_axles_figure",
     "locus_figure",
     "matrix_figure",
     "methods_figure",
+    "motion_figure",
     "pareto_figure",
     "plan_area_figure",
     "plan_band_figure",

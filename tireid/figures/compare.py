@@ -35,12 +35,7 @@ FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
-    """Return the names of recordings without the file where all are runs of one.
-
-    Parameters
-    ----------
-    names : FILE or FILE:RUN.
-    """
+    """Return the names of recordings without the file where all are runs of one."""
     files = {name.split(":", 1)[0] for name in names}
     if len(files) > 1 or not all(":" in name for name in names):
         return {name: mathtext(name) for name in names}
@@ -48,12 +43,7 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
 
 
 def method_label(name: str) -> str:
-    """Return the name of a method as a figure shows it.
-
-    Parameters
-    ----------
-    name : as in the registry.
-    """
+    """Return the name of a method as a figure shows it."""
     return mathtext(name.replace("_", " "))
 
 
@@ -62,7 +52,6 @@ def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
 
     Parameters
     ----------
-    axes : panel.
     which : "x" or "y".
     low : smallest value shown [%].
     high : largest value shown [%].
@@ -124,19 +113,13 @@ def methods_figure(comparison: Comparison) -> Figure:
     axes.tick_params(axis="y", length=0.0)
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(rows) + len(floors) - 0.5, -0.5)
-    axes.set_xlabel("axle force RMSE, both axles [% of rms force]")
+    axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
     legend_above(figure)
     return figure
 
 
 def method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
-    """Return by kind all errors of a method that did not diverge [%].
-
-    Parameters
-    ----------
-    comparison : the methods.
-    name : of the method.
-    """
+    """Return by kind all errors of a method that did not diverge [%]."""
     trial, course = comparison.trials[name], comparison.course
     sane = {rec: error for rec, error in trial.online.items() if rec not in trial.diverged_at}
     online = [course.share(rec, error) for rec, error in sane.items()]
@@ -144,13 +127,7 @@ def method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
 
 
 def floor_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
-    """Return by kind all errors of offline fits [%].
-
-    Parameters
-    ----------
-    comparison : the methods.
-    name : of the floor.
-    """
+    """Return by kind all errors of offline fits [%]."""
     return _frozen_errors(comparison, comparison.floors[name])
 
 
@@ -226,7 +203,7 @@ def matrix_figure(comparison: Comparison) -> Figure:
             axes.set_yticklabels([])
     figure.supylabel("learnt on", fontsize=8.0)
     figure.supxlabel("frozen, replayed on", fontsize=8.0)
-    figure.suptitle("axle force RMSE, both axles [% of rms force]", fontsize=8.0)
+    figure.suptitle(f"{comparison.course.measure}, both axles [% of rms force]", fontsize=8.0)
     return figure
 
 

@@ -119,12 +119,7 @@ TIRES: Mapping[str, Mapping[str, Any]] = {
 
 
 def tire_look(label: str) -> dict[str, Any]:
-    """Return color, line style and width of a tire in every figure.
-
-    Parameters
-    ----------
-    label : that begins with the name of the tire.
-    """
+    """Return color, line style and width of a tire in every figure."""
     look = dict(TIRES.get(label.split()[0], TIRES["frozen"]))
     return look | {"linestyle": LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
@@ -150,7 +145,6 @@ def drive_errors_figure(
     drives : by the name in the legend; the first is drawn on top.
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
-    faults : of the sensors, shaded while the first car drives.
     """
     figure = new_figure(PAGE, 5.2)
     panels = figure.subplots(4, 1, sharex=True)
@@ -192,7 +186,6 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
 
     Parameters
     ----------
-    axes : panel over arc length.
     drops : arc length [m] and friction from there on.
     """
     for place, mu in drops:
@@ -206,7 +199,6 @@ def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[Sens
 
     Parameters
     ----------
-    axes : panel over arc length.
     drives : by the name in the legend; faults are placed by the time of the first.
     """
     from mpc.handover.rules import Verdict
@@ -295,7 +287,6 @@ def drive_steering_figure(
     angle_limit : that the tracker keeps [rad].
     rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
-    faults : of the sensors, shaded while the first car drives.
     """
     figure = new_figure(PAGE, 3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
@@ -362,7 +353,6 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
 
     Parameters
     ----------
-    vehicle : gives the size.
     X, Y : center of gravity [m].
     psi : heading [rad].
     delta : angle of the front wheels [rad], positive to the left.

@@ -63,12 +63,7 @@ def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
 
 @styled
 def curves_figure(groups: Sequence[Merged]) -> Figure:
-    """Draw the force curves of groups, as far as they are known.
-
-    Parameters
-    ----------
-    groups : merged models.
-    """
+    """Draw the force curves of groups, as far as they are known."""
     figure = new_figure(PAGE, 3.0)
     panels = figure.subplots(1, 2, sharey=True)
     for k, one in enumerate(groups):
@@ -88,14 +83,7 @@ def curves_figure(groups: Sequence[Merged]) -> Figure:
 
 @styled
 def watch_figure(car: str, seen: Seen, alarms: Sequence[Alarm]) -> Figure:
-    """Draw how a car's tires differ from its baseline, part by part, and what was noticed.
-
-    Parameters
-    ----------
-    car : its name.
-    seen : its parts after the baseline.
-    alarms : of this car.
-    """
+    """Draw how a car's tires differ from its baseline, part by part, and what was noticed."""
     figure = new_figure(PAGE, 4.8)
     panels = figure.subplots(len(TITLES), 1, sharex=True)
     minutes = seen.driven / 60.0

@@ -1,5 +1,7 @@
 """Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below.
 
+A method that learns from a whole log has replays alone.
+
 And those that the motion shows, over slip angle, as a log is told and as the doctor repairs it.
 """
 
@@ -12,6 +14,7 @@ from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from identifier.doctor.consistency import Motion, Reading, forces_and_slips
+from identifier.prediction import Prediction
 from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
@@ -58,11 +61,11 @@ def force_figure(
     Above each panel stands the error, whatever the window shows: against the true force, or
     against the online force where there is no truth. That of a replay is the one it was made with;
     below it stands the paper's measure, the past against online, where both sides are known. The
-    lowest row shows what the online run and the last freeze miss of that force.
+    lowest row shows what the online run and the last freeze miss of that force. Of a method that
+    learns from a whole log there is no online run: it has neither panel nor residual.
 
     Parameters
     ----------
-    history : the online run.
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
     window : first and last time to show [s]; None shows all.
     since : time from which the error of the online run counts [s], as in the replays; None counts
@@ -82,18 +85,20 @@ def force_figure(
                 f"the online run of {recording.name}"
             )
     ends = time_window(recording.t, window)
-    curves = [history.axle_force, *(replay.axle_force for replay in replays.values())]
-    part = shown(recording.t, ends, *_with_residuals(curves, truth))
+    first = int(history.online)  # rows of the online run
+    curves = [history.axle_force] * first + [*(replay.axle_force for replay in replays.values())]
+    part = shown(recording.t, ends, *_with_residuals(curves or [history.axle_force], truth))
     t, online = drawn_times(recording, recording.t[part]), history.axle_force[part]
     reference = online if truth is None else truth[part]
     unit = force_unit_of(reference)
     frozen = {at: replay.axle_force[part] / unit.newtons for at, replay in replays.items()}
     limits = force_range(reference / unit.newtons, online / unit.newtons, *frozen.values())
 
-    missed = [] if truth is None else [(online / unit.newtons, ONLINE)]
-    missed += [(force, FROZEN) for force in list(frozen.values())[-1:]]
+    missed = [(online / unit.newtons, ONLINE)] if truth is not None and first else []
+    if truth is not None or first:
+        missed += [(force, FROZEN) for force in list(frozen.values())[-1:]]
     missed = [(force - reference / unit.newtons, look) for force, look in missed]
-    rows = 1 + len(replays)
+    rows = first + len(replays)
     ratios = [1.45] * rows + [1.05] * bool(missed)
     figure = new_figure(PAGE, 0.85 + sum(ratios))
     panels = figure.subplots(
@@ -105,17 +110,20 @@ def force_figure(
             axes.set(xlim=ends, ylim=limits)
             if truth is not None:
                 axes.plot(t, truth[part, axle] / unit.newtons, **TRUTH)
-            axes.plot(t, drawable(online[:, axle] / unit.newtons, limits), **ONLINE)
-        panels[0, axle].set_title(f"{name}, online")
+            if first:
+                axes.plot(t, drawable(online[:, axle] / unit.newtons, limits), **ONLINE)
+        if first:
+            panels[0, axle].set_title(f"{name}, online")
         if history.diverged_at is not None:
             note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
         elif error is not None:
             note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
-        for axes, (at, replay) in zip(panels[1:rows, axle], replays.items(), strict=True):
+        for axes, (at, replay) in zip(panels[first:rows, axle], replays.items(), strict=True):
             axes.plot(t, drawable(frozen[at][:, axle], limits), **FROZEN)
             axes.set_title(f"{name}, {frozen_title(recording.t, at)}")
             note(axes, _errors(replay, unit, axle))
-            mark_freeze(panels[0, axle], at, prediction=False)
+            if first:
+                mark_freeze(panels[0, axle], at, prediction=False)
             mark_freeze(axes, at, prediction=True)
         if missed:
             _draw_missed(panels[-1, axle], t, [(force[:, axle], look) for force, look in missed])
@@ -163,6 +171,8 @@ def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
     against = replay.against_truth
     if against is not None:
         said = f"RMSE {unit.format(against, axle)}"
+    elif replay.against_online is None:
+        return ""
     else:
         said = f"RMSE to online {unit.format(replay.against_online, axle)}"
     sides = replay.reproduction
@@ -176,7 +186,7 @@ def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
 
 @styled
 def prediction_figure(
-    replay: Replay, online: History | None = None, *, window: Window = None
+    replay: Replay | Prediction, online: History | None = None, *, window: Window = None
 ) -> Figure:
     """Draw a frozen model on a recording it did not learn from, with what it misses below.
 
@@ -230,7 +240,7 @@ def prediction_figure(
         upper.plot(t, drawable(frozen[:, axle], limits), **FROZEN)
         if error is not None:
             note(upper, f"RMSE {unit.format(error, axle)}")
-        elif known is not None:
+        elif isinstance(replay, Replay) and known is not None and replay.against_online is not None:
             note(upper, f"RMSE to online {unit.format(replay.against_online, axle)}")
         label_time(panels[-1, axle], recording.t)
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
@@ -248,10 +258,6 @@ COLORS = (ORANGE, BLUE, GREEN, PURPLE)
 @styled
 def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
     """Draw the forces of several frozen models over one drive, and what each misses.
-
-    Parameters
-    ----------
-    replays : by the name in the legend, replays of one recording that has true forces.
 
     Raises
     ------
@@ -354,7 +360,6 @@ def draw_diagnosis(
 
     Parameters
     ----------
-    recording, vehicle : as they were told.
     repaired, car : with the repair; the same where there is none.
     """
     figure = new_figure(PAGE, 2.9)

@@ -56,7 +56,6 @@ def error_figure(
 
     Parameters
     ----------
-    history : the online run.
     bounds : by name, bounds on the norm [U s]; one that is not finite is left out.
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
@@ -125,7 +124,6 @@ def weights_figure(
 
     Parameters
     ----------
-    history : the online run.
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
 
@@ -268,7 +266,6 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
 
     Parameters
     ----------
-    loop : the loop at the worst regressor.
     integrator : "euler" or "rk4".
     dt : sampling interval [s].
     """

@@ -55,7 +55,6 @@ def side_slip_figure(
     Parameters
     ----------
     recordings : that the methods ran over; the first few are drawn.
-    told : by method, by recording, what it told.
 
     Raises
     ------
@@ -136,11 +135,8 @@ def _degrees(v_y: Array, v_x: Array) -> Array:
 
 @styled
 def drive_lateral_figure(drive: "Drive") -> Figure:
-    """Draw the v_y that was told over the true one, and its error, each with the band of two sigma.
-
-    Parameters
-    ----------
-    drive : of a car whose v_y was told.
+    """Draw the v_y that was told over the true one, and its error, each with the band of two
+    sigma.
     """
     told, band = drive.told["v_y"], SIGMAS * drive.told["v_y_sd"]
     inertial = drive.told["inertial_v_y"]

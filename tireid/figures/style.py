@@ -15,13 +15,13 @@ from typing import Any, NamedTuple, ParamSpec
 import numpy as np
 from matplotlib import font_manager, get_data_path, style
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 from codegen.arrays import Array
+from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
@@ -84,12 +84,7 @@ LOOK: dict[str, Any] = {
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Return a drawing function that works in the look of the project, whatever the user's own.
-
-    Parameters
-    ----------
-    draw : function that makes a figure.
-    """
+    """Return a drawing function that works in the look of the project, whatever the user's own."""
 
     @wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
@@ -106,13 +101,7 @@ class PlainNumbers(ScalarFormatter):
     """
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return a number of the axis.
-
-        Parameters
-        ----------
-        x : where it stands.
-        pos : which of them it is.
-        """
+        """Return a number of the axis."""
         return MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
 
 
@@ -165,67 +154,16 @@ def _lay_out(figure: Figure) -> None:
         figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
 
 
-ASKED_OFTEN = ("_update_ticks", "_get_ticklabel_bboxes")  # of an axis, ten times a drawing
-
-
-@contextmanager
-def _ticks_found_once(figure: Figure) -> Iterator[None]:
-    """Let axes remember their ticks, and the boxes of their labels, for as long as they stay put.
-
-    Matplotlib finds them anew for the axis, its label, each title and each spine.
-
-    Parameters
-    ----------
-    figure : that is laid out and drawn meanwhile, and not changed.
-    """
-    every = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
-    # They are not promised by Matplotlib: where it has them no more it finds what it finds.
-    known = [(axis, name) for axis in every for name in ASKED_OFTEN if hasattr(axis, name)]
-    for axis, name in known:
-        setattr(axis, name, _remembered(axis, getattr(axis, name)))
-    try:
-        yield
-    finally:
-        for axis, name in known:
-            delattr(axis, name)
-
-
-def _remembered(axis: Axis, find: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that finds something of an axis again only where it has moved."""
-    found: list[Any] = [None, None]
-
-    def find_once(*args: Any) -> Any:
-        panel = axis.axes
-        place = (*axis.get_view_interval(), *panel.bbox.bounds, panel.figure.dpi)
-        if found[0] != place:
-            found[:] = place, find(*args)
-        return found[1]
-
-    return find_once
-
-
 @contextmanager
 def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
-    """Lay a figure out, and let it be drawn in the look of the project meanwhile.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    look : what differs from Matplotlib's own.
-    """
-    with style.context(["default", dict(look)]), _ticks_found_once(figure):
+    """Lay a figure out, and let it be drawn in the look of the project meanwhile."""
+    with style.context(["default", dict(look)]):
         _lay_out(figure)
         yield
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
-    """Return a figure as PNG, the same bytes for the same figure.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    resolution : dots per inch.
-    """
+    """Return a figure as PNG, the same bytes for the same figure."""
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
@@ -242,12 +180,7 @@ VECTOR: dict[str, Any] = {
 
 
 def figure_svg(figure: Figure) -> bytes:
-    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    """
+    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
     with laid_out(figure, {**LOOK, **VECTOR}):
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
@@ -259,13 +192,8 @@ DIGITS = re.compile(rb"(?<=\.\d\d)\d+")  # more are not seen
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG.
-
-    Parameters
-    ----------
-    figure : as a function of this package returns it.
-    """
-    path.write_bytes(figure_png(figure))
+    """Write a figure as PNG."""
+    write_file(path, figure_png(figure))
 
 
 # Parts that several figures share: time axes, freeze marks, legends, errors in titles.
@@ -308,7 +236,6 @@ def label_time(axes: Axes, t: Array) -> None:
 
     Parameters
     ----------
-    axes : panel over the time of a recording.
     t : times of the samples (n,) [s].
     """
     zero = clock_zero(t)
@@ -347,7 +274,6 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
 
     Parameters
     ----------
-    axes : panel over time.
     t_freeze : time of the freeze [s].
     prediction : whether the panel shows a replay.
     """
@@ -366,12 +292,7 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
 
 
 def note(axes: Axes, text: str) -> None:
-    """Write a short text above the right end of a panel, opposite to its title.
-
-    Parameters
-    ----------
-    text : what to write.
-    """
+    """Write a short text above the right end of a panel, opposite to its title."""
     axes.set_title(text, loc="right", color="#444444")
 
 
@@ -382,7 +303,6 @@ def legend_above(
 
     Parameters
     ----------
-    figure : figure with a constrained layout.
     columns : entries in a row; None puts all in one.
     order : labels that come after all others, in this order.
     """
@@ -404,12 +324,7 @@ def legend_above(
 
 
 def legend_beside(axes: Axes) -> None:
-    """Put the legend of one panel to its right, where it covers no data.
-
-    Parameters
-    ----------
-    axes : a panel that is as wide as its figure.
-    """
+    """Put the legend of one panel to its right, where it covers no data."""
     handles, labels = axes.get_legend_handles_labels()
     entries = dict(zip(labels, handles, strict=True))
     legend = axes.legend(
@@ -481,10 +396,6 @@ def impulse_unit(force_unit: float) -> str:
 def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units.
 
-    Parameters
-    ----------
-    history : an online run.
-
     Raises
     ------
     TypeError
@@ -521,7 +432,6 @@ def drawable(curve: Array, limits: tuple[float, float]) -> Array:
     Parameters
     ----------
     curve : in the unit of the axis (of any shape).
-    limits : ends of the axis.
     """
     low, high = limits
     reach = 10.0 * (high - low)

@@ -52,7 +52,6 @@ def drawn_times(recording: Recording, t: Array) -> Array:
 
     Parameters
     ----------
-    recording : in stretches, or in one.
     t : times of some of its samples, rising (k,) [s].
     """
     begins = recording.t[list(recording.breaks)]
@@ -66,7 +65,6 @@ def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     Parameters
     ----------
     signals : (k,) or (k, m) each; the last neighbors may be fewer.
-    width : samples of a column.
     """
     found = []
     for signal in signals:
@@ -86,9 +84,7 @@ class DrawnRun:
 
     Parameters
     ----------
-    history : the run.
     ends : first and last time [s].
-    tell : returns what is drawn of a block, one value a sample.
     """
 
     def __init__(
@@ -132,9 +128,7 @@ def shown_of_run(
 
     Parameters
     ----------
-    history : the run.
     ends : first and last time [s].
-    tell : returns what is drawn of a block, one value a sample.
     """
     drawn = DrawnRun(history, ends, tell)
     for block in history.blocks():
@@ -147,7 +141,6 @@ def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> S
 
     Parameters
     ----------
-    n : samples.
     slips : across (k, m).
     heights : of each curve (k, m).
     counts : whether samples are drawn at all (k,).

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
+from identifier.measured import printed_scale, printed_unit
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
@@ -62,7 +63,6 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     Parameters
     ----------
     model : the frozen model; its vehicle gives the axle positions and the linear tire.
-    recording : where the model is evaluated.
     online : an online run over the recording, drawn where there is no truth.
 
     Raises
@@ -149,7 +149,14 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     if band is not None:
         low, high = (force[:, axle] / newtons for force in band)
         axes.fill_between(
-            np.rad2deg(slip), low, high, color=SKY, alpha=0.35, linewidth=0.0, label=BAND
+            np.rad2deg(slip),
+            low,
+            high,
+            facecolor=(SKY, 0.6),
+            edgecolor=BLUE,
+            linewidth=0.4,
+            zorder=3,
+            label=BAND,
         )
     for side in model.guaranteed_band(slip) or ():
         axes.plot(
@@ -165,6 +172,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         model.force(slip)[:, axle] / newtons,
         color=BLUE,
         linewidth=1.2,
+        zorder=4,
         label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
     )
 
@@ -185,7 +193,6 @@ class TireCurve:
 
     Parameters
     ----------
-    label : what legends call it.
     alpha : slip in the paper's sign [rad], (k,).
     force : of front and rear axle [N], (k, 2).
     """
@@ -196,12 +203,7 @@ class TireCurve:
 
 
 def axle_slip(drive: "Drive") -> Array:
-    """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2).
-
-    Parameters
-    ----------
-    drive : its true motion is taken.
-    """
+    """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2)."""
     car = drive.vehicle
     motion = {"v_x": drive.v_x, "v_y": drive.v_y, "r": drive.r}
     return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
@@ -217,10 +219,6 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     """Draw the forces of a drive as a cloud, and the curves that trackers believed.
 
     Below stands what each curve misses of the true one, where the true one is known.
-
-    Parameters
-    ----------
-    curves : steady forces of the tires to compare.
     """
     unit = force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
@@ -285,12 +283,7 @@ def _missed_of_truth(
 
 
 def drawn_tracks(history: History) -> DrawnRun | None:
-    """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to.
-
-    Parameters
-    ----------
-    history : a run.
-    """
+    """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to."""
     if not history.tracks_over(next(history.blocks())):
         return None
     t = history.recording.t
@@ -331,9 +324,7 @@ def learnt_axles_figure(
     figure = new_figure(PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
-        label = f"{title}\n[{unit}]"
-        if unit == "N/rad" and float(values.max()) >= 1000.0:
-            label, values = f"{title}\n[kN/rad]", values / 1000.0
+        label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
         for axle, color in enumerate((GREEN, PURPLE)):
             axes.plot(at, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))

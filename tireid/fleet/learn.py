@@ -1,10 +1,13 @@
 """Learning from thousands of logs: which they are, what is learnt of one, and who does it.
 
-A log is read, learnt and frozen by the default method as `tireid identify` does it, without
+A log is read, learnt and frozen by the axle identifier as `tireid identify` does it, without
 figures; then it is gone through once more for what it tells of the tires, with its own frozen model
 as the reference (`identifier.axle.information`). A log that cannot be used becomes a row with its
 error. Work is done by processes of this machine or by a Dask cluster; a process that dies loses
 what it was doing, which is done again, and a log that it dies of twice becomes a row with an error.
+
+A log is known by the hash of its content and by its setting, wherever it lies; whoever reads it
+computes the hash. A file whose name, size and time are those of a row is not read again.
 """
 
 import hashlib
@@ -13,14 +16,15 @@ import os
 import posixpath
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -32,15 +36,15 @@ from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
 from identifier.run import identify, learn
-from identifier.stored import load_model
-from identifier.tire_model import AXLES
-from identifier.verdict import Verdict, judge_prediction
+from identifier.tire_model import AXLES, TireModel
+from identifier.verdict import Verdict, judge, judge_prediction
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
-from tireid.fleet.store import LogRow, Store, bucket_of, file_of, information_columns, needed
+from tireid.fleet.store import INDEX, LogRow, Store, information_columns, needed, protocols
 
-TOGETHER = 8  # logs that a process takes at once, and whose rows are written at once
+TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
+PORTIONS = 16  # that few logs are shared into
 PART = 300.0  # s of a log whose information is kept as one
 DT = 0.01  # s, to which logs are brought
 Judging = Literal["motion", "full", "none"]
@@ -55,15 +59,17 @@ class Task:
 
     Parameters
     ----------
-    log : its name: path or address.
+    log : its name: absolute path or address, or where it lies under a root.
+    address : absolute path or address, by which any process reads it.
     size : [bytes].
-    tags : what its path says.
+    stamp : hash of what its file system says of it and what changes with it; empty where nothing.
     date : when it was driven, ISO 8601; of its path, else when the file was written.
-    vehicle : path of the car's TOML.
     """
 
     log: str
+    address: str
     size: int
+    stamp: str
     tags: tuple[tuple[str, str], ...]
     date: str
     vehicle: Path
@@ -75,8 +81,7 @@ class Telling:
 
     Parameters
     ----------
-    log_map : how they are read and repaired.
-    weights : stored model that learning begins with; None begins afresh.
+    start : model that learning begins with; None begins afresh.
     judging : "motion" asks whether the frozen model gives the drive's motion back, "full" for the
         verdict of `tireid identify`, which takes ten times as long, "none" for nothing.
     check : whether a log that contradicts physics or the car is refused.
@@ -84,7 +89,7 @@ class Telling:
     """
 
     log_map: LogMap
-    weights: Path | None = None
+    start: TireModel | None = None
     judging: Judging = "motion"
     check: bool = True
     part: float = PART
@@ -92,40 +97,66 @@ class Telling:
     def __post_init__(self) -> None:
         if not 10.0 <= self.part < float("inf"):
             raise ValueError(f"a part must last at least 10 s, it is {self.part:g} s")
+        if self.log_map.dbc:  # whoever reads a log may run in another folder
+            told = replace(self.log_map, dbc=str(Path(self.log_map.dbc).absolute()))
+            object.__setattr__(self, "log_map", told)
 
-    def digest(self, vehicle: Path) -> str:
-        """Return the hash of all that a row follows from beside its log.
+    def digest(self, vehicle: Vehicle) -> str:
+        """Return the hash of all that a row follows from beside its log: car, method, options.
 
-        Parameters
-        ----------
-        vehicle : the car's TOML.
+        Files count by what they hold, not by their names.
         """
-        files = [vehicle.read_bytes(), b"" if self.weights is None else self.weights.read_bytes()]
-        words = repr((self.log_map, self.judging, self.check, self.part)).encode()
-        return hashlib.blake2b(b"\0".join((*files, words)), digest_size=8).hexdigest()
+        dbc = self.log_map.dbc
+        parts = (
+            vehicle,
+            AxleIdentifier.for_vehicle(vehicle, dt=DT),
+            InertialIdentifier.for_vehicle(vehicle, dt=DT),
+            replace(self.log_map, dbc=""),
+            Path(dbc).read_bytes() if dbc else b"",
+            None if self.start is None else json.dumps(self.start.to_dict()),
+            (self.judging, self.check, self.part),
+        )
+        told = "\0".join(map(repr, parts)).encode()
+        return hashlib.blake2b(told, digest_size=8).hexdigest()
+
+
+class Car(NamedTuple):
+    """A car that drove logs, and `Telling.digest` of it."""
+
+    vehicle: Vehicle
+    setting: str
+
+    @classmethod
+    def read(cls, path: Path, telling: Telling) -> "Car":
+        """Read a car once, for processes that may not reach its file."""
+        vehicle = Vehicle.from_toml(path)
+        if vehicle.chassis is not None:  # the tires are what is learnt
+            vehicle = replace(vehicle, chassis=replace(vehicle.chassis, tire=None))
+        return cls(vehicle, telling.digest(vehicle))
 
 
 # Which logs there are, and what their paths say.
 
 
 def find_logs(
-    patterns: Sequence[str], vehicle: str, tags: str = ""
+    patterns: Sequence[str], vehicle: str, tags: str = "", root: str = ""
 ) -> tuple[list[Task], dict[str, str]]:
     """Return the logs that patterns name, in order, and why others are left out.
 
     Parameters
     ----------
-    patterns : paths or addresses with * and **.
     vehicle : path of the car's TOML; {name} in it is replaced by the tag of that name.
     tags : pattern of a path's end with {name} for its parts, as in
         "{vehicle}/{tires}/{date}-{drive}.csv"; empty says nothing.
+    root : folder or address that names begin at; empty leaves them absolute.
 
     Raises
     ------
     ValueError
-        Where a pattern names no log, or {name} is no tag.
+        Where a pattern names no log or one outside of the root, or {name} is no tag.
     """
     core = needed("fsspec.core")
+    above = _absolute(root) if root else ""
     shape = tag_pattern(tags) if tags else None
     unknown = [one for one in FIELD.findall(vehicle) if one not in FIELD.findall(tags)]
     if unknown:
@@ -134,7 +165,6 @@ def find_logs(
     left: dict[str, str] = {}
     for pattern in patterns:
         fs, path = core.url_to_fs(pattern)
-        local = "://" not in pattern
         try:
             listed = fs.glob(path, detail=True)
         except (ValueError, OSError) as error:
@@ -143,21 +173,26 @@ def find_logs(
         if not files:
             raise ValueError(f"{pattern}: names no log")
         for name, info in sorted(files.items()):
-            log = _local_name(name) if local else fs.unstrip_protocol(name)
-            said = shape.search(posixpath.normpath(log)) if shape is not None else None
+            address = _address(fs, name)
+            if root and not address.startswith(above):
+                raise ValueError(f"{address}: does not lie under --root {root}")
+            log = address.removeprefix(above)
+            said = shape.search(posixpath.normpath(address)) if shape is not None else None
             if shape is not None and said is None:
                 left[log] = f"its path is not like {tags}"
                 continue
             words = {} if said is None else said.groupdict()
             car = FIELD.sub(lambda field, words=words: words[field[1]], vehicle)  # type: ignore[misc]
-            found[log] = Task(
+            found[address] = Task(
                 log=log,
+                address=address,
                 size=int(info.get("size") or 0),
+                stamp=_stamp(address, info),
                 tags=tuple(sorted(words.items())),
                 date=words.get("date") or _written(info),
                 vehicle=Path(car),
             )
-    return [found[log] for log in sorted(found)], left
+    return [found[address] for address in sorted(found)], left
 
 
 def tag_pattern(tags: str) -> re.Pattern[str]:
@@ -182,12 +217,31 @@ def tag_pattern(tags: str) -> re.Pattern[str]:
     return re.compile(rf"(?:^|/){body}$")
 
 
-def _local_name(path: str) -> str:
-    """Return a path as it reads from the folder that the command runs in, where it lies there."""
-    try:
-        return Path(path).relative_to(Path.cwd()).as_posix()
-    except ValueError:
-        return Path(path).as_posix()
+def _address(fs: Any, path: str) -> str:
+    """Return where a file lies, for any process: an absolute path, or an address."""
+    return path if "file" in protocols(fs) else str(fs.unstrip_protocol(path))
+
+
+def _absolute(root: str) -> str:
+    """Return a root as addresses under it begin."""
+    return _address(*needed("fsspec.core").url_to_fs(root)).rstrip("/") + "/"
+
+
+CHANGES = ("etag", "lastmodified", "md5hash", "contentmd5", "generation", "mtime", "created")
+
+
+def _stamp(address: str, info: Mapping[str, Any]) -> str:
+    """Return a hash of what changes with a file; empty where its file system tells nothing."""
+    if "://" not in address:
+        at = Path(address).stat()  # of the file itself, where `info` is of a link to it
+        told: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
+    else:
+        some = {key.replace("_", "").lower(): value for key, value in info.items()}
+        told = [(key, str(some[key])) for key in CHANGES if some.get(key)]
+        if not told:
+            return ""
+        told.append(("size", info.get("size")))
+    return hashlib.blake2b(repr(told).encode(), digest_size=8).hexdigest()
 
 
 def _written(info: Mapping[str, Any]) -> str:
@@ -202,46 +256,56 @@ def _written(info: Mapping[str, Any]) -> str:
 # What is learnt of one.
 
 
-def learn_log(task: Task, telling: Telling, setting: str) -> list[LogRow]:
+def learn_log(task: Task, telling: Telling, car: Car, known: Set[str] = frozenset()) -> "Learnt":
     """Return the row of a log, one for each run of its file; where it cannot be used, it says why.
 
     Parameters
     ----------
-    task : the log.
-    telling : what is told of all logs.
-    setting : `Telling.digest` of its car.
+    known : `LogRow.known` of logs that are not learnt again.
     """
-    tags = dict(task.tags)
-    vehicle_name = tags.get("vehicle", "")
-    row = LogRow(
-        log=task.log,
-        setting=setting,
-        size=task.size,
-        vehicle=vehicle_name,
-        tires=tags.get("tires", ""),
-        date=task.date,
-        tags=json.dumps(tags, ensure_ascii=False, sort_keys=True),
-    )
+    row = row_of(task, car)
     try:
-        vehicle = Vehicle.from_toml(task.vehicle)
-        row = replace(row, vehicle=vehicle_name or vehicle.name)
-        with _near(task.log) as path:
+        with _near(task.address) as path:
+            row = replace(row, content=content_of(path))
+            if row.known in known:
+                return Learnt([], [(row.log, row.known)])
             try:
-                return [_of_run(row, path, None, vehicle, telling)]
+                return Learnt([_of_run(row, path, car.vehicle, telling)], [])
             except RecordingError:
                 names = [] if telling.log_map.dbc or telling.log_map.run else runs(path)
                 if len(names) < 2:
                     raise
-            return [_tried(replace(row, log=f"{row.log}:{name}"), path, name, vehicle, telling)
-                    for name in names]  # fmt: skip
+            each = [replace(row, run=name) for name in names]
+            return Learnt([_tried(one, path, car.vehicle, telling) for one in each], [])
     except EXPECTED as error:
-        return [_failed(row, error)]
+        return Learnt([_failed(row, error)], [])
 
 
-def _tried(row: LogRow, path: Path, run: str, vehicle: Vehicle, telling: Telling) -> LogRow:
+def row_of(task: Task, car: Car) -> LogRow:
+    """Return the row of a log of which nothing was read yet."""
+    tags = dict(task.tags)
+    return LogRow(
+        log=task.log,
+        setting=car.setting,
+        size=task.size,
+        stamp=task.stamp,
+        vehicle=tags.get("vehicle", "") or car.vehicle.name,
+        tires=tags.get("tires", ""),
+        date=task.date,
+        tags=json.dumps(tags, ensure_ascii=False, sort_keys=True),
+    )
+
+
+def content_of(path: Path) -> str:
+    """Return the hash of what a file holds."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, partial(hashlib.blake2b, digest_size=16)).hexdigest()
+
+
+def _tried(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRow:
     """Return the row of a run; where it cannot be used, it says why."""
     try:
-        return _of_run(row, path, run, vehicle, telling)
+        return _of_run(row, path, vehicle, telling)
     except EXPECTED as error:
         return _failed(row, error)
 
@@ -251,9 +315,9 @@ def _failed(row: LogRow, error: Exception) -> LogRow:
     return replace(row, error=text[:500])
 
 
-def _of_run(row: LogRow, path: Path, run: str | None, vehicle: Vehicle, telling: Telling) -> LogRow:
+def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRow:
     recording, vehicle = read_repaired(
-        path, vehicle, run, dt=DT, check=telling.check, log_map=telling.log_map
+        path, vehicle, row.run or None, dt=DT, check=telling.check, log_map=telling.log_map
     )
     return learnt(row, recording, vehicle, telling)
 
@@ -263,27 +327,23 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
 
     Parameters
     ----------
-    row : the log's name and what its path says.
     recording : the log, at `DT`.
-    vehicle : the car that drove.
-    telling : what is told of all logs.
 
     Raises
     ------
     ValueError, ArithmeticError
         Where nothing can be learnt of it.
     """
-    start = None if telling.weights is None else load_model(telling.weights)
     usual = InertialIdentifier if recording.logged_v_y is None else AxleIdentifier
     method = usual.for_vehicle(vehicle, dt=recording.dt)
     counted_samples(recording, method.min_speed)  # refuses a car that never drives
     verdict: Verdict | None = None
     if recording.logged_v_y is None or telling.judging == "full":
-        history = identify(recording, vehicle, method, start)
+        history = identify(recording, vehicle, method, telling.start)
         recording, model = history.recording, history.freeze()
-        verdict = history.verdict() if telling.judging == "full" else None
+        verdict = judge(history) if telling.judging == "full" else None
     else:
-        model = learn(recording, vehicle, method, start)
+        model = learn(recording, vehicle, method, telling.start)
     if not isinstance(model, AxleModel):
         raise TypeError(f"{type(method).__name__} freezes no axle model")
     if telling.judging == "motion":
@@ -317,12 +377,7 @@ def _near(log: str) -> Iterator[Path]:
 
 
 def conditions(recording: Recording) -> dict[str, Any]:
-    """Return how a log was driven, by columns of a row.
-
-    Parameters
-    ----------
-    recording : the log.
-    """
+    """Return how a log was driven, by columns of a row."""
     a_y = recording.v_x * recording.r
     return {
         "seconds": recording.duration,
@@ -367,29 +422,51 @@ def _of_model(model: AxleModel) -> dict[str, Any]:
 # Who does it.
 
 
+class Learnt(NamedTuple):
+    """Rows of some logs; and the names and `LogRow.known` of others, which a store has."""
+
+    rows: list[LogRow]
+    copies: list[tuple[str, str]]
+
+
 @dataclass(frozen=True, slots=True)
 class LearnSome:
     """Work of a process: a few logs.
 
     Parameters
     ----------
-    telling : what is told of all logs.
-    settings : `Telling.digest` by the car's TOML.
+    known : `LogRow.known` of logs that are not learnt again.
     """
 
     telling: Telling
-    settings: Mapping[Path, str]
+    cars: Mapping[Path, Car]
+    known: Set[str] = frozenset()
 
-    def __call__(self, tasks: Sequence[Task]) -> list[LogRow]:
-        """Return the rows of some logs.
+    def __call__(self, tasks: Sequence[Task]) -> Learnt:
+        """Return the rows of some logs."""
+        each = [learn_log(one, self.telling, self.cars[one.vehicle], self.known) for one in tasks]
+        return Learnt(
+            [row for one in each for row in one.rows], [two for one in each for two in one.copies]
+        )
 
-        Parameters
-        ----------
-        tasks : the logs.
-        """
-        return [
-            row for one in tasks for row in learn_log(one, self.telling, self.settings[one.vehicle])
-        ]
+    def died(self, task: Task) -> Learnt:
+        """Return the row of a log that processes die of."""
+        why = "the process that learnt it died, twice: it may want more memory than there is"
+        return Learnt([replace(row_of(task, self.cars[task.vehicle]), error=why)], [])
+
+
+class Done(NamedTuple):
+    """What became of logs.
+
+    learnt : how many were learnt now.   of : how many there are.
+    copies : names of those that a row has under another name, and that row's.
+    others : rows of the same logs with another setting, and of the same names with other content.
+    """
+
+    learnt: int
+    of: int
+    copies: list[tuple[str, str]]
+    others: list[LogRow]
 
 
 def learn_fleet(
@@ -399,49 +476,80 @@ def learn_fleet(
     spread_map: Map,
     *,
     again: bool = False,
+    replacing: bool = False,
     done: Callable[[int, int], None] | None = None,
-) -> tuple[int, int]:
-    """Learn the logs that a store has no row of, and keep what comes; return how many, and of all.
+) -> Done:
+    """Learn the logs that a store has no row of, and keep what comes.
 
     Parameters
     ----------
-    tasks : the logs.
-    telling : what is told of all of them.
     store : where rows are kept, some at a time, and sorted at the end.
     spread_map : does the work; results may come in any order.
     again : also learn logs whose row holds an error.
-    done : told how many logs are ready, and of how many.
+    replacing : take `Done.others` out of the store.
     """
-    settings = {one: telling.digest(one) for one in {task.vehicle for task in tasks}}
-    known = {
-        (name, row.setting, row.size)
-        for row in store.rows(("log", "setting", "size", "error"))
-        for name in (row.log, file_of(row.log))
-        if not (again and row.error)
-    }
-    left = [one for one in tasks if (one.log, settings[one.vehicle], one.size) not in known]
+    cars = {one: Car.read(one, telling) for one in {task.vehicle for task in tasks}}
+    before = [row for row in store.stream(INDEX) if not (again and row.error)]
+    by_name = {(row.log, row.setting, row.stamp): row.known for row in before}
+    names = {one: (one.log, cars[one.vehicle].setting, one.stamp) for one in tasks}
+    left = [one for one in tasks if not one.stamp or names[one] not in by_name]
+    current = {by_name[names[one]] for one in set(tasks) - set(left)}
+    work = LearnSome(telling, cars, frozenset(row.known for row in before))
     ready, of = len(tasks) - len(left), len(tasks)
+    learnt, copies = 0, list[tuple[str, str]]()
     if done is not None:
         done(ready, of)
-    for rows in spread_map(LearnSome(telling, settings), _together(left)):
-        store.keep(rows)
-        ready += len({file_of(row.log) for row in rows})
+    for found in spread_map(work, _portions(left)):
+        if found.rows:
+            store.keep(found.rows)
+        here = len({row.log for row in found.rows})
+        learnt, ready = learnt + here, ready + here + len(found.copies)
+        copies += found.copies
+        current |= {row.known for row in found.rows} | {known for _, known in found.copies}
         if done is not None:
             done(ready, of)
     store.settle()
-    return len(left), of
+    index = list(store.stream(INDEX))
+    store.drop(_overcome(index))
+    others = _others(index, {one.log for one in tasks}, current)
+    if replacing:
+        store.drop(others)
+    named = {row.known: row.log for row in index}
+    elsewhere = [(log, named[known]) for log, known in copies if named[known] != log]
+    return Done(learnt, of, elsewhere, others)
 
 
-def _together(tasks: Sequence[Task]) -> list[tuple[Task, ...]]:
-    """Return logs in portions, each of one bucket, in the order of the first log of each."""
-    open_: dict[int, list[Task]] = {}
-    portions: list[tuple[Task, ...]] = []
-    for task in tasks:
-        some = open_.setdefault(bucket_of(task.log), [])
-        some.append(task)
-        if len(some) == TOGETHER:
-            portions.append(tuple(open_.pop(bucket_of(task.log))))
-    return [*portions, *(tuple(some) for some in open_.values())]
+def _portions(tasks: Sequence[Task]) -> list[tuple[Task, ...]]:
+    """Return logs in portions, small ones where there are few."""
+    size = min(max(len(tasks) // PORTIONS, 1), TOGETHER)
+    return [tuple(tasks[k : k + size]) for k in range(0, len(tasks), size)]
+
+
+def _overcome(index: Sequence[LogRow]) -> list[LogRow]:
+    """Return rows of a log that could not be read or parted into runs, and then could."""
+    read = {(row.log, row.setting) for row in index if row.content}
+    parted = {row.known for row in index if row.run}
+    return [
+        row
+        for row in index
+        if (not row.content and (row.log, row.setting) in read)
+        or (row.error and not row.run and row.known in parted)
+    ]
+
+
+def _others(index: Sequence[LogRow], names: Set[str], current: Set[str]) -> list[LogRow]:
+    """Return rows of the same contents with another setting, or of the same names of other content.
+
+    Parameters
+    ----------
+    current : `LogRow.known` of what these logs hold.
+    """
+    contents = {row.content for row in index if row.content and row.known in current}
+    return [
+        row
+        for row in index
+        if row.known not in current and (row.content in contents or row.log in names)
+    ]
 
 
 def on_this_machine(jobs: int) -> Map:
@@ -454,16 +562,16 @@ def on_this_machine(jobs: int) -> Map:
     if jobs == 1:
         return map
 
-    def spread_map(work: Callable[[Any], Any], portions: Any) -> Iterator[list[LogRow]]:
+    def spread_map(work: Any, portions: Any) -> Iterator[Learnt]:
         left = list(portions)
         while left:
             finished: set[int] = set()
-            for k, rows in _until_one_dies(work, left, min(jobs, len(left))):
+            for k, found in _until_one_dies(work, left, min(jobs, len(left))):
                 finished.add(k)
-                yield rows
+                yield found
             left = [one for k, one in enumerate(left) if k not in finished]
             for suspect in left[: 2 * jobs]:  # of these one took its process with it
-                yield _carefully(work, suspect)
+                yield from _carefully(work, suspect)
             left = left[2 * jobs :]
 
     return spread_map
@@ -477,59 +585,57 @@ def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     elsewhere : of `tireid.cluster.cluster`; tells `lost` what several workers died of.
     """
 
-    def spread_map(work: Callable[[Any], Any], portions: Any) -> Iterator[list[LogRow]]:
+    def spread_map(work: Any, portions: Any) -> Iterator[Learnt]:
         suspects: list[Sequence[Task]] = []
         yield from elsewhere(work, portions, lost=suspects.append)
         alone = [(task,) for portion in suspects for task in portion]
         dead: list[Sequence[Task]] = []
         yield from elsewhere(work, alone, lost=dead.append)
         for portion in dead:
-            yield [_died(task, work) for task in portion]
+            yield from map(work.died, portion)
 
     return spread_map
 
 
-def _prepare_process() -> None:
+_WORK: list[LearnSome] = []  # of a process: told once, as it holds what the store knows
+
+
+def _prepare_process(work: LearnSome) -> None:
     """Keep a process to one thread; import pyarrow, which reads many short logs sooner."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ARROW_IO_THREADS"):
         os.environ.setdefault(name, "1")
     arrow.is_installed()
+    _WORK[:] = [work]
+
+
+def _work_of_process(portion: Sequence[Task]) -> Learnt:
+    return _WORK[0](portion)
 
 
 def _until_one_dies(
-    work: Callable[[Any], list[LogRow]], portions: Sequence[Any], jobs: int
-) -> Iterator[tuple[int, list[LogRow]]]:
-    """Yield which portion is done and its rows, as long as no process dies."""
-    pool = fresh_processes(jobs, _prepare_process)
+    work: LearnSome, portions: Sequence[Any], jobs: int
+) -> Iterator[tuple[int, Learnt]]:
+    """Yield which portion is done and what was learnt, as long as no process dies."""
+    pool = fresh_processes(jobs, partial(_prepare_process, work))
     try:
-        futures = {pool.submit(work, one): k for k, one in enumerate(portions)}
+        futures = {pool.submit(_work_of_process, one): k for k, one in enumerate(portions)}
         for future in as_completed(futures):
             try:
-                rows = future.result()
+                found = future.result()
             except BrokenProcessPool:
                 continue
-            yield futures[future], rows
+            yield futures[future], found
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _carefully(work: Callable[[Any], list[LogRow]], portion: Sequence[Task]) -> list[LogRow]:
-    """Return the rows of a portion from a process of its own; where it dies, log by log."""
-    for _, rows in _until_one_dies(work, [tuple(portion)], 1):
-        return rows
+def _carefully(work: LearnSome, portion: Sequence[Task]) -> Iterator[Learnt]:
+    """Yield what a process of its own learns of a portion; where it dies, log by log."""
+    for _, found in _until_one_dies(work, [tuple(portion)], 1):
+        yield found
+        return
     if len(portion) == 1:
-        return [_died(portion[0], work)]
-    return [row for task in portion for row in _carefully(work, [task])]
-
-
-def _died(task: Task, work: Any) -> LogRow:
-    return LogRow(
-        log=task.log,
-        setting=work.settings[task.vehicle],
-        size=task.size,
-        vehicle=dict(task.tags).get("vehicle", ""),
-        tires=dict(task.tags).get("tires", ""),
-        date=task.date,
-        tags=json.dumps(dict(task.tags), ensure_ascii=False, sort_keys=True),
-        error="the process that learnt it died, twice: it may want more memory than there is",
-    )
+        yield work.died(portion[0])
+        return
+    for task in portion:
+        yield from _carefully(work, [task])

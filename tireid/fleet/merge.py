@@ -8,27 +8,30 @@ it as by `WORTH` more cars. Where the next car starts is m, as sure as N(m, T + 
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.curve import EDGES
-from identifier.axle.information import Information, merged, posterior, reference_of, total
+from identifier.axle.information import Information, Total, merged, posterior, reference_of
 from models.vehicle import Vehicle
 from tireid.fleet.learn import DT
-from tireid.fleet.store import LogRow
+from tireid.fleet.store import INDEX, LogRow
 
 TAGGED = ("vehicle", "tires", "date")
-BY = (*TAGGED, "week", "month", "log")
+BY = (*TAGGED, "week", "month", "log", "setting")
+TOLD = ("excitation", "part_begin", "part_seconds", "part_samples", "matrix", "vector", "square")
+COLUMNS = (*INDEX, *TAGGED, "tags", "valid", "car", *TOLD)  # of a row, that are asked for here
 PASSES = 60  # of expectation and maximization
 WORTH = 2.0  # cars that the identifier's prior counts as
 
 
-class MergeError(ValueError):
+class MergeError(TireidError, ValueError):
     """Rows do not make a model together; the message says which, and what to do."""
 
 
@@ -39,9 +42,6 @@ class Merged:
     Parameters
     ----------
     key : what they have in common, by `BY` or tag.
-    logs : how many there are.
-    told : what they tell.
-    model : of it.
     """
 
     key: tuple[tuple[str, str], ...]
@@ -65,7 +65,6 @@ def key_of(row: LogRow, by: Sequence[str]) -> tuple[tuple[str, str], ...]:
 
     Parameters
     ----------
-    row : of the log.
     by : names of `BY` or of tags.
 
     Raises
@@ -81,21 +80,17 @@ def _value(row: LogRow, name: str) -> str:
         day = day_of(row)
         year, week, _ = day.isocalendar()
         return f"{year}-W{week:02d}" if name == "week" else f"{day:%Y-%m}"
-    if name in (*TAGGED, "log"):
+    if name in (*TAGGED, "log", "setting"):
         return str(getattr(row, name))
     tags = json.loads(row.tags)
     if name not in tags:
         known = ", ".join(dict.fromkeys((*BY, *sorted(tags))))
-        raise MergeError(f"{row.log}: {name!r} is none of what is known of it: {known}")
+        raise MergeError(f"{row.name}: {name!r} is none of what is known of it: {known}")
     return str(tags[name])
 
 
 def day_of(row: LogRow) -> date:
     """Return the day of a log.
-
-    Parameters
-    ----------
-    row : of the log.
 
     Raises
     ------
@@ -106,70 +101,104 @@ def day_of(row: LogRow) -> date:
         return date.fromisoformat(row.date[:10])
     except ValueError:
         raise MergeError(
-            f"{row.log}: its date {row.date!r} must begin with year-month-day, as in 2026-03-31"
+            f"{row.name}: its date {row.date!r} must begin with year-month-day, as in 2026-03-31"
         ) from None
 
 
-def usable(rows: Sequence[LogRow], *, refused: bool = False) -> list[LogRow]:
-    """Return the rows that a model can be made of.
+def usable(row: LogRow, *, refused: bool = False) -> bool:
+    """Return whether a model can be made of a row.
 
     Parameters
     ----------
-    rows : of logs.
-    refused : also those whose answer the verdict refuses.
+    refused : also where the verdict refuses its answer.
     """
-    return [
-        row
-        for row in rows
-        if not row.error and row.part_begin and (refused or row.valid is not False)
-    ]
+    return bool(not row.error and row.part_begin and (refused or row.valid is not False))
 
 
-def merge(rows: Sequence[LogRow], by: Sequence[str]) -> list[Merged]:
-    """Return the model of each group of logs, by its key.
+def grouped(
+    rows: Iterable[LogRow], by: Sequence[str]
+) -> Iterator[tuple[tuple[tuple[str, str], ...], LogRow]]:
+    """Yield rows with what they belong to.
 
     Parameters
     ----------
-    rows : usable ones.
+    by : names of `BY` or of tags.
+
+    Raises
+    ------
+    MergeError
+        Where the logs of a group are of several cars, or a log is in it twice, learnt with two
+        settings.
+    """
+    cars: dict[tuple[tuple[str, str], ...], tuple[str, str]] = {}
+    settings: dict[tuple[object, ...], str] = {}
+    for row in rows:
+        key = key_of(row, by)
+        car, first = cars.setdefault(key, (row.car, row.name))
+        if car != row.car:
+            raise MergeError(
+                f"{first} and {row.name} are of cars whose files differ: merge --by vehicle (or "
+                "tell it by --tags), or --by setting; fleet prior is for many cars"
+            )
+        setting = settings.setdefault((key, *row.key[:2]), row.setting)
+        if setting != row.setting:
+            raise MergeError(
+                f"{row.name} was learnt with two settings, {setting} and {row.setting}, and would "
+                "count twice: merge --by setting, choose one by --where, or keep the newest by "
+                "fleet learn --replace"
+            )
+        yield key, row
+
+
+def merge(rows: Iterable[LogRow], by: Sequence[str]) -> list[Merged]:
+    """Return the model of each group of logs, by its key; rows are held one at a time.
+
+    Parameters
+    ----------
     by : what the logs of a group have in common; empty merges all.
 
     Raises
     ------
     MergeError
-        Where the logs of a group are of several cars.
+        As of `grouped`.
     """
-    groups: dict[tuple[tuple[str, str], ...], list[LogRow]] = {}
-    for row in rows:
-        groups.setdefault(key_of(row, by), []).append(row)
-    return [_merged(key, some) for key, some in sorted(groups.items())]
+    sums: dict[tuple[tuple[str, str], ...], _Sum] = {}
+    for key, row in grouped(rows, by):
+        sums.setdefault(key, _Sum(row)).add(row)
+    return [one.merged(key) for key, one in sorted(sums.items(), key=lambda item: item[0])]
 
 
-def _merged(key: tuple[tuple[str, str], ...], rows: Sequence[LogRow]) -> Merged:
-    cars = {row.car: row for row in rows}
-    if len(cars) > 1:
-        first, second = [row.log for row in cars.values()][:2]
-        raise MergeError(
-            f"{first} and {second} are of cars whose files differ: merge --by vehicle (or tell it "
-            "by --tags), fleet prior is for many cars"
-        )
-    vehicle = rows[0].told_car
-    design = AxleIdentifier.for_vehicle(vehicle, dt=DT)
-    told = total((part for row in rows for part in row.parts), len(design.ladder) + 3)
-    reference = reference_of(design, vehicle)
-    model = merged(design, reference, told, excitation_of(rows))
-    return Merged(key=key, logs=len(rows), told=told, model=model)
+class _Sum:
+    """What the logs of a group tell, as far as they were added."""
+
+    def __init__(self, row: LogRow) -> None:
+        self.vehicle, self.logs = row.told_car, 0
+        self.design = AxleIdentifier.for_vehicle(self.vehicle, dt=DT)
+        self.told = Total(len(self.design.ladder) + 3)
+        self.excitation = np.zeros((2, 1 + len(EDGES)))
+
+    def add(self, row: LogRow) -> None:
+        for part in row.parts:
+            self.told.add(part)
+        self.excitation = excitation_of(self.excitation, row)
+        self.logs += 1
+
+    def merged(self, key: tuple[tuple[str, str], ...]) -> Merged:
+        told, reference = self.told.information, reference_of(self.design, self.vehicle)
+        model = merged(self.design, reference, told, self.excitation)
+        return Merged(key=key, logs=self.logs, told=told, model=model)
 
 
-def excitation_of(rows: Sequence[LogRow]) -> Array:
-    """Return the largest slip and the times of learning of all logs together, (2, 9).
+def excitation_of(before: Array, row: LogRow) -> Array:
+    """Return the largest slip and the times of learning of logs and one more, (2, 9).
 
     Parameters
     ----------
-    rows : of logs.
+    before : of the logs, (2, 9).
     """
-    each = np.array([row.numbers("excitation", 2, 1 + len(EDGES)) for row in rows])
-    together: Array = each.sum(axis=0)
-    together[:, 0] = each[:, :, 0].max(axis=0)
+    one = row.numbers("excitation", *before.shape)
+    together: Array = before + one
+    together[:, 0] = np.maximum(before[:, 0], one[:, 0])
     return together
 
 
@@ -224,10 +253,6 @@ def sizes(vehicle: Vehicle, q: int) -> Array:
 
 def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
     """Return what many cars have in common.
-
-    Parameters
-    ----------
-    cars : a merged model for each.
 
     Raises
     ------

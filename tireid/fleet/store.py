@@ -1,12 +1,13 @@
 """What was learnt of many logs, as a Parquet dataset: a row for each log, in files by bucket.
 
-    STORE/logs/bucket-07.parquet      rows by the name of their log; a bucket is a hash of that name
-    STORE/pending/07-<digest>.parquet rows of a run that has not ended yet
+    STORE/logs/bucket-07.parquet   rows by the name of their log; a bucket is a hash of its content
+    STORE/pending/<digest>.parquet rows of a run that has not ended yet
 
-A run writes the rows of a few logs at once, whole or not at all, and sorts them into their bucket
-at its end: what it had written when it was stopped is found by the next one, and the same logs give
-the same bytes, in whatever order they were learnt and wherever. A store lies in a folder or at any
-address of fsspec, as in s3://bucket/store.
+A row is that of a log's content (and run) learnt with a setting; there is one of each. A run writes
+the rows of a few logs at once, whole or not at all, and sorts them into their bucket at its end:
+what it had written when it was stopped is found by the next one, and the same logs give the same
+bytes, in whatever order they were learnt and wherever. A store lies in a folder or at any address
+of fsspec, as in s3://bucket/store. A question reads the columns that it wants, a few rows at once.
 """
 
 import hashlib
@@ -15,7 +16,7 @@ import io
 import json
 import math
 import posixpath
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -23,27 +24,29 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
+from codegen.writing import naming
 from identifier.axle import AxleModel
 from identifier.axle.information import Information
 from identifier.frozen import vehicle_from
+from models.extras import needs
 from models.vehicle import Vehicle
 
+Key = tuple[str, str, str]
 BUCKETS = 16
-FORMAT = "tireid fleet 1"
-INSTALL = "pip install 'tireid[fleet]'"
+FORMAT = "tireid fleet 2"
+BATCH = 512  # rows that are read at once
+SMALL = 1 << 22  # bytes of a file that is fetched as one
+HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
+WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "oci", "memory"}  # see _put
 
 
-class StoreError(ValueError):
+class StoreError(TireidError, ValueError):
     """The store cannot be used; the message names it, and says why and what to do."""
 
 
 def needed(name: str, what: str = "a fleet's store") -> Any:
     """Return a library of the extra [fleet].
-
-    Parameters
-    ----------
-    name : of its module.
-    what : what needs it.
 
     Raises
     ------
@@ -53,28 +56,7 @@ def needed(name: str, what: str = "a fleet's store") -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise ImportError(f"{what} needs {name.partition('.')[0]}: {INSTALL}") from error
-
-
-def file_of(log: str) -> str:
-    """Return the file of a log.
-
-    Parameters
-    ----------
-    log : its name: FILE, or FILE:RUN where a file has several runs.
-    """
-    folder, slash, name = log.rpartition("/")
-    return folder + slash + (name.rpartition(":")[0] or name)
-
-
-def bucket_of(log: str) -> int:
-    """Return the bucket of a log, 0 to 15; the runs of a file lie together.
-
-    Parameters
-    ----------
-    log : its name.
-    """
-    return hashlib.blake2b(file_of(log).encode(), digest_size=1).digest()[0] % BUCKETS
+        raise ImportError(needs(what, name.partition(".")[0], "fleet")) from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,13 +65,15 @@ class LogRow:
 
     Parameters
     ----------
-    log : its name, by which rows are told apart: FILE, or FILE:RUN where it has several runs.
-    setting : hash of all that was told: car, map, start, options.
+    log : its name: absolute path or address, or where it lies under a root.
+    run : of the file, where it has several; else empty.
+    content : hash of what the file holds; empty where it could not be read.
+    setting : hash of all that was told: car, method, map, start, options.
     size : of the file [bytes].
+    stamp : hash of what its file system says of the file, which changes with it.
     vehicle, tires, date : as its path or its folder says; the date as ISO 8601.
     tags : everything that the path says, as JSON.
     error : why nothing was learnt, one line; empty where it was. All that follows is empty then.
-    seconds : that it lasts.
     v_x_mean, v_x_most : speed [m/s].
     a_y_rms, a_y_most : lateral acceleration v_x r [m/s²].
     steering_most : of the front wheels [rad].
@@ -111,12 +95,15 @@ class LogRow:
     """
 
     log: str
-    setting: str
-    size: int
-    vehicle: str
-    tires: str
-    date: str
-    tags: str
+    run: str = ""
+    content: str = ""
+    setting: str = ""
+    size: int = 0
+    stamp: str = ""
+    vehicle: str = ""
+    tires: str = ""
+    date: str = ""
+    tags: str = "{}"
     error: str = ""
     seconds: float | None = None
     v_x_mean: float | None = None
@@ -148,6 +135,27 @@ class LogRow:
     square: Sequence[float] = ()
 
     @property
+    def name(self) -> str:
+        """Its log, and its run where the log has several."""
+        return f"{self.log}:{self.run}" if self.run else self.log
+
+    @property
+    def known(self) -> str:
+        """What the log is known by: its content, and its setting."""
+        return f"{self.content} {self.setting}"
+
+    @property
+    def key(self) -> Key:
+        """What its row is known by: content, or name where that could not be read, run, setting."""
+        return self.content or self.log, self.run, self.setting
+
+    @property
+    def bucket(self) -> str:
+        """The file of its row; the runs of a file lie together."""
+        word = hashlib.blake2b(self.key[0].encode(), digest_size=1)
+        return f"bucket-{word.digest()[0] % BUCKETS:02d}.parquet"
+
+    @property
     def told_car(self) -> Vehicle:
         """The car as it was told."""
         try:
@@ -158,7 +166,7 @@ class LogRow:
     @property
     def frozen(self) -> AxleModel:
         """The frozen model."""
-        return AxleModel.from_dict(json.loads(self.model), self.log)
+        return AxleModel.from_dict(json.loads(self.model), self.name)
 
     @property
     def parts(self) -> list[Information]:
@@ -192,11 +200,6 @@ class LogRow:
     def numbers(self, name: str, *shape: int) -> Array:
         """Return a column that is a list, in its shape.
 
-        Parameters
-        ----------
-        name : of the column.
-        shape : that it must have.
-
         Raises
         ------
         StoreError
@@ -212,13 +215,15 @@ class LogRow:
     @property
     def _where(self) -> str:
         """Which row of a store it is, for messages."""
-        return f"logs/bucket-{bucket_of(self.log):02d}.parquet, log {self.log!r}"
+        return f"logs/{self.bucket}, log {self.name!r}"
 
 
 COLUMNS = tuple(field.name for field in fields(LogRow))
 LISTS = ("excitation", *COLUMNS[COLUMNS.index("part_begin") :])
-WORDS = ("log", "setting", "vehicle", "tires", "date", "tags", "error", "car", "model")
-HEAVY = ("model",)  # what a fleet's arithmetic does not want
+WORDS = ("log", "run", "content", "setting", "stamp", "vehicle", "tires", "date", "tags", "error",
+         "car", "model")  # fmt: skip
+INDEX = ("log", "run", "content", "setting", "stamp", "error")  # which rows there are
+HEAVY = (*LISTS, "car", "model")  # read where they are asked for by name
 
 
 def packed_triangles(matrix: Array) -> Array:
@@ -248,12 +253,7 @@ def unpacked_triangles(packed: Array, q: int) -> Array:
 
 
 def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
-    """Return the columns that hold what parts of a log tell.
-
-    Parameters
-    ----------
-    parts : in the order of time.
-    """
+    """Return the columns that hold what parts of a log tell."""
     return {
         "part_seconds": [one.seconds for one in parts],
         "part_samples": [one.samples for one in parts],
@@ -265,12 +265,7 @@ def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Store:
-    """A fleet's rows at an address.
-
-    Parameters
-    ----------
-    address : a folder, or what fsspec opens.
-    """
+    """A fleet's rows at an address."""
 
     address: str
 
@@ -287,23 +282,24 @@ class Store:
     def _path(self, *names: str) -> str:
         return posixpath.join(self._place[1], *names)
 
-    def _files(self, kind: str) -> list[str]:
-        """Return the Parquet files of a kind, in order."""
+    def _sizes(self, kind: str) -> dict[str, int]:
+        """Return the Parquet files of a kind, in order, with their bytes."""
         fs, _ = self._place
-        fs.invalidate_cache()
-        if not fs.isdir(self._path(kind)):
-            return []
-        found = {one["name"]: one["type"] for one in fs.ls(self._path(kind), detail=True)}
+        fs.invalidate_cache(self._path(kind))
+        try:
+            found = {one["name"]: one for one in fs.ls(self._path(kind), detail=True)}
+        except (FileNotFoundError, NotADirectoryError):
+            return {}
         names = sorted(name for name in found if name.endswith(".parquet"))
         for name in names:
-            if found[name] == "other":  # of which reading may not end
+            if found[name]["type"] == "other":  # of which reading may not end
                 raise StoreError(f"{name}: must be a file, it is a device, pipe or socket")
-        return names
+        return {name: int(found[name]["size"] or 0) for name in names}
 
     @property
     def exists(self) -> bool:
         """Whether there are rows, of a run that ended or of one that did not."""
-        return bool(self._files("logs") or self._files("pending"))
+        return bool(self._sizes("logs") or self._sizes("pending"))
 
     def require_ours(self) -> None:
         """Refuse an address at which there is something else.
@@ -330,125 +326,244 @@ class Store:
         if not self.exists:
             raise StoreError(f"{self.address} is no store: tireid fleet learn LOGS --out makes one")
 
-    def rows(
-        self, columns: Sequence[str] | None = None, *, where: str = "", light: bool = True
-    ) -> list[LogRow]:
-        """Return the rows, by the name of their log.
+    def rows(self, columns: Sequence[str] | None = None, *, where: str = "") -> list[LogRow]:
+        """Return the rows, by the name of their log."""
+        return sorted(self.stream(columns, where=where), key=_order)
+
+    def stream(self, columns: Sequence[str] | None = None, *, where: str = "") -> Iterator[LogRow]:
+        """Yield the rows as they lie in their files, a few of them in memory.
 
         Parameters
         ----------
         columns : that are read; others are as of a log without result. None reads all.
         where : a condition of SQL on the columns; empty takes every row.
-        light : leave the frozen models out where `columns` is None.
 
         Raises
         ------
         StoreError
             Where a file is none of a store, or the condition is not right.
         """
-        wanted = columns or [one for one in COLUMNS if not (light and one in HEAVY)]
-        table = self.table(wanted if not where else None)
-        if where:
-            table = selected(table, f"SELECT * FROM logs WHERE {where}", self.address)
-        must = ("log", "setting", "size", "vehicle", "tires", "date", "tags")
-        empty = dict.fromkeys(must, "") | {"size": 0}
-        kept = table.select([one for one in wanted if one in table.column_names])
-        found = {row["log"]: LogRow(**(empty | _plain(row))) for row in kept.to_pylist()}
-        return [found[name] for name in sorted(found)]
-
-    def table(self, columns: Sequence[str] | None = None) -> Any:
-        """Return all rows as an Arrow table; what pends stands last.
-
-        Parameters
-        ----------
-        columns : that are read; None reads all.
-
-        Raises
-        ------
-        StoreError
-            Where a file is none of a store.
-        """
         pyarrow = needed("pyarrow")
-        tables = [
-            self._read(one, columns) for one in (*self._files("logs"), *self._files("pending"))
-        ]
-        empty = (
-            schema() if columns is None else pyarrow.schema([schema().field(c) for c in columns])
-        )
-        return pyarrow.concat_tables(tables) if tables else empty.empty_table()
+        files = {**self._sizes("logs"), **self._sizes("pending")}
+        taken = self._taken(files, where)
+        for path, size in files.items():
+            begin = 0
+            for batch in self._batches(path, size, columns):
+                if taken is not None:
+                    some = taken[path][begin : begin + len(batch)]
+                    begin += len(batch)
+                    batch = batch.filter(pyarrow.array(some))
+                yield from _rows_of(batch)
 
-    def _read(self, path: str, columns: Sequence[str] | None) -> Any:
+    def _taken(self, files: Mapping[str, int], where: str) -> dict[str, Array] | None:
+        """Return which rows of each file are asked for, one of each key; None takes all."""
+        if not where and not any(self._pends(path) for path in files):
+            return None
+        columns = dict.fromkeys([*INDEX, *(_named_in(where) if where else ())])
+        tables = {path: self._table(path, size, list(columns)) for path, size in files.items()}
+        counts = np.cumsum([0, *map(len, tables.values())])
+        best: dict[Key, tuple[Any, int]] = {}
+        k = 0
+        for path, table in tables.items():
+            for batch in table.select(INDEX).to_batches(BATCH):
+                for row in _rows_of(batch):
+                    rank = _rank(row, pending=self._pends(path)), k
+                    best[row.key] = min(best.get(row.key, rank), rank)
+                    k += 1
+        taken = np.zeros(counts[-1], dtype=bool)
+        taken[[at for _, at in best.values()]] = True
+        if where and files:
+            table = needed("pyarrow").concat_tables(tables.values())
+            taken = _answered(table, taken, where, self.address)
+        return {
+            path: taken[first:last]
+            for path, first, last in zip(tables, counts[:-1], counts[1:], strict=True)
+        }
+
+    def _pends(self, path: str) -> bool:
+        return posixpath.dirname(path) == self._path("pending")
+
+    def _table(self, path: str, size: int, columns: Sequence[str] | None = None) -> Any:
+        """Return columns of a file as an Arrow table."""
+        pyarrow = needed("pyarrow")
+        names = COLUMNS if columns is None else columns
+        kinds = pyarrow.schema([schema().field(name) for name in names])
+        batches = (batch.select(names) for batch in self._batches(path, size, columns))
+        return pyarrow.Table.from_batches(batches, kinds)
+
+    def _batches(self, path: str, size: int, columns: Sequence[str] | None) -> Iterator[Any]:
+        """Yield columns of a file, some rows at once.
+
+        Nothing is read by threads: one that drops what belongs to Python while Python ends aborts
+        the program.
+        """
         parquet, pyarrow = needed("pyarrow.parquet"), needed("pyarrow")
-        fs, _ = self._place
+        names = list(COLUMNS if columns is None else columns)
         try:
-            # Its bytes, not the file: a thread of pyarrow that drops what belongs to Python while
-            # Python ends aborts the program.
-            held = pyarrow.BufferReader(fs.cat_file(path))
-            with parquet.ParquetFile(held) as file:
-                table = file.read(columns=None if columns is None else list(columns))
+            with (
+                self._opened(path, size, columns) as source,
+                parquet.ParquetFile(source) as file,
+            ):
+                _require_ours(path, file.schema_arrow)
+                for batch in file.iter_batches(BATCH, columns=names, use_threads=False):
+                    if "log" in names and batch.column("log").null_count:
+                        raise StoreError(
+                            f"{path}: log must be the name of a log in every row, one is empty"
+                        )
+                    yield batch.replace_schema_metadata()
+        except StoreError:
+            raise
         except (OSError, ValueError, pyarrow.ArrowException) as error:
             raise StoreError(f"{path}: cannot be read as a store's file: {error}") from error
-        names = COLUMNS if columns is None else columns
-        told = (table.schema.metadata or {}).get(b"format", b"").decode()
-        if told != FORMAT or table.column_names != list(names):
-            raise StoreError(f"{path}: is not of this version's store ({told or 'no format'})")
-        for name in names:
-            column, kind = table.column(name), schema().field(name).type
-            if column.type != kind:
-                raise StoreError(f"{path}: {name} must be of type {kind}, it is {column.type}")
-            if name == "log" and column.null_count:
-                raise StoreError(
-                    f"{path}: log must be the name of a log in every row, one is empty"
-                )
-        return table
+
+    def _opened(self, path: str, size: int, columns: Sequence[str] | None) -> Any:
+        """Return a file to read: as it lies here, or with what is asked for of it fetched."""
+        pyarrow, (fs, _) = needed("pyarrow"), self._place
+        if "file" in protocols(fs):
+            return pyarrow.OSFile(path)
+        if columns is None or size <= SMALL:
+            return pyarrow.BufferReader(fs.cat_file(path))
+        remote = needed("fsspec.parquet")
+        return remote.open_parquet_file(path, fs=fs, columns=list(columns), engine="pyarrow")
 
     def keep(self, rows: Sequence[LogRow]) -> None:
-        """Write rows of one bucket, whole or not at all; they pend until `settle`.
-
-        Parameters
-        ----------
-        rows : of logs of one bucket.
-        """
-        names = "\0".join(f"{row.log}\0{row.setting}\0{row.size}" for row in rows)
+        """Write rows, whole or not at all; they pend until `settle`."""
+        names = "\0".join("\0".join((*row.key, row.log)) for row in rows)
         digest = hashlib.blake2b(names.encode(), digest_size=12).hexdigest()
-        self._write(self._path("pending", f"{bucket_of(rows[0].log):02d}-{digest}.parquet"), rows)
+        data = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
+        table = needed("pyarrow").table(data, schema=schema())
+        self._put(self._path("pending", f"{digest}.parquet"), table)
 
-    def _write(self, path: str, rows: Iterable[LogRow]) -> None:
-        pyarrow, parquet = needed("pyarrow"), needed("pyarrow.parquet")
-        some = list(rows)
-        data = {name: [getattr(row, name) for row in some] for name in COLUMNS}
-        table = pyarrow.table(data, schema=schema())
+    def _put(self, path: str, table: Any) -> None:
+        """Write a file that appears whole or not at all: by one request where objects do so."""
+        parquet = needed("pyarrow.parquet")
+        table = table.replace_schema_metadata(schema().metadata)
         buffer = io.BytesIO()
-        parquet.write_table(table, buffer, compression="zstd")
+        parquet.write_table(
+            table, buffer, compression="zstd", row_group_size=8 * BATCH, use_dictionary=list(WORDS)
+        )
         fs, _ = self._place
+        if WHOLE & protocols(fs):
+            fs.pipe_file(path, buffer.getvalue())
+            return
         fs.makedirs(posixpath.dirname(path), exist_ok=True)
         scratch = f"{path}.part"
-        with fs.open(scratch, "wb") as file:
+        with naming(path), fs.open(scratch, "wb") as file:
             file.write(buffer.getvalue())
         fs.mv(scratch, path)
 
     def settle(self) -> None:
-        """Sort what pends into its buckets, the newest row of each log."""
-        fs, _ = self._place
-        pending = self._files("pending")
-        by_bucket: dict[str, list[str]] = {}
-        for path in pending:
-            by_bucket.setdefault(posixpath.basename(path)[:2], []).append(path)
-        for bucket, files in sorted(by_bucket.items()):
-            final = self._path("logs", f"bucket-{bucket}.parquet")
-            before = [final] if fs.exists(final) else []
-            rows: dict[str, LogRow] = {}
-            for path in (*before, *files):
-                for row in self._read(path, None).to_pylist():
-                    rows[row["log"]] = LogRow(**_plain(row))
-            self._write(final, [rows[name] for name in sorted(rows)])
-            for path in files:
-                fs.rm(path)
+        """Sort what pends into its buckets."""
+        paths, tables = [], []
+        for path, size in self._sizes("pending").items():
+            paths.append(path)
+            tables.append(self._table(path, size))
+            if len(paths) == AT_ONCE or sum(table.nbytes for table in tables) > HELD:
+                self._settle(paths, tables)
+                paths, tables = [], []
+        if paths:
+            self._settle(paths, tables)
+
+    def _settle(self, paths: Sequence[str], tables: Sequence[Any]) -> None:
+        """Sort files that pend into their buckets."""
+        new = needed("pyarrow").concat_tables(tables)
+        by_bucket: dict[str, list[int]] = {}
+        for k, row in enumerate(_rows_of(new.select(INDEX))):
+            by_bucket.setdefault(row.bucket, []).append(k)
+        sizes = self._sizes("logs")
+        for bucket, some in sorted(by_bucket.items()):
+            self._sort(bucket, sizes, [new.take(some)])
+        self._place[0].rm(list(paths))
+
+    def drop(self, rows: Sequence[LogRow]) -> None:
+        """Take rows out; none may pend."""
+        sizes = self._sizes("logs") if rows else {}
+        for bucket in sorted({row.bucket for row in rows}):
+            self._sort(bucket, sizes, [], frozenset(row.key for row in rows))
+
+    def _sort(
+        self, bucket: str, sizes: Mapping[str, int], new: list[Any], without: Set[Key] = frozenset()
+    ) -> None:
+        """Write a bucket with new rows and without some, one of each key, in order."""
+        path = self._path("logs", bucket)
+        old = [self._table(path, sizes[path])] if path in sizes else []
+        table = needed("pyarrow").concat_tables([*old, *new])
+        rows, settled = list(_rows_of(table.select(INDEX))), sum(map(len, old))
+        best: dict[Key, int] = {}
+        for k in sorted(range(len(rows)), key=lambda k: _rank(rows[k], pending=k >= settled)):
+            if rows[k].key not in without:
+                best.setdefault(rows[k].key, k)
+        if best:
+            order = sorted(best.values(), key=lambda k: _order(rows[k]))
+            self._put(path, table.take(order).combine_chunks())
+        elif old:
+            self._place[0].rm(path)
+
+
+def protocols(fs: Any) -> set[str]:
+    """Return the names of a file system's protocol."""
+    return {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
+
+
+def _require_ours(path: str, found: Any) -> None:
+    """Refuse a file whose columns are not those of this version's store."""
+    told = (found.metadata or {}).get(b"format", b"").decode(errors="replace")
+    if told.startswith("tireid fleet") and told != FORMAT:
+        raise StoreError(
+            f"{path}: is of another version's store ({told}, not {FORMAT}): learn its logs again, "
+            "into a new store"
+        )
+    if told != FORMAT or found.names != list(COLUMNS):
+        raise StoreError(f"{path}: is not of this version's store ({told or 'no format'})")
+    for name in COLUMNS:
+        kind = schema().field(name).type
+        if found.field(name).type != kind:
+            raise StoreError(
+                f"{path}: {name} must be of type {kind}, it is {found.field(name).type}"
+            )
+
+
+def _rank(row: LogRow, *, pending: bool) -> tuple[bool, bool, str]:
+    """Return what is least for the row of a key that counts: a result, new, of the first name."""
+    return bool(row.error), not pending, row.name
+
+
+def _order(row: LogRow) -> tuple[str, ...]:
+    return row.log, row.run, row.setting, row.content
+
+
+def _named_in(where: str) -> list[str]:
+    """Return the columns that a condition may ask for: what is heavy only where it names it."""
+    return [name for name in COLUMNS if name not in HEAVY or name in where.lower()]
+
+
+def _answered(table: Any, taken: Array, where: str, source: str) -> Array:
+    """Return which rows that are taken fulfill a condition; DuckDB sees nothing but them."""
+    pyarrow, duckdb = needed("pyarrow"), needed("duckdb", "a question in SQL")
+    some = table.filter(pyarrow.array(taken))
+    some = some.append_column("_row", pyarrow.array(np.flatnonzero(taken).tolist()))
+    connection = duckdb.connect(":memory:")
+    try:
+        connection.register("logs", some)
+        connection.execute("SET enable_external_access = false")
+        connection.execute(f"SELECT _row FROM logs WHERE ({where}\n)")
+        rows = [row for (row,) in connection.fetchall()]
+    except duckdb.Error as error:
+        raise StoreError(f"{source}: {' '.join(str(error).split())}") from error
+    finally:
+        connection.close()
+    fulfilled = np.zeros_like(taken)
+    fulfilled[rows] = True
+    return fulfilled
+
+
+def _rows_of(table: Any) -> Iterator[LogRow]:
+    return (LogRow(**_plain(row)) for row in table.to_pylist())
 
 
 def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row of Arrow as the arguments of `LogRow`."""
-    empty = {**dict.fromkeys(LISTS, ()), **dict.fromkeys(WORDS, "")}
+    empty = {**dict.fromkeys((*LISTS, "findings"), ()), **dict.fromkeys(WORDS, "")}
     return {name: empty.get(name) if value is None else value for name, value in row.items()}
 
 
@@ -465,32 +580,3 @@ def schema() -> Any:
     kinds |= {name: pyarrow.string() for name in WORDS}
     listed = [pyarrow.field(name, kinds.get(name, pyarrow.float64())) for name in COLUMNS]
     return pyarrow.schema(listed, metadata={"format": FORMAT})
-
-
-def selected(table: Any, question: str, source: str) -> Any:
-    """Return what DuckDB answers, as an Arrow table; it sees nothing but the table `logs`.
-
-    Parameters
-    ----------
-    table : an Arrow table.
-    question : in SQL.
-    source : of the table, for errors.
-
-    Raises
-    ------
-    StoreError
-        Where the question is not right.
-    """
-    duckdb = needed("duckdb", "a question in SQL")
-    connection = duckdb.connect(":memory:")
-    try:
-        connection.register("logs", table)
-        connection.execute("SET enable_external_access = false")
-        answer = connection.sql(question)
-        if answer is None:
-            raise StoreError(f"{source}: the question must be one that SELECTs")
-        return answer.to_arrow_table() if hasattr(answer, "to_arrow_table") else answer.arrow()
-    except duckdb.Error as error:
-        raise StoreError(f"{source}: {' '.join(str(error).split())}") from error
-    finally:
-        connection.close()

@@ -17,9 +17,8 @@ A part adds at most its share of `LEAST` of driving: no sensor that fails for a 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import date
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +33,7 @@ from identifier.axle.information import (
 )
 from models.vehicle import Vehicle
 from tireid.fleet.learn import DT
-from tireid.fleet.merge import MergeError, key_of
+from tireid.fleet.merge import day_of, grouped
 from tireid.fleet.store import LogRow
 
 LEAST = 600.0  # s of driving that an alarm takes at least
@@ -55,11 +54,6 @@ class Watching:
     baseline : learning of a car that its baseline takes [s].
     false_alarms : in a thousand hours of learning, of all statistics of a car together.
     stiffness, friction : change of ln C and of ln μ that is looked for, δ [-].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     baseline: float = 1200.0
@@ -116,10 +110,7 @@ class Alarm:
 
     Parameters
     ----------
-    car : whose.
     statistic : index of `TITLES`.
-    began : log in which the change is taken to have begun.
-    log, date : in which it was noticed.
     after : learning from the baseline to the alarm [s].
     change : of all statistics since it began, ln, (3,) [-].
     sd : of these (3,) [-].
@@ -194,8 +185,6 @@ class Watch:
     Parameters
     ----------
     alarms : in the order of cars and time.
-    seen : by car, of those that were driven beyond their baseline.
-    short : cars that were not.
     """
 
     alarms: tuple[Alarm, ...]
@@ -208,25 +197,28 @@ class Watch:
         return sum(float(one.driven[-1]) for one in self.seen.values()) / 3600.0
 
 
-def watch(rows: Sequence[LogRow], by: Sequence[str], watching: Watching) -> Watch:
+def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watch:
     """Return which cars' tires changed.
 
     Parameters
     ----------
-    rows : usable ones.
     by : what tells cars, or their sets of tires, apart.
-    watching : what is looked for.
 
     Raises
     ------
     MergeError
         Where logs of a group are of several cars, or have no date.
     """
-    groups: dict[str, list[LogRow]] = {}
-    for row in rows:
-        name = " ".join(value or "-" for _, value in key_of(row, by)) or "all"
-        groups.setdefault(name, []).append(row)
-    compared = {name: _against_baseline(some, watching) for name, some in sorted(groups.items())}
+    cars: dict[str, Vehicle] = {}
+    parts: dict[str, list[Part]] = {}
+    for key, row in grouped(rows, by):
+        name = " ".join(value or "-" for _, value in key) or "all"
+        cars.setdefault(name, row.told_car)
+        parts.setdefault(name, []).extend(parts_of(row))
+    compared = {
+        name: _against_baseline(sorted(some, key=_when), cars[name], watching)
+        for name, some in sorted(parts.items())
+    }
     there = {name: one for name, one in compared.items() if one is not None}
     short = tuple(name for name, one in compared.items() if one is None)
     scatter = [one.scatter for one in there.values() if len(one.baseline) > 2]
@@ -254,42 +246,31 @@ class _Compared(NamedTuple):
         return np.asarray((NORMAL * np.median(np.abs(z - np.median(z, axis=0)), axis=0)) ** 2)
 
 
-def parts_of(rows: Sequence[LogRow]) -> list[Part]:
-    """Return the parts of a car's logs in the order of time, those that tell of the tires.
-
-    Parameters
-    ----------
-    rows : of one car.
+def parts_of(row: LogRow) -> list[Part]:
+    """Return the parts of a log that tell of the tires.
 
     Raises
     ------
     MergeError
-        Where several logs have no date to be ordered by.
+        Where it has no date to be ordered by.
     """
-    for row in rows:
-        try:
-            date.fromisoformat(row.date[:10])
-        except ValueError:
-            raise MergeError(
-                f"{row.log}: its date {row.date!r} must begin with year-month-day, as in 2026-03-31"
-            ) from None
-    listed = [
-        Part(row.log, row.date, begin, told)
-        for row in sorted(rows, key=lambda row: (row.date, row.log))
+    day_of(row)
+    return [
+        Part(row.name, row.date, begin, told)
         for begin, told in zip(row.part_begin, row.parts, strict=True)
+        if told.seconds >= SHORTEST
     ]
-    return [one for one in listed if one.told.seconds >= SHORTEST]
 
 
-def _against_baseline(rows: Sequence[LogRow], watching: Watching) -> _Compared | None:
+def _when(part: Part) -> tuple[str, str, float]:
+    return part.date, part.log, part.begin
+
+
+def _against_baseline(
+    parts: Sequence[Part], vehicle: Vehicle, watching: Watching
+) -> _Compared | None:
     """Return the parts of a car against its baseline; None where there are none after it."""
-    if len({row.car for row in rows}) > 1:
-        raise MergeError(
-            f"{rows[0].log} and others are of cars whose files differ: watch --by vehicle"
-        )
-    vehicle = rows[0].told_car
     design = AxleIdentifier.for_vehicle(vehicle, dt=DT)
-    parts = tuple(parts_of(rows))
     learnt = np.cumsum([one.told.seconds for one in parts])
     count = int(np.searchsorted(learnt, watching.baseline)) + 1
     if count >= len(parts):
@@ -299,7 +280,7 @@ def _against_baseline(rows: Sequence[LogRow], watching: Watching) -> _Compared |
     z = np.array([_three(one.value, np.array([0.5, 0.5])) for one in changes])
     variances = np.array([np.einsum("aii->ai", one.covariance) for one in changes])
     S = np.array([_three(one, np.array([0.25, 0.25])) for one in variances])
-    return _Compared(parts, z, S, list(range(count)))
+    return _Compared(tuple(parts), z, S, list(range(count)))
 
 
 def _baseline(told: Sequence[Information], design: AxleIdentifier, vehicle: Vehicle) -> Array:

@@ -33,6 +33,10 @@ READ = {
     "or a falling curve is no tire, whatever its numbers.",
     "inputs": "Is the log what you think it is: signs, gaps, noise?",
     "replay": "A drive that was not learnt; the residual is what the frozen model misses.",
+    "motion": "The model lies on what the motion shows; what is missed below it is small and shows "
+    "no pattern. Windows that the verdict leaves out are not drawn.",
+    "friction": "Near 1 the road is that of the drive that taught. The band is wide where the "
+    "tires do not slide: nobody can tell there.",
     "error": "It shrinks at first and then stays at the size of the noise.",
     "weights": "They come to rest; weights that grow to the end are those of a law that drifts.",
     "film": "The curve that is steered by and the one that was learnt are those known at that "
@@ -62,14 +66,7 @@ READ = {
 
 
 def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
-    """Return a figure as a picture of a report.
-
-    Parameters
-    ----------
-    figure : as the functions of `tireid.figures` return it.
-    caption : what it shows, plain text.
-    read : how to read it, plain text.
-    """
+    """Return a figure as a picture of a report."""
     return Picture(image=style.figure_svg(figure), caption=caption, read=read)
 
 
@@ -92,14 +89,7 @@ def recording_digest(recording: Recording) -> str:
 def origin(
     command: str, vehicle: Vehicle, recordings: Iterable[Recording], **others: str
 ) -> Section:
-    """Return what is needed to compute a report again.
-
-    Parameters
-    ----------
-    command : as it was typed.
-    recordings : that were read or driven.
-    others : more lines, by their name with underscores for blanks.
-    """
+    """Return what is needed to compute a report again."""
     told = list(recordings)
     rows = [
         ["command", command],

@@ -33,13 +33,7 @@ def write_compare_report(
 
     Parameters
     ----------
-    folder : where to.
-    comparison : the methods.
-    rows : its table, the header first.
-    figures : by the name of their files.
     verdicts : on what the default learns, by recording.
-    remarks : what the methods say of themselves, a line each.
-    command : as it was typed.
     """
     course = comparison.course
     captions = {
@@ -50,9 +44,8 @@ def write_compare_report(
     }
     blocks: list[Block] = [
         Table(
-            caption=f"RMSE of the axle force, front / rear, in percent of the rms force (and N), "
-            f"mean over {len(comparison.names)} recordings."
-            + "".join(f" {line}." for line in remarks),
+            caption=f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
+            f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in remarks),
             header=rows[0],
             rows=rows[1:],
         )
@@ -70,9 +63,9 @@ def write_compare_report(
         warnings=[
             *compare_warnings(comparison),
             *(
-                f"The default learnt on {name}: {one}"
+                one
                 for name, verdict in verdicts.items()
-                for one in verdict_warnings(verdict)
+                for one in verdict_warnings(verdict, f"The default learnt on {name}: ")
             ),
         ],
         sections=[
@@ -84,12 +77,7 @@ def write_compare_report(
 
 
 def compare_headlines(comparison: Comparison) -> list[Headline]:
-    """Return the frozen error of the best methods on recordings that they did not learn on.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Return the frozen error of the best methods on recordings that they did not learn on."""
     numbers = []
     elsewhere = len(comparison.names) > 1
     for name in ranking(comparison):
@@ -104,13 +92,14 @@ def compare_headlines(comparison: Comparison) -> list[Headline]:
 
 
 def compare_warnings(comparison: Comparison) -> list[str]:
-    """Return what speaks against a comparison.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
-    said = []
+    """Return what speaks against a comparison."""
+    vehicle = comparison.course.vehicle
+    said = [f"{vehicle.estimates}."] if vehicle.estimates else []
+    if comparison.course.by_motion:
+        said.append(
+            "Without true forces methods are judged by the motion: by mean forces over 0.3 s, the "
+            "noise of the sensors taken off. A wrong mass scales all of them alike."
+        )
     for name, trial in comparison.trials.items():
         at = [f"{where} at {freeze_key(t)} s" for where, t in trial.diverged_at.items()]
         if at:

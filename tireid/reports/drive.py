@@ -29,13 +29,8 @@ def write_drive_report(
 
     Parameters
     ----------
-    folder : where to.
-    runs : the drives, the one that it is about first.
     inputs : all that went in, ready for JSON.
-    figures : by the name of their files.
-    headline : the case in one line.
     film : its file, where there is one that a page shows.
-    command : as it was typed.
     """
     first = runs[0]
     report = Report(
@@ -65,19 +60,22 @@ def write_drive_report(
 
 
 def drive_headlines(runs: Sequence[Run]) -> list[Headline]:
-    """Return how far the cars were off, and how long a step took.
-
-    Parameters
-    ----------
-    runs : the drives.
-    """
+    """Return how far the cars were off, and how long a step took."""
     first = runs[0].scores
     numbers = [
-        Headline(f"{first.rms_e_y_m:.3f} m", f"rms deviation from the path, {runs[0].label}"),
+        Headline(
+            f"{first.rms_e_y_m:.3f} m",
+            f"rms deviation from the path, {runs[0].label}{_end(runs[0])}",
+            "" if first.completed else "bad",
+        ),
         Headline(f"{first.peak_e_y_m:.3f} m", f"largest deviation, {runs[0].label}"),
     ]
     numbers += [
-        Headline(f"{run.scores.rms_e_y_m:.3f} m", f"rms deviation, {run.label}{_end(run)}")
+        Headline(
+            f"{run.scores.rms_e_y_m:.3f} m",
+            f"rms deviation, {run.label}{_end(run)}",
+            "" if run.scores.completed else "bad",
+        )
         for run in runs[1:]
     ]
     told = told_scores(runs[0].drive)
@@ -98,12 +96,7 @@ def _end(run: Run) -> str:
 
 
 def drive_warnings(runs: Sequence[Run]) -> list[str]:
-    """Return what went wrong on the way.
-
-    Parameters
-    ----------
-    runs : the drives.
-    """
+    """Return what went wrong on the way."""
     said = []
     for run in runs:
         scores = run.scores
@@ -128,13 +121,7 @@ def _bad(text: str) -> bool:
 
 
 def drive_table(runs: Sequence[Run], caption: str) -> Table:
-    """Return the scores of drives.
-
-    Parameters
-    ----------
-    runs : the drives.
-    caption : plain text.
-    """
+    """Return the scores of drives."""
     rows = [
         [
             run.label,
@@ -156,8 +143,6 @@ def drive_blocks(
 
     Parameters
     ----------
-    runs : the drives.
-    figures : by the name of their files.
     film : its file, where there is one that a page shows.
     """
     blocks: list[Block] = [drive_table(runs, "Scores of the drives.")]
@@ -173,13 +158,7 @@ def drive_blocks(
 
 
 def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
-    """Return what trackers believed of the tires, and what they were told on the way.
-
-    Parameters
-    ----------
-    runs : the drives.
-    figures : by the name of their files.
-    """
+    """Return what trackers believed of the tires, and what they were told on the way."""
     caption = "Forces of the first drive, and what trackers believed of the tires."
     blocks: list[Block] = [drawing(figures["tires"], caption, READ["tires"])]
     if "lateral" in figures:

@@ -6,15 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
+from identifier.tire_model import STIFFNESS
 from tireid import __version__
 from tireid.figures.fleet import curves_figure, stiffness_figure, watch_figure
 from tireid.fleet.merge import Merged
-from tireid.fleet.store import LogRow
+from tireid.fleet.store import INDEX, LogRow
 from tireid.fleet.watch import Alarm, Watch
 from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import REPORT, drawing
 
 LISTED = 200  # rows of a table
+COLUMNS = (*INDEX, "vehicle", "date", "seconds", "valid", "findings", "stiffness_front",
+           "stiffness_rear")  # fmt: skip
 DRAWN = 6  # cars with an alarm that are drawn
 
 READ_STIFFNESS = (
@@ -37,17 +40,7 @@ def write_fleet_report(
     *,
     command: str,
 ) -> None:
-    """Write what a store holds.
-
-    Parameters
-    ----------
-    folder : where to.
-    store : its address.
-    rows : of all logs.
-    groups : merged models.
-    watched : what was seen of the cars over time.
-    command : as it was typed.
-    """
+    """Write what a store holds."""
     learnt = [row for row in rows if not row.error]
     refused = [row for row in learnt if row.valid is False]
     hours = sum(row.seconds or 0.0 for row in learnt) / 3600.0
@@ -75,8 +68,8 @@ def write_fleet_report(
         Section(heading="What changed", blocks=watch_blocks(watched)),
     ]
     if errors or refused:
-        why = {row.log: row.error for row in errors}
-        why |= {row.log: f"not valid: {', '.join(row.findings)}" for row in refused}
+        why = {row.name: row.error for row in errors}
+        why |= {row.name: f"not valid: {', '.join(row.findings)}" for row in refused}
         listed = list(why.items())
         table = Table(
             caption=f"Logs that were left out{_first(len(listed))}.",
@@ -96,15 +89,7 @@ def write_fleet_report(
 
 
 def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str) -> None:
-    """Write whose tires changed.
-
-    Parameters
-    ----------
-    folder : where to.
-    store : its address.
-    watched : what was seen.
-    command : as it was typed.
-    """
+    """Write whose tires changed."""
     lasting = [alarm for alarm in watched.alarms if not alarm.ended]
     report = Report(
         title=f"Changes in the fleet of {store}",
@@ -124,12 +109,7 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
 
 
 def watch_blocks(watched: Watch) -> list[Block]:
-    """Return what was seen over time, as table and figures.
-
-    Parameters
-    ----------
-    watched : what was seen.
-    """
+    """Return what was seen over time, as table and figures."""
     told = f"{len(watched.seen)} cars were driven beyond their baseline"
     short = f"; {len(watched.short)} were not, and are not watched yet" if watched.short else ""
     blocks: list[Block] = [Paragraph(text=f"{told}{short}.")]
@@ -162,10 +142,9 @@ def _alarm_row(alarm: Alarm) -> list[str | float | None]:
 def _groups_table(groups: Sequence[Merged]) -> Table:
     rows: list[list[str | float | None]] = []
     for one in groups:
-        C, known = one.model.cornering_stiffness / 1e3, np.degrees(one.model.known_slip)
-        rows.append(
-            [one.name, one.logs, one.told.seconds / 60.0, *map(float, (*C, *known))]
-        )  # fmt: skip
+        known = map(float, np.degrees(one.model.known_slip))
+        C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
+        rows.append([one.name, one.logs, one.told.seconds / 60.0, *C, *known])
     return Table(
         caption=f"Merged models{_first(len(rows))}.",
         header=["group", "logs", "learning [min]", "stiffness front [kN/rad]", "rear [kN/rad]",

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from identifier.axle.guarantee import Guarantee
 from identifier.doctor import Diagnosis
+from identifier.measured import with_doubt
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -17,16 +18,35 @@ from identifier.reproducibility import (
     online_error,
 )
 from identifier.run import History
-from identifier.tire_model import TireModel
+from identifier.tire_model import AXLES, TireModel
 from identifier.verdict import Verdict
+from identifier.verdict.verdict import PERCENT
 from models.files import digest
+from models.recordings import Recording
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
-from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
+from tireid.report import (
+    Block,
+    Cell,
+    Headline,
+    Marked,
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Tone,
+    write_report,
+)
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
+from tireid.verdicts import (
+    missed_headline,
+    number_headlines,
+    of_answer,
+    verdict_headline,
+    verdict_section,
+    verdict_warnings,
+)
 
-AXLES = ("front", "rear")
-HEADLINES = 3  # facts of a model that stand at the top
 EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
 
@@ -42,20 +62,15 @@ def write_identify_report(
     *,
     diagnosis: Diagnosis,
     command: str,
+    asked: Mapping[str, Verdict],
 ) -> None:
     """Write the report of what was learnt, or of a network that was judged.
 
     Parameters
     ----------
-    folder : where to.
-    law : what learnt, as the user named it.
-    runs : online, the one that was learnt on first.
     frozen : by when it was frozen, replays by recording; the last is of the model.
-    figures : by the name of their files.
-    verdict : on the model.
     parts : of the first run, over each of several logs that were learnt on.
-    diagnosis : of what was learnt on, as it was read.
-    command : as it was typed.
+    asked : verdicts on the model over the drives that it was not learnt on, by recording.
     """
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
@@ -63,7 +78,10 @@ def write_identify_report(
         Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
         Section(
             heading="How well it predicts",
-            blocks=_errors([runs[0], *parts, *runs[1:]], frozen, figures),
+            blocks=[
+                *_asked(asked),
+                *_errors([runs[0], *parts, *runs[1:]], frozen, figures),
+            ],
         ),
         Section(
             heading="What went in",
@@ -79,14 +97,31 @@ def write_identify_report(
             method=f"{law}, hash {digest(learnt.design.numbers())}",
         ),
     ]
+    notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, runs)]
     report = Report(
         title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
         summary=_how_learnt(learnt),
-        numbers=[verdict_headline(verdict), *identify_headlines(model, runs, last)],
+        numbers=[
+            verdict_headline(verdict, notes),
+            *of_answer(
+                verdict,
+                [
+                    *missed_headline(verdict),
+                    *asked_headlines(asked),
+                    *number_headlines(verdict),
+                    *identify_headlines(model, runs, last),
+                ],
+            ),
+        ],
+        lead=[curve_drawing(figures, verdict)],
         warnings=[
             *verdict_warnings(verdict),
-            *diagnosis_warnings(diagnosis),
-            *identify_warnings(model, runs),
+            *(
+                one
+                for name, found in asked.items()
+                for one in verdict_warnings(found, f"{name}, replayed: ")
+            ),
+            *notes,
         ],
         sections=sections,
     )
@@ -99,19 +134,15 @@ def _how_learnt(learnt: History) -> str:
     lateral = "acceleration" if estimated else "velocity"
     told = side_slip_text(learnt)
     more = f" Nobody measured lateral velocity: {told}." if estimated and told else ""
+    how = "learnt sample by sample" if learnt.online else "one estimate of tires and sensors"
     return (
-        f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from speed, "
+        f"{learnt.recording.duration:.4g} s of driving, {how} from speed, "
         f"lateral {lateral}, yaw rate and steering.{more}"
     )
 
 
 def side_slip_text(learnt: History) -> str:
-    """Return how well a run knew side slip, where it tells it; else nothing.
-
-    Parameters
-    ----------
-    learnt : the run.
-    """
+    """Return how well a run knew side slip, where it tells it; else nothing."""
     if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
         return ""
     moves = learnt.recording.v_x >= learnt.design.min_speed
@@ -124,24 +155,45 @@ def side_slip_text(learnt: History) -> str:
 def identify_headlines(
     model: TireModel, runs: Sequence[History], replays: Mapping[str, Replay]
 ) -> list[Headline]:
-    """Return the errors of a frozen model, other drives first, and what it says of the tires.
-
-    Parameters
-    ----------
-    runs : online, the one that was learnt on first.
-    replays : of the model, by recording.
-    """
+    """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers = []
     for kind, some in (("not learnt on", runs[1:]), ("learnt on", runs[:1])):
         shares = [share for run in some if (share := _share(run, replays)) is not None]
         if shares:
             meaning = f"of the rms force missed on drives {kind}, frozen"
             numbers.append(Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
-    for title, (front, rear), unit in model.facts()[:HEADLINES]:
-        scale, name = (1e3, f"k{unit}") if unit.startswith("N") and front >= 1e3 else (1.0, unit)
-        value = f"{front / scale:.3g} / {rear / scale:.3g} {'°' if name == 'deg' else name}"
-        numbers.append(Headline(value.replace(" °", "°"), f"{title}, front / rear"))
+    if model.known_slip is not None:
+        front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
+        numbers.append(Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
     return numbers
+
+
+def asked_headlines(asked: Mapping[str, Verdict]) -> list[Headline]:
+    """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
+    if not asked:
+        return []
+    valid = sum(verdict.valid for verdict in asked.values())
+    tone: Tone = "" if valid == len(asked) else "bad"
+    meaning = "replayed drives, not learnt on, whose motion the model gives back"
+    numbers = [Headline(f"{valid} of {len(asked)}", meaning, tone)]
+    shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
+    if shares:
+        front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
+        meaning = "missed of the force that the motion of these drives shows, front / rear"
+        numbers.append(Headline(f"{front} / {rear} %", meaning))
+    return numbers
+
+
+def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> Picture:
+    """Return the learnt curve with its band, the first figure of a report.
+
+    Parameters
+    ----------
+    verdict : on the model; of a refused one the caption says so.
+    """
+    refused = "" if verdict.valid else "NOT VALID. "
+    caption = f"{refused}Axle force over slip angle: drive, curve and its band."
+    return drawing(figures["slip"], caption, READ["slip"])
 
 
 def _share(run: History, replays: Mapping[str, Replay]) -> float | None:
@@ -153,53 +205,55 @@ def _share(run: History, replays: Mapping[str, Replay]) -> float | None:
 
 
 def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
-    """Return what speaks against a frozen model: divergence, extrapolation, no truth.
-
-    Parameters
-    ----------
-    runs : online, the one that was learnt on first.
-    """
+    """Return what speaks against a frozen model: divergence, extrapolation, no truth."""
     said = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
     for run in runs:
         name, recording = run.recording.name, run.recording
         if run.diverged_at is not None:
             said.append(f"{name}: learning diverged at {freeze_key(run.diverged_at)} s.")
-        if recording.axle_force is None:
+        if recording.axle_force is None and run.online:
             said.append(
                 f"{name} has no true forces: errors are against what was identified online over "
                 "it, which asks only whether the model agrees with itself."
             )
-        beyond = beyond_known(model, recording)
-        if model.known_slip is None or beyond is None:
-            continue
-        for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True):
-            if share > EXTRAPOLATED:
-                said.append(
-                    f"{name}: {100.0 * share:.0f} % of the samples slip farther than is known at "
-                    f"the {axle} axle ({known:.1f}°): there the curve is a guess."
-                )
+        said += _extrapolated(model, recording)
     if model.known_slip is None:
         said.append("This kind of model cannot tell where it knows the tires and where it guesses.")
     return said
 
 
-def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[Block]:
-    """Return the numbers and the figures of a frozen model.
+def asked_warnings(model: TireModel, recording: Recording) -> list[str]:
+    """Return what speaks against a stored model over a drive beside the verdict."""
+    estimated = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
+    return [*estimated, *_extrapolated(model, recording)]
 
-    Parameters
-    ----------
-    law : what learnt, as the user named it.
-    figures : by the name of their files.
-    """
-    facts = [[fact.title, *fact.words, fact.unit] for fact in model.facts()]
+
+def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
+    """Return at which axles a drive slips farther than the model knows, in words."""
+    beyond = beyond_known(model, recording)
+    if model.known_slip is None or beyond is None:
+        return []
+    return [
+        f"{recording.name}: {100.0 * share:.0f} % of the samples exceed the identified slip range "
+        f"of the {axle} axle ({known:.1f}°). There the curve is extrapolated."
+        for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True)
+        if share > EXTRAPOLATED
+    ]
+
+
+def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[Block]:
+    """Return the numbers and the figures of a frozen model."""
+    facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[Block] = [
         Paragraph(
             text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
             "left. curve.csv holds the curve with what is known of it, weights.json the model."
-        ),
-        Table(caption=f"The tires by {law}.", header=["", *AXLES, "unit"], rows=facts),
-        drawing(figures["slip"], "Axle force over slip angle: drive and curve.", READ["slip"]),
+        )
     ]
+    if facts:
+        blocks.append(
+            Table(caption=f"What {law} knows of the tires.", header=["", *AXLES], rows=facts)
+        )
     for told in (band_sentence(model), guaranteed_sentence(model)):
         if told:
             blocks.append(Paragraph(text=told))
@@ -215,27 +269,17 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
 
 
 def band_sentence(model: TireModel) -> str:
-    """Return how wide the band is where slip is known, in words; empty where there is none.
-
-    Parameters
-    ----------
-    model : frozen, its band calibrated or not.
-    """
+    """Return how wide the band is where slip is known, in words; empty where there is none."""
     known = model.known_slip
     half = None if known is None else model.half_band(known)
     if known is None or half is None or not (known > 0.0).all():
         return ""
     at = model.force(known)
     shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
-    calibrated = getattr(model, "calibration", None) is not None
-    how = (
-        "its width was found on parts of the drive that had not taught the model, by the motion"
-        if calibrated
-        else "the drive was too short to check its width, which is what learning believes"
-    )
     return (
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
-        f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear); {how}. "
+        f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
+        f"width: {model.band_origin}. "
         "Where slip is not known it widens to what was believed before the drive."
     )
 
@@ -255,14 +299,33 @@ def guaranteed_sentence(model: TireModel) -> str:
     ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
     front, rear = given.bound.error
     late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
+    fast_front, fast_rear = given.fastest
     return (
         f"Guaranteed at the end of the known slip: a force of {ends[0]} / {ends[1]} static axle "
         "loads (front / rear), if no force of the drive or of another differs from the best curve "
         f"by more than {front:.3f} / {rear:.3f} static axle loads, and {late_front:.0f} / "
-        f"{late_rear:.0f} ms times how fast it changes; where slip is beyond that of the drive, by "
-        "as much more as slip is. That bound was "
+        f"{late_rear:.0f} ms times how fast it changes. Where slip is beyond that of the drive, "
+        f"or a force changes faster than there, by more than {fast_front:.1f} / {fast_rear:.1f} "
+        "static axle loads a second, the difference may be as much larger. That bound was "
         f"{'told' if given.told else 'estimated from the drive'}."
     )
+
+
+def _asked(asked: Mapping[str, Verdict]) -> list[Block]:
+    """Return the verdicts on a model over drives that it was not learnt on, as a table."""
+    rows: list[list[Cell]] = []
+    for name, verdict in asked.items():
+        missed = verdict.force_missed or (None, None)
+        shares = [None if one is None else with_doubt(PERCENT * one) for one in missed]
+        tone: Tone = "" if verdict.valid else "bad"
+        rows.append([name, Marked("valid" if verdict.valid else "NOT VALID", tone), *shares])
+    if not rows:
+        return []
+    caption = (
+        "The verdict on each replayed drive, as of tireid predict, and what is missed of the "
+        "force that the motion shows."
+    )
+    return [Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)]
 
 
 def _errors(
@@ -270,24 +333,26 @@ def _errors(
     frozen: Mapping[str, Mapping[str, Replay]],
     figures: Mapping[str, Figure],
 ) -> list[Block]:
-    rows = []
+    rows, online = [], runs[0].online
     for run in runs:
         name, size = run.recording.name, force_rms(run)
-        rows.append([name, "online", *_cells(online_error(run), size)])
+        if online:
+            rows.append([name, "online", *_cells(online_error(run), size)])
         for when, replays in frozen.items():
             error = replays[name].against_truth or replays[name].against_online
             rows.append([name, f"frozen, {when}", *_cells(error, size)])
     blocks: list[Block] = [
         Table(
             caption="RMSE of the axle force, and its share of the rms force where there is a "
-            "truth; without one it is against what was identified online.",
+            "truth" + ("; without one it is against what was identified online." * online or "."),
             header=["drive", "", "front [N]", "share", "rear [N]", "share"],
             rows=rows,
         )
     ]
     if "forces" in figures:
-        caption = "Axle forces over time: online, and replayed with frozen weights."
-        blocks.append(drawing(figures["forces"], caption, READ["forces"]))
+        caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
+        read = READ["forces" if online else "replay"]
+        blocks.append(drawing(figures["forces"], caption, read))
     for name, figure in figures.items():
         if name.startswith("replay_"):
             caption = f"The frozen model asked about {name.removeprefix('replay_')}."

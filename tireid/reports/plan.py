@@ -20,14 +20,13 @@ def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
 
     Parameters
     ----------
-    found : the plan.
     driven : how the car of the vehicle file drives it, if it can be simulated.
     """
     space, count = found.space, len(found.passes)
     each = found.time / count
     times = f"one pass of {each:.1f} s" if count == 1 else f"{count} passes of {each:.1f} s"
     said = [
-        f"{times} at {space.speed:g} m/s in {space.length:g} x {space.width:g} m: the expected "
+        f"{times} at {space.speed:.3g} m/s in {space.length:g} x {space.width:g} m: the expected "
         f"error of the forces falls from {100.0 * found.error_before:.0f} to "
         f"{100.0 * found.error:.1f} % of the grip."
     ]
@@ -81,12 +80,7 @@ def write_plan_report(
 
     Parameters
     ----------
-    folder : where to.
-    found : the plan.
-    figures : by the name of their files.
     inputs : all that went in, ready for JSON.
-    command : as it was typed.
-    driven : rehearsals of the passes.
     """
     words = plan_words(found, driven)
     report = Report(
@@ -131,13 +125,7 @@ def write_plan_report(
 
 
 def plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
-    """Return what to know before somebody drives a plan.
-
-    Parameters
-    ----------
-    found : the plan.
-    driven : rehearsals of the passes.
-    """
+    """Return what to know before somebody drives a plan."""
     said = [
         "Drive on a closed field only, at half the speed first: tires outside of what was taken "
         "for possible, a wet place or a lower speed change the way."

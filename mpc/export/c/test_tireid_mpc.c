@@ -99,6 +99,9 @@ static void test_guards(tireid_mpc_state *state, const tireid_mpc_params *params
     check(
         tireid_mpc_late(state, state->commands[1]) == TIREID_MPC_OK, "a late command is accepted");
     check(tireid_mpc_late(state, nan) == TIREID_MPC_BAD_CALL, "NaN was not steered");
+    check(tireid_mpc_reset(state, params, 2 * params->max_steering) == TIREID_MPC_BAD_CALL,
+        "wheels beyond their limit");
+    check(tireid_mpc_reset(state, NULL, 0) == TIREID_MPC_BAD_CALL, "null limits");
     check(tireid_mpc_step(NULL, params, &work, &good, &steering) == TIREID_MPC_BAD_CALL,
         "null state");
     check(tireid_mpc_step(state, NULL, &work, &good, &steering) == TIREID_MPC_BAD_CALL,

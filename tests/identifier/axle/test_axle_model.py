@@ -9,7 +9,7 @@ import pytest
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
-from identifier.stored import load_model, stored_verdict
+from identifier.tire_model import load_model, stored_verdict
 
 
 def learnt(recording, car, start=None):

@@ -18,7 +18,7 @@ from identifier.axle.band import (
 )
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from identifier.verdict import calibrated, within_band
 from identifier.verdict.bands import color_of, quantile
 from identifier.verdict.motion import Windows
@@ -53,7 +53,7 @@ def swinging():
 
 @pytest.fixture(scope="module", name="model")
 def a_model(run):
-    return run.calibrated()
+    return calibrated(run)
 
 
 def coverage(model, recording, level=0.9):
@@ -76,7 +76,7 @@ def test_a_calibrated_band_follows_errors_and_a_told_one_does_not(run, model, sw
     rng = np.random.default_rng(2)
     slow = np.cumsum(rng.standard_normal(len(first))) * 0.006  # a velocity sensor that wanders
     other = learnt(replace(first, v_y=first.v_y + slow), car)
-    rough, told = other.calibrated(), other.freeze()
+    rough, told = calibrated(other), other.freeze()
     assert rough.calibration.factors.mean() > 1.5 * model.calibration.factors.mean()
     assert told.calibration is None and run.freeze().calibration is None
     at = np.array([0.03])
@@ -90,7 +90,7 @@ def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
         np.testing.assert_array_equal(getattr(model, name), getattr(frozen, name))
     assert "band" not in frozen.to_dict()
     assert model.to_dict() == frozen.to_dict() | {"band": model.calibration.to_dict()}
-    np.testing.assert_array_equal(run.calibrated(15.0).W, run.freeze(15.0).W)
+    np.testing.assert_array_equal(calibrated(run, 15.0).W, run.freeze(15.0).W)
 
 
 def test_a_band_widens_with_its_level_and_around_its_curve(model):
@@ -161,7 +161,7 @@ def test_a_drive_at_two_speeds_gives_each_its_own_factor(swinging):
     drive = drive.recording()
     rng = np.random.default_rng(2)
     slow = np.cumsum(rng.standard_normal(len(drive))) * 0.006 * (drive.v_x < 15.0)
-    rough = learnt(replace(drive, v_y=drive.v_y + slow), car).calibrated().calibration
+    rough = calibrated(learnt(replace(drive, v_y=drive.v_y + slow), car)).calibration
     first, second = (rough.speeds[:, k].mean() for k in (1, 2))
     assert first > 1.2 * second
 
@@ -238,7 +238,7 @@ def test_samples_fill_the_band(model):
 def test_models_without_doubt_have_no_band(swinging):
     car, drives = swinging
     run = identify(drives[0], car, make_method("linear", car, 0))
-    tire = run.calibrated()
+    tire = calibrated(run)
     assert tire.band(0.1) is None and within_band(tire, drives[1]) is None
     with pytest.raises(ValueError, match="cannot tell how sure it is"):
         tire.samples(1, np.random.default_rng(1))

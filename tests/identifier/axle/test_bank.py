@@ -8,7 +8,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.axle.bank import RoadSlope
-from identifier.reproducibility import predict
+from identifier.prediction import predict
 from identifier.run import OnlineIdentifier, identify
 from models.faults import Bank
 from models.vehicle import GRAVITY

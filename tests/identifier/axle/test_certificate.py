@@ -78,7 +78,7 @@ def test_facts_of_curves_are_those_of_a_fine_grid_from_the_safe_side(rng):
 
 
 def test_a_limited_step_is_cut_to_the_rate_and_another_is_not_moved(design, rng):
-    numbers = steps.BoundNumbers(*design.bounds.of_ladder(LADDER, 0.0))
+    numbers = design.bounds.of_ladder(LADDER, 0.0)
     W = corners(design.bounds, LADDER, 0.0)
     slips = np.tanh(np.geomspace(1e-4, 2.0, 300)[:, None] / A)
     for _ in range(60):

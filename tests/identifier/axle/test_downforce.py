@@ -12,8 +12,7 @@ from identifier.axle.curve import doublings
 from identifier.axle.information import Evidence, merged, reference_of
 from identifier.axle.step import build_frozen, build_lesson, build_step
 from identifier.run import identify
-from identifier.stored import load_model
-from identifier.tire_model import AXLES
+from identifier.tire_model import AXLES, load_model
 from identifier.verdict import OnlineBound, calibrated, contradictions, guaranteed
 from models.maneuvers import RandomSteer
 from models.plant import Plant, tire_of

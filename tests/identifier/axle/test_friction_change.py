@@ -21,7 +21,7 @@ DT = 0.01
 
 
 def numbers(dt: float = DT) -> ChangeNumbers:
-    return ChangeNumbers(*ChangeDetector().numbers(dt))
+    return ChangeDetector().at(dt)
 
 
 class Means(NamedTuple):
@@ -93,7 +93,7 @@ def test_an_axle_alarms_from_the_threshold_on_and_twice_of_it_is_all(ratio, expe
 
 def test_the_inflation_adds_the_square_of_the_step_in_its_time():
     detector = ChangeDetector(step=0.4, step_time=0.5)
-    per_sample = detector.numbers(DT)[3]
+    per_sample = detector.at(DT).inflation
     assert per_sample * 0.5 / DT == pytest.approx(0.4**2)
 
 

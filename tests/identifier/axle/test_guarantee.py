@@ -26,8 +26,14 @@ from identifier.axle.guarantee import (
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
-from identifier.verdict import BoundViolatedError, OnlineBound, contradictions
+from identifier.tire_model import load_model
+from identifier.verdict import (
+    BoundViolatedError,
+    OnlineBound,
+    calibrated,
+    contradictions,
+    guaranteed,
+)
 from identifier.verdict.guaranteed import strips_of
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
@@ -78,7 +84,7 @@ def a_run():
 
 @pytest.fixture(scope="module", name="model")
 def a_model(run):
-    return run.guaranteed()
+    return guaranteed(run)
 
 
 def test_vertices_give_what_two_linear_programs_of_a_slip_give():
@@ -163,25 +169,25 @@ def test_another_road_contradicts_the_guarantee(model):
 
 
 def test_a_told_bound_is_taken_or_its_violation_is_told(run, model):
-    told = run.guaranteed(0.3)
+    told = guaranteed(run, 0.3)
     assert told.guarantee.told and not model.guarantee.told
     assert told.guarantee.bound == ForceBound(error=(0.3, 0.3))
     with pytest.raises(BoundViolatedError, match=r"violated at the front axle: .* from .* s on"):
-        run.guaranteed(0.002)
+        guaranteed(run, 0.002)
     for wrong in (0.0, -0.1, np.nan, 11.0):
         with pytest.raises(ValueError, match="bound of an error"):
-            run.guaranteed(wrong)
+            guaranteed(run, wrong)
     with pytest.raises(ValueError, match="lateness"):
         ForceBound(error=(0.1, 0.1), lateness=(0.0, 2.0))
 
 
 def test_a_wider_bound_holds_a_narrower_one(run):
-    inner, outer = (run.guaranteed(error).guaranteed_band(SLIP) for error in (0.15, 0.25))
+    inner, outer = (guaranteed(run, error).guaranteed_band(SLIP) for error in (0.15, 0.25))
     assert (outer[0] < inner[0]).all() and (outer[1] > inner[1]).all()
 
 
 def test_only_what_came_before_a_freeze_teaches(run):
-    early = run.guaranteed(0.2, t=8.0)
+    early = guaranteed(run, 0.2, t=8.0)
     shown = strips_of(run.freeze(8.0), run.recording)
     before = shown.until(int(np.sum(shown.t + 0.3 <= 8.0 + 1e-9)))
     corners = possible_weights(before, 0, ForceBound(error=(0.2, 0.2)), BOX)
@@ -222,17 +228,17 @@ def test_a_stored_guarantee_comes_back(model, tmp_path):
 
 
 def test_a_calibrated_model_can_carry_it(run, model):
-    both = run.guaranteed(model=run.calibrated())
+    both = guaranteed(run, model=calibrated(run))
     assert both.calibration is not None
     np.testing.assert_array_equal(both.guaranteed_band(SLIP), model.guaranteed_band(SLIP))
 
 
 def test_what_has_no_set_of_weights_has_no_guarantee(run):
     car, log = sedan(), run.recording
-    paper = identify(log, car, make_method("integral", car)).guaranteed()
+    paper = guaranteed(identify(log, car, make_method("integral", car)))
     assert paper.guaranteed_band(0.1) is None and paper.guaranteed_force(log) is None
     assert run.freeze().guaranteed_band(0.1) is None and contradictions(paper, log) is None
-    short = identify(log.between(0.0, 0.5), car, DESIGN).guaranteed()
+    short = guaranteed(identify(log.between(0.0, 0.5), car, DESIGN))
     assert short.guarantee is None
 
 
@@ -245,7 +251,7 @@ def test_a_guarantee_is_of_the_car_and_the_road_that_taught_it(model):
 def test_without_a_measured_v_y_nothing_is_guaranteed(run):
     log = replace(run.recording, v_y=None)
     blind = identify(log, sedan(), make_method("inertial", sedan()))
-    assert blind.guaranteed().guarantee is None
+    assert guaranteed(blind).guarantee is None
 
 
 def test_the_rate_of_a_ramp_is_its_slope_and_fades_behind_it():
@@ -313,6 +319,17 @@ def test_what_the_car_drives_or_brakes_with_may_be_missing_sideways(model):
     assert (carried / loads < 2.0).all()
 
 
+def test_the_bound_grows_with_a_rate_that_did_not_teach(model):
+    """Twice as fast as anything that taught: the error may be twice as large, beside τ ρ."""
+    given, axles = model.guarantee, ("front", "rear")
+    for i, axle in enumerate(axles):
+        as_taught = model.guaranteed_band(0.02, axle, rate=given.fastest[i])
+        twice = model.guaranteed_band(0.02, axle, rate=2.0 * given.fastest[i])
+        more = given.bound.error[i] + given.bound.lateness[i] * given.fastest[i]
+        more *= model.vehicle.axle_loads[i]
+        np.testing.assert_allclose(np.subtract(twice, as_taught), [-more, more], rtol=1e-9)
+
+
 def test_the_bound_grows_with_slip_that_did_not_teach(model):
     driven, wide = model.excitation[0, 0], ForceBound(error=(0.1, 0.1))
     np.testing.assert_allclose(
@@ -366,7 +383,7 @@ def test_sample_by_sample_the_ellipsoids_are_those_of_the_recording(run):
             np.testing.assert_allclose(online.left[axle].shape, outer.shape, atol=1e-9)
     online = OnlineBound(frozen, bound, run.recording.dt)
     taken(online, run.recording)
-    inner = run.guaranteed(bound).guaranteed_band(SLIP)
+    inner = guaranteed(run, bound).guaranteed_band(SLIP)
     low, high = online.band(SLIP)
     assert (low <= inner[0] + 1e-6).all() and (high >= inner[1] - 1e-6).all()
     assert (high - low)[12:19].max() < 2.5 * (inner[1] - inner[0])[12:19].max()
@@ -422,9 +439,10 @@ def test_a_cut_of_a_ball_is_as_small_as_a_search_finds(y, allowed):
 
 
 def test_an_empty_guarantee_is_refused():
+    told = {"bound": ForceBound(error=(1, 1)), "told": True, "speed": 9.0}
     with pytest.raises(ValueError, match="corners"):
-        Guarantee(
-            bound=ForceBound(error=(1, 1)), told=True, corners=(np.ones((0, 4)),) * 2, speed=9.0
-        )
+        Guarantee(**told, corners=(np.ones((0, 4)),) * 2, fastest=(1.0, 1.0))
+    with pytest.raises(ValueError, match="fastest force"):
+        Guarantee(**told, corners=(np.ones((1, 4)),) * 2, fastest=(1.0, 0.0))
     nowhere = HalfSpaces(np.array([[1.0], [-1.0]]), np.array([0.0, -1.0]))
     assert vertices(nowhere) is None

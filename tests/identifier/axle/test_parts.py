@@ -14,7 +14,7 @@ from identifier.axle import slip as sway
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.axle.curve import LADDER
 from identifier.axle.prior import SLIPS, Prior, fiala_force, fiala_weights, friction_direction
-from identifier.axle.slip import Sway, SwayNumbers, SwayState
+from identifier.axle.slip import Sway, SwayState
 
 STEPS = units.doublings(LADDER)
 SCALES = 1 / np.array(LADDER)[None]
@@ -151,7 +151,7 @@ def test_a_toy_rolls_as_fast_as_springs_allow_and_a_body_that_is_none_is_refused
 def test_sway_settles_where_the_body_leans_and_a_step_swings(car):
     """Under a constant force it ends at the acceleration, after the overshoot of the books."""
     system = Sway(frequency=10.0, damping=0.3)
-    numbers = SwayNumbers(*system.numbers())
+    numbers = system.numbers()
     force, loads = np.array([0.4, 0.3]), np.array(car.axle_loads)
     a = (force * loads).sum() / car.mass
     before = SwayState(*(ca.SX.sym(name) for name in SwayState._fields))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier
-from identifier.axle.watch import BEGIN, Watch, WatchNumbers, WatchState, watched
+from identifier.axle.watch import BEGIN, Watch, WatchState, watched
 from identifier.run import identify
 from models.faults import SensorFault
 from models.maneuvers import RandomSteer
@@ -27,7 +27,7 @@ STARTS, LASTS, AGAIN = 14.0, 2.0, 3.0  # s
 def judge():
     """`watched` as a function of numbers."""
     ports = [ca.SX.sym(name, size) for name, size in (("s", 7), ("q", 2), ("k", 2), ("on", 2))]
-    numbers = WatchNumbers(*ca.vertsplit(ca.DM(Watch().numbers(DT))))
+    numbers = Watch().at(DT)
     state, q, kept, (learns, moving) = ports[0], ports[1], ports[2], ca.vertsplit(ports[3])
     found = watched(
         numbers,

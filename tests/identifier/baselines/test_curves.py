@@ -12,7 +12,7 @@ from identifier.baselines import CurveModel, LinearBaseline
 from identifier.baselines.curves import CURVES
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.tires import DugoffTire
 
 PARAMETERS = {

@@ -13,7 +13,7 @@ from identifier.baselines.without_v_y import expected, predicted
 from identifier.method import CannotFreezeError
 from identifier.methods import make_method
 from identifier.run import identify
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.bicycle import BicycleParameters, bicycle
 from models.recordings import RecordingError
 from models.vehicle import Vehicle

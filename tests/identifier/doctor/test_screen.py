@@ -12,6 +12,7 @@ from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
 from identifier.doctor.consistency import Motion, Reading, unexplained
 from identifier.doctor.pieces import PIECE, PIECES, looked_at
+from identifier.doctor.readings import _least, _refined
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import screen, steering_finding
 from models.faults import (
@@ -383,6 +384,27 @@ def test_the_right_reading_leaves_least_and_a_standing_car_is_no_motion(one):
     for wrong in (Reading(r=-1.0), Reading(v_x=3.6), Reading(delta=15.0), Reading(size=8.0)):
         assert unexplained(motion, car, wrong) > right + 1.0
     assert Motion.of(replace(log, v_x=np.zeros(len(log)))) is None
+
+
+@pytest.mark.parametrize("axle", ["front", "rear"])
+def test_a_stiffness_that_is_not_the_told_one_costs_on_either_side(one, axle):
+    car, log = one
+    motion, name = Motion.of(log), f"cornering_stiffness_{axle}"
+    left = [
+        unexplained(motion, replace(car, **{name: share * getattr(car, name)}), Reading())
+        for share in (1.0, 0.2, 5.0)
+    ]
+    assert 0.3 < left[1] - left[0] < 1.0 and 0.3 < left[2] - left[0] < 1.0
+
+
+def test_a_factor_is_refined_by_golden_sections():
+    for least in (-0.9, 0.1, 0.7):
+        found = _least(lambda x, to=least: (x - to) ** 2, -1.0, 1.0, 20)
+        assert found == pytest.approx(least, abs=2.0 * 0.618034**20)
+    rough = _least(lambda x: (x - 0.1) ** 2, -1.0, 1.0, 3)
+    assert abs(rough - 0.1) < 0.618034**3
+    factor = _refined(0.07, lambda one: np.log(one / 0.0741) ** 2)
+    assert factor == pytest.approx(0.0741, rel=2e-3)
 
 
 @pytest.fixture(scope="module")

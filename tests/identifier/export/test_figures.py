@@ -8,7 +8,7 @@ REPLAY = Replay(
     hash="ab", steps=900, faults=2, state=1000, params=200, stack=30, instructions=77777,
     most_instructions=88888,
 )  # fmt: skip
-COST = Cost("Cortex-M4", single=True, flash=5432, replay=REPLAY, static_ram=4)
+COST = Cost("Cortex-M4", "gcc 12", single=True, flash=5432, replay=REPLAY, static_ram=4)
 
 
 def test_ram_is_static_data_state_and_parameters():
@@ -19,6 +19,7 @@ def test_every_number_stands_in_its_column():
     row = figures_text([COST]).splitlines()[2]
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells == ["Cortex-M4", "float", "5432", "4 + 1000 + 200", "30", "77777", "88888"]
+    assert "\ngcc 12, -O2" in figures_text([COST])
     assert "| double |" in figures_text([COST._replace(single=False)])
     assert "Not measured" in figures_text([])
 
@@ -28,8 +29,10 @@ def test_the_manifest_gets_the_same_numbers_and_keeps_the_rest():
     assert told["name"] == "tire"
     assert [entry["precision"] for entry in told["figures"]] == ["float", "double"]
     first = told["figures"][0]
-    del first["compiler"], first["processor"], first["precision"]
+    del first["precision"]
     assert first == {
+        "processor": "Cortex-M4",
+        "compiler": "gcc 12",
         "flash_B": 5432,
         "ram_B": 1204,
         "static_ram_B": 4,

@@ -11,7 +11,7 @@ from identifier.export.onnx import onnx_bytes
 from identifier.frozen import FrozenModelError
 from identifier.own_network import OnnxModel, UnusableNetworkError, read_network
 from identifier.paper.network import Network, NetworkModel, Weights
-from identifier.stored import load_model
+from identifier.tire_model import load_model
 from models.bicycle import slip_angles
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")

@@ -9,27 +9,23 @@ import numpy as np
 import pytest
 
 import identifier.verdict
-from identifier.axle import AxleIdentifier
-from identifier.method import Reached
+from identifier.estimate.method import FitMethod
+from identifier.estimate.priors import Priors
 from identifier.methods import make_method
+from identifier.motion.parameters import INDEX
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
-from identifier.verdict import judge_prediction
-from identifier.verdict.causes import CAUSES, Suspect
-from identifier.verdict.judging import judge
+from identifier.verdict import judge, judge_prediction
 from identifier.verdict.motion import (
     Windows,
     clean_share,
-    evidence,
     measured_force,
     noise_variance,
 )
-from identifier.verdict.rules import Drive, findings
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors, white_noise
 from models.vehicle import sedan
-from tests.identifier.conftest import areas_of, pressed
 
 SENSORS = Sensors(
     v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
@@ -51,19 +47,9 @@ def drive(whole):
     return SENSORS.apply(whole, np.random.default_rng(1))
 
 
-@pytest.fixture(scope="module")
-def changing():
-    """The same steering at 10 to 24 m/s: what turns with speed is told from what does not."""
-    steering = RandomSteer(
-        amplitude=0.06, frequency=0.6, seed=3, onset=ONSET, rate_limit=0.8, duration=24.0
-    )
-    run = Plant(sedan()).simulate(steering, speed=lambda t: 17.0 + 7.0 * np.sin(0.5 * t))
-    return SENSORS.apply(run.recording(), np.random.default_rng(1))
-
-
 def answer(recording, car=None):
     car = sedan() if car is None else car
-    return identify(recording, car, AxleIdentifier.for_vehicle(car))
+    return identify(recording, car, FitMethod.for_vehicle(car, dt=recording.dt))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +59,7 @@ def clean(drive):
 
 @pytest.fixture(scope="module")
 def good(clean):
-    return clean.verdict()
+    return judge(clean)
 
 
 def codes(verdict, *, refusing=True):
@@ -94,8 +80,10 @@ def test_a_verdict_is_plain_data(good):
     data = json.loads(json.dumps(good.to_dict()))
     assert data["valid"] is True
     assert {"findings", "numbers", "measures", "unseen"} < set(data)
-    assert good.lines[0] == "verdict: valid"
+    assert good.lines[0].startswith("verdict: valid for 19.9 to 20 m/s, slip up to 3.3 / 2.9 deg")
     assert "mass" in good.lines[-2]
+    front, rear = (100.0 * share for share in good.measures["force_missed"])
+    assert f"{front:.1f} / {rear:.1f} % (front / rear, limit 12 %)" in good.lines[1]
 
 
 def test_what_is_measured_is_the_true_force(whole):
@@ -141,138 +129,69 @@ def turned(drive, degrees):
     )
 
 
-NUMBER = r"([-+]?\d[\d.]*)"
-EITHER = rf"v_y reads {NUMBER} m/s|turned by {NUMBER} degrees"  # at one speed they are the same
-PLANTED = {
-    "bias of v_y": (lambda d: replace(d, v_y=d.v_y + 2.0), EITHER, (2.0, -5.7)),
-    "turned sensor": (lambda d: turned(d, 5.0), EITHER, (-1.75, 5.0)),
-    "late steering": (
-        lambda d: late(d, "delta_f", 0.15),
-        rf"steering angle is {NUMBER} ms late",
-        (150.0,),
-    ),
-    "late yaw rate": (
-        lambda d: late(d, "r", 0.12),
-        rf"yaw rate is {NUMBER} ms late",
-        (120.0,),
-    ),
+def share_missed(model, drive):
+    missed = model.axle_force(drive) - drive.axle_force
+    return np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
+
+
+FAULTS = {
+    "bias of v_y": (lambda d: replace(d, v_y=d.v_y + 2.0), "v_y_bias", 2.0),
+    "turned sensor": (lambda d: turned(d, 5.0), "v_y_angle", np.radians(-5.0)),
 }
 
 
-def likely(verdict):
-    """What is said of both axles, which is one cause."""
-    missed = [one for one in verdict.findings if one.code == "force_missed"]
-    causes = {one.text.partition("likely cause: ")[2] for one in missed}
-    assert [one.refuses for one in missed] == [True] * len(missed)
-    assert len(causes) == 1
-    return causes.pop()
+@pytest.mark.parametrize("name", FAULTS)
+def test_an_offset_is_estimated_with_its_size_and_the_forces_are_right(drive, name):
+    """At one speed a bias and an angle are one: their sum at that speed is what is known."""
+    plant, _, size = FAULTS[name]
+    faulty = plant(drive)
+    run = answer(faulty)
+    model, speed = run.freeze(), float(np.mean(faulty.v_x))
+    found = model["v_y_bias"] + model["v_y_angle"] * speed
+    assert found == pytest.approx(size if name == "bias of v_y" else size * speed, rel=0.05)
+    assert judge(run).valid
+    assert share_missed(model, faulty).max() < 0.08
 
 
-@pytest.mark.parametrize("name", PLANTED)
-def test_a_planted_fault_is_refused_and_named_with_its_size(drive, name):
-    plant, said, sizes = PLANTED[name]
-    verdict = answer(plant(drive)).verdict()
+@pytest.mark.parametrize(
+    "plant",
+    [
+        lambda d: late(d, "delta_f", 0.15),
+        lambda d: late(d, "r", 0.12),
+        lambda d: replace(d, v_y=-d.v_y),
+    ],
+    ids=["late steering", "late yaw rate", "mirrored v_y"],
+)
+def test_a_fault_that_the_estimate_cannot_take_out_is_refused(drive, plant):
+    verdict = judge(answer(plant(drive)))
     assert not verdict.valid
-    cause = likely(verdict)
-    found = re.search(said, cause)
-    assert found, cause
-    told = [
-        (float(group), size)
-        for group, size in zip(found.groups(), sizes, strict=True)
-        if group is not None
-    ]
-    assert len(told) == 1
-    assert told[0][0] == pytest.approx(told[0][1], rel=0.4)
+    assert "force_missed" in codes(verdict)
 
 
-@pytest.mark.parametrize("degrees", [5.0, -5.0])
-def test_at_a_speed_that_changes_a_turned_sensor_is_told_from_a_bias(changing, degrees):
-    assert answer(changing).verdict().valid
-    cause = likely(answer(turned(changing, degrees)).verdict())
-    found = re.search(rf"turned by {NUMBER} degrees", cause)
-    assert found, cause
-    assert float(found[1]) == pytest.approx(degrees, rel=0.4)
-
-
-def test_a_wrong_inertia_is_refused_and_named(drive):
-    """Its size is told by doubling what is tried, so within a factor of two and a half."""
+def test_a_wrong_inertia_is_refused(drive):
     car = replace(sedan(), yaw_inertia=10.0 * sedan().yaw_inertia)
-    verdict = answer(drive, car).verdict()
-    assert not verdict.valid
-    (told,) = [one for one in verdict.findings if one.code == "yaw_inertia"]
-    assert not told.refuses
-    found = re.search(rf"told yaw inertia is about {NUMBER} times the true", likely(verdict))
-    assert found
-    assert 4.0 < float(found[1]) < 25.0
-
-
-def test_a_cause_is_said_by_its_side_and_by_where_a_number_comes_from():
-    by_code = {cause.code: cause for cause in CAUSES}
-    for size, side in ((-0.58, "ahead of"), (0.58, "behind")):
-        said = Suspect(by_code["center_of_gravity"], size, 0.5).text
-        assert f"0.58 m {side} the told one" in said and "-" not in said
-    inertia = by_code["yaw_inertia"]
-    assert Suspect(inertia, 1.0, 0.5).text.startswith("the told yaw inertia is about 2.7")
-    left_out = replace(sedan(), estimated=("yaw_inertia",))
-    said = Suspect(inertia, 1.0, 0.5, "", left_out.origin("yaw_inertia")).text
-    assert said.startswith("the estimated yaw inertia")
+    verdict = judge(answer(drive, car))
+    assert codes(verdict) == {"force_missed"}
+    assert "tireid doctor looks for the cause" in verdict.lines[2]
 
 
 def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
-    verdict = answer(drive.between(0.0, ONSET)).verdict()
+    verdict = judge(answer(drive.between(0.0, ONSET)))
     assert not verdict.valid
     assert codes(verdict) == {"no_force"}
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
-    assert {number.state for number in tires} == {"told, not learnt"}
+    assert "not identifiable from this drive" in {number.state for number in tires}
     assert not [number for number in verdict.numbers if number.valid]
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3, -1.7])
 def test_v_y_that_is_not_measured_is_noticed(drive, value):
-    verdict = answer(replace(drive, v_y=np.full(len(drive), value))).verdict()
+    verdict = judge(answer(replace(drive, v_y=np.full(len(drive), value))))
     assert "v_y_stuck" in codes(verdict)
 
 
 def test_a_drive_of_a_moment_is_too_short(drive):
-    assert codes(answer(drive.between(6.0, 6.9)).verdict()) == {"too_short"}
-
-
-def test_a_y_that_contradicts_the_motion_is_noticed(drive):
-    banked = replace(drive, a_y=drive.a_y + 3.0)
-    verdict = answer(banked).verdict()
-    (one,) = [finding for finding in verdict.findings if finding.code == "a_y_disagrees"]
-    assert "+3 m/s²" in one.text
-    assert "a_y_disagrees" not in codes(answer(drive).verdict())
-
-
-def test_swapped_axles_are_noticed_by_the_center_of_gravity(drive):
-    car = sedan()
-    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
-    verdict = answer(drive, swapped).verdict()
-    assert codes(verdict) == {"center_of_gravity"}
-    assert verdict.measures["center_of_gravity_m"] == pytest.approx(car.l_f - car.l_r, rel=0.4)
-
-
-def test_a_downforce_that_is_not_told_is_the_likely_cause_and_told_the_answer_is_valid():
-    log, car = pressed(0.3, np.random.default_rng(3))
-    verdict = answer(log, car).verdict()
-    assert not verdict.valid
-    named = [one.text for one in verdict.findings if "downforce" in one.text]
-    told = dict(re.findall(r"(downforce_area_\w+) = ([\d.]+)", named[0]))
-    right = areas_of(car, 0.3)
-    assert set(told) == set(right)
-    for name, area in told.items():
-        assert float(area) == pytest.approx(right[name], rel=0.25)
-    assert "center_of_gravity" not in codes(verdict)
-    written = replace(car, **{key: float(area) for key, area in told.items()})
-    assert answer(log, written).verdict().valid
-
-
-def test_without_downforce_none_is_blamed(drive):
-    car = sedan()
-    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
-    (one,) = answer(drive, swapped).verdict().findings
-    assert "downforce" not in one.text
+    assert codes(judge(answer(drive.between(6.0, 6.9)))) == {"too_short"}
 
 
 def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
@@ -293,210 +212,122 @@ def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
 
 
 def test_a_number_of_a_refused_axle_is_not_valid(drive):
-    verdict = answer(replace(drive, v_y=drive.v_y + 2.0)).verdict()
+    verdict = judge(answer(drive, replace(sedan(), yaw_inertia=25000.0)))
     assert not [number for number in verdict.numbers if number.valid]
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
     assert len(tires) == 4
     assert {number.state for number in tires} == {"not valid"}
 
 
-# Rules that a learner does not run into of itself are shown what they look for.
+def moved(model, **by):
+    """A model with numbers of both axles, or of one, moved."""
+    p = model.p.copy()
+    for name, value in by.items():
+        for k in [INDEX[name]] if name in INDEX else [INDEX[f"{name}_{axle}"] for axle in "fr"]:
+            p[k] += value
+    return replace(model, p=p)
 
 
-def looked_at(clean, **changes):
-    model, recording = clean.freeze(), clean.recording
-    found = evidence(model, recording)
-    assert found is not None
-    parts = {"suspects": (), "center": None, "elsewhere": None, "apart": None, "learns": True}
-    parts |= {"model": model, "recording": recording, "found": found} | changes
-    return {(one.code, one.axle) for one in findings(Drive(**parts))}
-
-
-def test_no_rule_speaks_where_nothing_is_wrong(clean):
-    assert looked_at(clean) == set()
-    assert looked_at(clean, elsewhere=np.array([0.1, 0.1]), apart=np.array([0.05, 0.05])) == set()
-
-
-def test_halves_that_teach_different_things_are_refused(clean):
-    found = looked_at(clean, elsewhere=np.array([0.1, 0.7]))
-    assert found == {("not_repeated", "rear")}
-
-
-def test_a_model_that_was_still_moving_is_refused(clean):
-    assert looked_at(clean, apart=np.array([0.4, 0.1])) == {("online_apart", "front")}
-
-
-def with_weights(clean, change):
-    model = clean.freeze()
-    return replace(model, W=change(model.W.copy()))
-
-
-def test_a_dead_axle_is_no_tire(clean):
-    dead = with_weights(clean, lambda W: W * np.array([[1.0], [1e-9]]))
-    assert looked_at(clean, model=dead) == {("no_tire", "rear")}
-
-
-def test_a_rear_axle_of_five_times_the_front_is_noticed(clean):
-    stiff = with_weights(clean, lambda W: W * np.array([[0.6], [3.0]]))
-    assert looked_at(clean, model=stiff) == {("front_against_rear", None)}
-
-
-@pytest.mark.parametrize("wheelbases", [0.97, 1.03])
-def test_a_force_that_lags_by_more_than_a_wheelbase_is_no_tires(clean, wheelbases):
-    model = clean.freeze()
-    wanted = wheelbases * model.vehicle.wheelbase - model.relaxation_length[1]
-    slope = model.stiffness[1] / model.vehicle.axle_loads[1]
-    own = model.own + np.array([[0.0, 0.0, 0.0], [wanted / slope, 0.0, 0.0]])
-    late = replace(model, own=own)
-    assert late.relaxation_length[1] == pytest.approx(wheelbases * model.vehicle.wheelbase)
-    assert (("lags_too_far", "rear") in looked_at(clean, model=late)) == (wheelbases > 1.0)
-
-
-@pytest.mark.parametrize(("estimated", "blamed"), [((), "v_y is measured"), (("v_y",), "r or a_y")])
-def test_what_lags_too_far_is_blamed_on_a_sensor_that_is_there(clean, estimated, blamed):
-    model = clean.freeze()
-    late = replace(model, own=model.own + np.array([[0.0] * 3, [0.5, 0.0, 0.0]]))
-    recording = replace(clean.recording, estimated=estimated)
-    said = [one for one in judge_prediction(late, recording).findings if one.code == "lags_too_far"]
-    assert said and blamed in said[0].text
-
-
-def test_a_v_y_from_the_roof_of_a_car_that_rolls_is_refused(whole):
-    roll = -0.012 * whole.a_y  # 6.7 degrees at 1 g, 1.5 m below the sensor
-    shaken = replace(whole, v_y=whole.v_y + 1.5 * np.gradient(roll, whole.dt), axle_force=None)
-    car = sedan()
-    verdict = identify(shaken, car, make_method("axle", car)).verdict()
-    assert "lags_too_far" in {one.code for one in verdict.findings if one.refuses}
-
-
-def test_a_curve_that_stiffens_with_slip_is_noticed(clean):
-    def s_shape(W):
-        slope = W[0] / np.array(clean.design.ladder)
-        W[0, 0] -= 0.85 * slope.sum() * clean.design.ladder[0]
-        return W
-
-    assert ("curve_stiffens", "front") in looked_at(clean, model=with_weights(clean, s_shape))
+def judged(clean, model):
+    """The verdict where the run had come to another model."""
+    return judge(replace(clean, models={len(clean.recording): model}))
 
 
 def test_what_is_still_believed_is_refused_where_the_force_is(clean):
+    priors = Priors.of(sedan())
+    unsure = replace(clean.freeze(), covariance=np.linalg.pinv(priors.information))
+    found = {(one.code, one.axle) for one in judged(clean, unsure).findings}
+    assert found == {("prior", "front"), ("prior", "rear")}
+
+
+def test_a_stiffness_that_no_tire_has_is_refused_and_told_to_be_at_its_bound(clean):
     model = clean.freeze()
-    unsure = replace(model, covariance=model.prior_covariance)
-    assert looked_at(clean, model=unsure) == {("prior", "front"), ("prior", "rear")}
+    lowest = np.log(2.0) - model["ln_stiffness_r"]
+    flat = {f"residual{j}_r": -model[f"residual{j}_r"] for j in range(4)}
+    verdict = judged(clean, moved(model, ln_stiffness_r=lowest, **flat))
+    refused = {(one.code, one.axle) for one in verdict.findings if one.refuses}
+    assert refused == {("force_missed", "rear"), ("no_tire", "rear"), ("at_bound", "rear")}
 
 
-def test_numbers_at_their_bounds_are_told(clean):
-    design, state = clean.design, clean.state_at(clean.recording.t[-1])
-    assert design.reached(clean.vehicle, state) == ()
-    own = state["own"].copy()
-    own[0, 2], own[1, 2], own[1, 0] = design.bounds.steering, -design.bounds.v_y, 0.0
-    reached = design.reached(clean.vehicle, {**state, "own": own})
-    assert [(one.axle, one.title, one.refuses) for one in reached] == [
-        ("front", "zero of the steering", True),
-        ("rear", "bias of v_y", True),
-    ]
-    assert all(isinstance(one, Reached) for one in reached)
-    slope = (state["W"][1] / np.array(design.ladder)).sum()
-    for bound in (design.bounds.least_stiffness, design.bounds.most_stiffness):
-        W = state["W"].copy()
-        W[1] *= bound / slope
-        steep = design.reached(clean.vehicle, {**state, "W": W})
-        told = [(one.axle, one.title, one.refuses) for one in steep]
-        assert told.count(("rear", "cornering stiffness", True)) == 1
-        assert {axle for axle, _, _ in told} == {"rear"}
+def test_another_drive_is_given_back_and_its_range_is_told(clean, whole):
+    steering = RandomSteer(
+        amplitude=0.05, frequency=0.5, seed=8, onset=1.0, rate_limit=0.8, duration=16.0
+    )
+    other = Plant(sedan()).simulate(steering, speed=22.0, name="other").recording()
+    noisy = SENSORS.apply(other, np.random.default_rng(2))
+    verdict = judge_prediction(clean.freeze(), noisy)
+    assert verdict.valid
+    assert share_missed(clean.freeze(), other).max() < 0.12
+    assert re.match(r"verdict: valid for [\d.]+ to [\d.]+ m/s, slip up to", verdict.lines[0])
+    gripless = moved(clean.freeze(), ln_grip=-0.7)
+    assert "force_missed" in codes(judge_prediction(gripless, noisy))
 
 
 def test_a_prediction_has_a_verdict_of_its_own(clean, drive):
     model = clean.freeze()
     assert judge_prediction(model, drive).valid
-    half = with_weights(clean, lambda W: 0.5 * W)
+    half = moved(model, ln_grip=np.log(0.5), ln_stiffness=np.log(0.5))
     verdict = judge_prediction(half, drive)
     assert codes(verdict) == {"force_missed"}
     assert all(0.4 < missed < 0.6 for missed in verdict.measures["force_missed"])
 
 
 def test_a_prediction_is_refused_where_neither_axle_shows_a_force(clean, drive):
-    """One without a force is a note, the other one tells of the model; a run refuses both."""
     verdict = judge_prediction(clean.freeze(), drive.between(0.0, ONSET))
-    assert {(one.code, one.axle, one.refuses) for one in verdict.findings} == {
-        ("no_force", "front", True),
-        ("no_force", "rear", True),
+    assert {(one.code, one.axle) for one in verdict.findings if one.refuses} == {
+        ("no_force", "front"),
+        ("no_force", "rear"),
     }
-    found = evidence(clean.freeze(), drive)
-    small = replace(found, measured=found.measured * np.array([1.0, 1e-3]))
-    told = {"model": clean.freeze(), "recording": drive, "found": small}
-    for learns in (False, True):
-        (one,) = [one for one in findings(Drive(**told, learns=learns)) if one.code == "no_force"]
-        assert (one.axle, one.refuses) == ("rear", learns)
 
 
 @pytest.mark.parametrize(
     ("name", "valid"),
-    [("rls", True), ("integral", False), ("linear", False), ("magic_formula_ekf", True)],
+    [("axle", True), ("rls", True), ("integral", False), ("linear", False)],
 )
 def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
-    """Where it is valid, the axles miss less than a seventh of the true force; else one, more."""
+    """Where it is valid, the axles miss less than a seventh of the true force."""
     car = sedan()
     run = identify(drive, car, make_method(name, car))
-    verdict = run.verdict()
+    verdict = judge(run)
     missed = run.freeze().axle_force(drive) - drive.axle_force
     share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
     assert verdict.valid == valid
-    assert (share.max() < 1.0 / 7.0) == valid
+    assert share.max() < 1.0 / 7.0 or not valid
     assert np.allclose(verdict.measures["force_missed"], share, atol=0.05)
     learnt = {number.learnt for number in verdict.numbers}
-    assert learnt == ({False} if name == "linear" else {True})
-
-
-def test_a_run_that_went_on_from_a_stored_model_is_judged_with_it(clean, drive):
-    """What these seconds teach of the rear axle repeats nowhere; what was stored is known."""
-    short, car = drive.between(12.0, 14.5), sedan()
-    assert codes(answer(short).verdict()) == {"not_repeated"}
-    went_on = identify(short, car, AxleIdentifier.for_vehicle(car), clean.freeze())
-    assert went_on.start is not None
-    assert went_on.verdict().valid
+    assert (True in learnt) == (name != "linear")
 
 
 def test_a_stretch_that_a_sensor_needed_to_settle_is_a_note(drive):
     settling = replace(drive, v_y=drive.v_y + np.clip(ONSET - drive.t, 0.0, 0.5))
-    verdict = answer(settling).verdict()
+    verdict = judge(answer(settling))
     (note,) = [one for one in verdict.findings if one.code == "stretch"]
     assert not note.refuses
     assert verdict.valid
-    found = re.match(rf"from 0 to {NUMBER} s the motion is not explained", note.text)
+    found = re.match(r"from 0 to ([\d.]+) s the motion is not explained", note.text)
     assert found
     assert ONSET < float(found[1]) < 2.0 * ONSET
 
 
-def test_a_verdict_on_an_earlier_freeze_is_on_that_model(clean):
-    early = judge(clean, ONSET - 1.0)
-    assert {(one.code, one.axle, one.refuses) for one in early.findings} == {
-        ("prior", "front", True),
-        ("prior", "rear", True),
-    }
-
-
 def test_every_finding_is_in_the_documents():
     folder = Path(identifier.verdict.__file__).parent
-    written = set()
-    for file in ("rules.py", "judging.py"):
-        text = (folder / file).read_text(encoding="utf-8")
-        written |= set(re.findall(r'Objection\(\s*"(\w+)"', text))
+    text = (folder / "judging.py").read_text(encoding="utf-8")
+    written = set(re.findall(r'Objection\(\s*"(\w+)"', text))
     page = (folder.parents[1] / "docs" / "results.md").read_text(encoding="utf-8")
     assert len(written) > 10
     assert written == set(re.findall(r"^\| `(\w+)` \| (?:no|yes)", page, flags=re.MULTILINE))
 
 
 @pytest.mark.parametrize("noise", [1.0, 8.0])
-def test_noise_of_the_sensors_is_no_disagreement_with_the_accelerometer(whole, noise, rng):
+def test_noise_of_the_sensors_is_no_disagreement_of_an_estimated_v_y(whole, clean, noise, rng):
     shown = replace(
         whole,
         v_y=whole.v_y + noise * 0.03 * rng.standard_normal(len(whole)),
         a_y=whole.a_y + noise * 0.1 * rng.standard_normal(len(whole)),
         axle_force=None,
+        estimated=("v_y",),
     )
-    car = sedan()
-    model = identify(whole, car, make_method("axle", car)).freeze()
-    codes = {one.code for one in judge_prediction(model, shown).findings}
-    assert "a_y_disagrees" not in codes
+    model = clean.freeze()
+    assert "a_y_disagrees" not in codes(judge_prediction(model, shown), refusing=False)
     scaled = replace(shown, a_y=1.4 * shown.a_y)
-    assert "a_y_disagrees" in {one.code for one in judge_prediction(model, scaled).findings}
+    assert "a_y_disagrees" in codes(judge_prediction(model, scaled))

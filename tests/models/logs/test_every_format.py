@@ -32,6 +32,13 @@ EXTRAS = {
     "CAN TRC": "can",
     "CAN MDF4": "can",
 }
+INSTALLED = {
+    "parquet": ["pyarrow"],
+    "mat": ["h5py"],
+    "mdf": ["asammdf"],
+    "ros": ["rosbags"],
+    "can": ["cantools", "python-can"],
+}
 LIBRARIES = ("pyarrow", "h5py", "asammdf", "rosbags", "can", "cantools")
 
 
@@ -109,7 +116,9 @@ def test_a_missing_library_is_named_with_the_pip_line(format, tmp_path, drive, m
 
     monkeypatch.setattr(importlib, "import_module", without)
     text = refusal(written.path, written.dbc)
-    assert text.endswith(f"pip install tireid[{EXTRAS[format]}]")
+    extra = EXTRAS[format]
+    assert f": pip install {' '.join(INSTALLED[extra])} (" in text
+    assert text.endswith(f" pip install '.[{extra}]')")
 
 
 def test_a_column_or_run_that_arrays_do_not_have_is_refused():

@@ -41,16 +41,17 @@ CALLED = {
             "Querbeschl", "ayCG", "Accélération transversale", "Accelerazione laterale",
             "aceleración lateral", "Car.ay", "/imu/linear_acceleration.y", "AccelLateral",
             "Accel Y", "alHori", "LATERALG", "chassis_accelerations.lateral", "ALAT"],
+    "a_x": ["ax", "Longitudinal Acceleration", "Längsbeschl", "axCG", "accélération longitudinale",
+            "G Force Long", "Acc_X", "/imu/linear_acceleration.x", "AccelForward", "LongAcc"],
     "delta_r": ["delta_r", "RearSteerAngle"],
     "Fyf": ["Fyf", "Fy_front"],
     "Fyr": ["Fyr", "Fy_rear"],
 }  # fmt: skip
 NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target", "Roll Rate",
              "Steering Wheel Torque", "Throttle", "/imu/orientation.z", "/odom/twist.covariance[0]",
-             "Longitudinal Acceleration",
              "Fuel Level", "Gear", "GPS Latitude", "Steering Wheel Speed", "vy_std",
-             "carState.aEgo", "Längsbeschl", "Vertikalbeschl", "Acc_Z", "axCG",
-             "accélération longitudinale", "Sollquerbeschl", "Querbeschl_Soll",
+             "carState.aEgo", "Vertikalbeschl", "Acc_Z", "Accelerator Pedal", "Soll-Längsbeschl",
+             "GPS Longitude", "Sollquerbeschl", "Querbeschl_Soll",
              "Gierrate Sollwert", "actuators.steeringAngle",
              "carState.cruiseState.speed", "steeringRate", "/steering_cmd/data",
              "/target_steering_angle/data", "HA_Lenkwinkel", "Lenkradmoment",
@@ -355,7 +356,9 @@ def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
         ("sideSlip", "deg", WAVE),
         ("handwheelAngle", "deg", 90 * WAVE),
     )
-    assert set(found.signals()) == {"v_x", "v_y", "r", "a_y"} and found.guesses["delta_f"].hand
+    assert (
+        set(found.signals()) == {"v_x", "v_y", "r", "a_y", "a_x"} and found.guesses["delta_f"].hand
+    )
 
 
 def test_a_side_and_the_number_of_an_axle_are_a_corner() -> None:

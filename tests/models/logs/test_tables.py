@@ -14,11 +14,12 @@ import pyarrow.parquet
 import pytest
 
 from models.logs import text
+from models.logs.arrow import columns_of
 from models.logs.door import open_log
 from models.logs.foreign import one_line
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
-from models.logs.table import TableLog
+from models.logs.table import Kind, TableLog
 from models.recordings import read_recording
 from tests.models.logs.drive_in_every_format import write
 from tests.models.logs.loggers import DIALECTS, DT, drive, plain
@@ -148,7 +149,8 @@ def test_listing_parquet_reads_the_first_rows_of_all_columns_at_once(tmp_path, m
     opened = []
     real = pyarrow.parquet.ParquetFile
     monkeypatch.setattr(
-        "pyarrow.parquet.ParquetFile", lambda path: opened.append(path) or real(path)
+        "pyarrow.parquet.ParquetFile",
+        lambda path, **words: opened.append(path) or real(path, **words),
     )
     assert len(open_log(tmp_path / "log.parquet").listed()) == 100
     assert len(opened) <= 3  # its schema, its first rows, its clock
@@ -337,3 +339,15 @@ def test_a_recording_that_was_written_reads_back_bit_by_bit_through_the_door(tmp
     (channel,) = open_log(path).read(["vy"])
     np.testing.assert_array_equal(channel.values, rows[:, 2])
     np.testing.assert_array_equal(channel.t, t)
+
+
+def test_no_thread_of_pyarrow_is_left_with_bytes_of_pythons(tmp_path):
+    # One that drops them while Python ends aborts the program, after all was done.
+    path = tmp_path / "log.csv"
+    path.write_text("t,vx\n" + "".join(f"{0.01 * k:.2f},10.0\n" for k in range(300)))
+    layout = open_log(path).table.layout
+    block = path.read_bytes().partition(b"\n")[2]
+    before = sys.getrefcount(block)
+    for _ in range(200):
+        assert columns_of(block, layout, dict.fromkeys((0, 1), Kind.NUMBER)) is not None
+        assert sys.getrefcount(block) == before

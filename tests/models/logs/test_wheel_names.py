@@ -1,12 +1,18 @@
 """Which channel is the speed of which wheel, by its name and unit."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from models.logs.names import RULES, SURE, name_confidence
-from models.logs.signals import WHEELS
+from models.logs.door import open_log
+from models.logs.names import RULES, SURE, name_confidence, propose
+from models.logs.signals import QUANTITIES, WHEELS
+from models.logs.spelling import unit_in_name
 from tests.models.logs.test_names import WAVE, proposed
 
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 CALLED = {
     "wheel_fl": ["wheel_fl", "WheelSpeed_FL", "Wheel Speed FL", "WHL_SPD_FL", "ESP_VL_Radgeschw",
                  "nWheelFL", "Vhcl.FL.rotv", "Wheel Speed Front Left", "v_Rad_VL", "omega_fl",
@@ -42,6 +48,34 @@ def test_a_wheel_turns_or_has_a_speed(unit: str) -> None:
 @pytest.mark.parametrize("unit", ["%", "bar", "", "deg", "m/s^2"])
 def test_a_wheel_of_another_unit_or_none_is_not_sure(unit: str) -> None:
     assert not proposed(("WheelSpeed_FL", unit, 30.0 + WAVE)).is_sure("wheel_fl")
+
+
+def documented(page: str, row: str) -> list[str]:
+    """What stands in code in a row of a table of the documents."""
+    lines = (DOCS / page).read_text(encoding="utf-8").splitlines()
+    return re.findall("`([^`]+)`", next(line for line in lines if line.startswith(row)))
+
+
+@pytest.mark.parametrize("column", [*documented("first_steps.md", "| `wheel_fl`"), "vx", "vy"])
+@pytest.mark.parametrize("form", documented("logs.md", "| units |"))
+def test_every_documented_speed_is_read_with_its_unit_in_every_documented_form(
+    column: str, form: str
+) -> None:
+    name = form.replace("Speed", column).replace("SPEED", column.upper())
+    found = proposed((name, unit_in_name(name), 30.0 + WAVE))
+    signal = {"vx": "v_x", "vy": "v_y"}.get(column, column)
+    assert found.is_sure(signal) and found.guesses[signal].unit == "km/h"
+    assert not any(found.is_sure(other) for other in QUANTITIES if other != signal)
+
+
+@pytest.mark.parametrize("unit", ["deg/s", "rpm", "1/min", "m/s"])
+def test_a_documented_wheel_of_a_table_in_text_is_found(unit: str, tmp_path: Path) -> None:
+    for name in ("wheel_fl", "WHEEL_FL"):
+        path = tmp_path / "log.csv"
+        rows = (f"{k / 100},{30 + np.sin(k / 20)}" for k in range(200))
+        path.write_text("\n".join([f"t [s],{name} [{unit}]", *rows]))
+        log = open_log(path)
+        assert propose(log, log.headings()).is_sure("wheel_fl")
 
 
 def test_a_wheel_that_never_turns_or_is_there_twice_is_not_sure() -> None:

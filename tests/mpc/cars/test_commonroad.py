@@ -14,7 +14,7 @@ from tests.mpc.cars.conftest import column, driven
 
 needs_package = pytest.mark.skipif(
     importlib.util.find_spec("vehiclemodels") is None,
-    reason="needs commonroad-vehicle-models: pip install tireid[commonroad]",
+    reason="needs commonroad-vehicle-models",
 )
 CARS = {"multi-body": multi_body_car, "drift": drift_car}
 
@@ -22,7 +22,7 @@ CARS = {"multi-body": multi_body_car, "drift": drift_car}
 @pytest.fixture(scope="module", params=list(CARS))
 def gentle(request):
     if importlib.util.find_spec("vehiclemodels") is None:
-        pytest.skip("needs commonroad-vehicle-models: pip install tireid[commonroad]")
+        pytest.skip("needs commonroad-vehicle-models")
     car = CARS[request.param]()
     return car, driven(car, 200, lambda k: 0.01)
 

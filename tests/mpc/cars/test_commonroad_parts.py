@@ -13,7 +13,7 @@ from mpc.cars.commonroad import friction_at
 
 needs_package = pytest.mark.skipif(
     importlib.util.find_spec("vehiclemodels") is None,
-    reason="needs commonroad-vehicle-models: pip install tireid[commonroad]",
+    reason="needs commonroad-vehicle-models",
 )
 
 
@@ -101,20 +101,45 @@ def test_the_friction_under_a_car_is_that_of_its_time_or_place():
 
 
 @needs_package
-def test_a_tire_slips_by_the_velocity_of_its_axle(monkeypatch):
+def test_a_tire_slips_by_the_velocity_of_its_axle():
     """Front pair, then rear pair: each is told what its axle moves sideways beside the body."""
-    from vehiclemodels.utils import tire_model
+    from mpc.cars.bmw_equations import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE, SlipAtTheAxles
 
-    from mpc.cars.bmw_equations import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE
-    from mpc.cars.bmw_equations import slip_at_the_axles as at_the_axles
-
-    seen = []
-    monkeypatch.setattr(tire_model, "formula_lateral", lambda alpha, *_: seen.append(alpha))
+    told = SimpleNamespace(
+        formula_longitudinal=lambda kappa: kappa,
+        formula_lateral=lambda alpha: alpha,
+        formula_longitudinal_comb=lambda kappa, alpha: alpha,
+        formula_lateral_comb=lambda kappa, alpha: alpha,
+    )
     x, car = np.zeros(29), SimpleNamespace(a=1.2, b=1.6)
     x[[V_X, V_Y, YAW_RATE]] = 20.0, 0.5, 0.3
     x[V_Y_FRONT], x[V_Y_REAR] = 0.5 + 1.2 * 0.3 + 0.04, 0.5 - 1.6 * 0.3 - 0.06
-    with at_the_axles(car) as prepare:
-        prepare(x)
-        for _ in range(4):
-            tire_model.formula_lateral(0.1)
-    assert seen == pytest.approx([0.1 + 0.002] * 2 + [0.1 - 0.003] * 2)
+    tires = SlipAtTheAxles(told, x, car)
+    expected = pytest.approx([0.1 + 0.002] * 2 + [0.1 - 0.003] * 2)
+    assert [tires.formula_lateral(0.1) for _ in range(4)] == expected
+    assert [tires.formula_lateral_comb(0.0, 0.1) for _ in range(4)] == expected
+    assert [tires.formula_longitudinal_comb(0.0, 0.1) for _ in range(4)] == expected
+    assert tires.formula_longitudinal(0.2) == 0.2
+
+
+@needs_package
+def test_their_program_stays_as_it_is():
+    """Once repaired, once not: the tires that others find in the package are the published ones."""
+    from vehiclemodels import vehicle_dynamics_mb as program
+    from vehiclemodels.utils import tire_model
+
+    from mpc.cars.bmw import bmw, bmw_parameters
+    from mpc.cars.bmw_equations import V_Y_FRONT, MultiBody
+
+    before, tires, parameters = dict(vars(tire_model)), program.tireModel, bmw_parameters()
+    found = []
+    for repaired in (False, True, False):
+        equations = MultiBody(bmw(), repaired=repaired)
+        x = equations.start([0.0, 0.0, 0.02, 20.0, 0.0, 0.1, 0.01], parameters)
+        x[V_Y_FRONT] += 0.05
+        found.append(equations.derivative(x, 0.0, 0.0, parameters))
+    published, corrected, again = found
+    assert np.array_equal(published, again)
+    assert not np.allclose(published, corrected)
+    assert vars(tire_model) == before
+    assert program.tireModel is tires

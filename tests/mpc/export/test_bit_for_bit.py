@@ -56,7 +56,7 @@ def test_the_processor_computes_the_bits_of_this_machine_within_its_means(
     assert 3e5 < found.instructions <= found.most_instructions < 6e6
     assert 500 < found.stack < 4096
     assert found.work < 100_000
-    cost = MpcCost(PROCESSOR.name, single, 20_000, 0, found)
+    cost = MpcCost(PROCESSOR.name, "gcc 12", single, 20_000, 0, found)
     text = mpc_figures_text([cost], time_here(packages[law]))
     assert f"| {found.instructions} |" in text
     assert '"stack_B"' in with_mpc_figures(packages[law].files["tireid_mpc.json"], [cost])

@@ -8,7 +8,6 @@ from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from mpc.cars import DoubleTrackCar
 from mpc.handover import Learner, Supervisor
-from mpc.handover.learner import previewed_rate
 from mpc.handover.road import at_friction
 from mpc.loop import drive, inertial_unit
 from mpc.path import iso_3888_1
@@ -73,13 +72,27 @@ def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
         measurement = Measurement(0.01 * k, 0.0, -0.1, 0.2, kappa, v_x)
         command = asked.step(measurement)
         assert command.steering == left_alone.step(measurement).steering
-        same, other = (previewed_rate(asked, one) for one in (tire, at_friction(tire, 0.4)))
+        same, other = (asked.previewed_rate(one) for one in (tire, at_friction(tire, 0.4)))
     assert abs(command.plan_u[0]) > 0.05
     assert same == pytest.approx(command.plan_u[0], rel=0.1)  # it is one iteration further
     assert abs(other - same) > 0.02
     assert asked.tire is tire
     with pytest.raises(ValueError, match="the tracker is built for"):
-        previewed_rate(asked, prediction_tire(car))
+        asked.previewed_rate(prediction_tire(car))
+
+
+def test_a_preview_writes_no_memory_of_what_steers(learnt):
+    """Neither what is carried nor what was prepared for the next measurement."""
+    tire = prediction_tire(learnt)
+    tracker = Tracker(tire, period=0.01, delay=0.02)
+    kappa, v_x = (np.full(tracker.times.size, value) for value in (0.01, 20.0))
+    tracker.step(Measurement(0.1, 0.0, -0.1, 0.2, kappa, v_x))
+    tracker.prepare(kappa, v_x)
+    instance = tracker.instance
+    every = (*instance.numbers, instance._work, instance.start, instance.steering)
+    before = [one.tobytes() for one in every]
+    tracker.previewed_rate(at_friction(tire, 0.4))
+    assert [one.tobytes() for one in every] == before
 
 
 def test_jumps_must_be_positive(car, learnt):

@@ -96,10 +96,23 @@ def test_the_stage_is_finite_beyond_the_center_and_as_before_on_this_side(tire, 
 @pytest.mark.parametrize("angle", [1e308, -1e308, 3.3, np.inf, np.nan])
 def test_an_angle_that_no_wheel_has_is_refused(tracker, angle):
     before = tracker.instance.state.copy()
-    with pytest.raises(ValueError, match="at most 3"):
+    with pytest.raises(ValueError, match="finite and at most"):
         tracker.reset(angle)
     tracker.instance.late(angle)
     assert tracker.instance.state == before
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_reset_beyond_the_limit_of_the_wheels_is_refused(tracker, problem, measure, side):
+    most = problem.limits.steering
+    tracker.step(measure(e_y=0.3))
+    before = tracker.instance.state.copy()
+    with pytest.raises(ValueError, match=f"at most {most:g} rad, it is {1.01 * side * most:g}"):
+        tracker.reset(1.01 * side * most)
+    assert tracker.instance.state == before  # it goes on with the plan that there was
+    tracker.reset(side * most)
+    steered = tracker.step(measure(e_y=0.3)).steering
+    assert abs(steered - side * most) <= PERIOD * problem.limits.steering_rate + 1e-12
 
 
 def test_weights_that_overflow_give_no_plan_and_stay_out_of_the_state(tire, problem, measure):

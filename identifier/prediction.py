@@ -1,0 +1,106 @@
+"""A recording as a frozen model predicts it, and the verdict on that."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from codegen.arrays import Array
+from identifier.reproducibility import (
+    AxleRmse,
+    MotionError,
+    axle_rms,
+    counted_samples,
+    motion_error,
+)
+from identifier.tire_model import UNCALIBRATED, TireModel
+from identifier.verdict import RoadFriction, Verdict, judge_prediction
+from models.recordings import Recording
+
+
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Prediction:
+    """One recording as a frozen model predicts it.
+
+    Parameters
+    ----------
+    model : that predicted.
+    recording : what was predicted.
+    axle_force : forces of the frozen model (n, 2) [N].
+    against_truth : error over the samples that count, against the true force; None without truth.
+    true_force : root mean square of the true force over the same samples, None without truth.
+    motion : what the forces miss of the measured motion; None where the recording is too short.
+    """
+
+    model: TireModel
+    recording: Recording
+    axle_force: Array
+    against_truth: AxleRmse | None
+    true_force: AxleRmse | None
+    motion: MotionError | None
+
+    def __repr__(self) -> str:
+        name, error, size = self.recording.name, self.against_truth, self.true_force
+        if error is None or size is None:
+            told = "" if self.motion is None else f"; {self.motion_text()}"
+            return f"<Prediction of {name!r}: no true forces to compare with{told}>"
+        front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
+        return (
+            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
+            f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
+        )
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the model gives back the drive's motion; computed once."""
+        return judge_prediction(self.model, self.recording)
+
+    def friction(self) -> RoadFriction | None:
+        """Return the friction of the drive's road over that of the one that taught, over time.
+
+        None where the model has no band, or too little is driven. It is part of the verdict.
+
+        Raises
+        ------
+        ValueError
+            Where the band of the model is not calibrated: its errors would look like friction.
+        """
+        if self.model.has_band and not self.model.band_calibrated:
+            raise ValueError(f"friction() wants a calibrated band; this one is {UNCALIBRATED}")
+        return self.verdict.friction
+
+    def motion_text(self) -> str:
+        """Return what the forces explain of the motion, in a line; empty where nobody knows."""
+        if self.motion is None:
+            return ""
+        parts = zip(("lateral", "yaw"), self.motion.explained, strict=True)
+        shares = [
+            f"{f'{100.0 * share:.1f} %' if share > 0.0 else 'nothing'} of the {name}"
+            for name, share in parts
+            if share is not None
+        ]
+        return f"explained are {' and '.join(shares)} acceleration" if shares else ""
+
+
+def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
+    """Replay a recording with frozen weights and compare with its true forces, where it has any.
+
+    Parameters
+    ----------
+    model : the frozen model; samples below its minimum speed do not count.
+    since : samples before this time [s] do not count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        Where no sample counts.
+    """
+    force = model.axle_force(recording)
+    counted = counted_samples(recording, model.min_speed, since)
+    truth = recording.axle_force
+    return Prediction(
+        model=model,
+        recording=recording,
+        axle_force=force,
+        against_truth=None if truth is None else axle_rms(force, counted, truth),
+        true_force=None if truth is None else axle_rms(truth, counted),
+        motion=motion_error(force, recording, model.vehicle, counted),
+    )

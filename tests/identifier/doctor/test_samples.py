@@ -1,0 +1,202 @@
+"""What is wrong with samples is found where it was planted, with its size, and nowhere else."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.doctor.samples import CERTAIN, _is_late, _rounded_alike, sample_findings
+from models.recordings import Recording
+
+DT = 0.01
+T = np.arange(3000) * DT
+NOISE = {"v_x": 0.03, "v_y": 0.02, "r": 0.004, "delta_f": 0.001, "a_y": 0.1}
+
+
+def swing(rng, width=0.8):
+    """A smooth motion of several periods."""
+    waves = [(0.23, 1.0), (0.41, 0.8), (0.67, 0.5)]
+    return width * sum(a * np.sin(2.0 * math.pi * f * T + rng.uniform(0.0, 6.0)) for f, a in waves)
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    rng = np.random.default_rng(5)
+    r, v_x = swing(rng, 0.2), 20.0 + swing(rng, 1.0)
+    return Recording(
+        name="made",
+        t=T,
+        v_x=v_x,
+        v_y=swing(rng, 0.4),
+        r=r,
+        delta_f=swing(rng, 0.03),
+        delta_r=np.zeros(T.size),
+        a_y=v_x * r + swing(rng, 0.3),
+    )
+
+
+@pytest.fixture(scope="module")
+def noisy(smooth):
+    rng = np.random.default_rng(6)
+    return replace(
+        smooth,
+        **{n: getattr(smooth, n) + s * rng.standard_normal(T.size) for n, s in NOISE.items()},
+    )
+
+
+def changed(recording, name, where, value):
+    signal = getattr(recording, name).copy()
+    signal[where] = value
+    return replace(recording, **{name: signal})
+
+
+def only(recording):
+    (found,) = sample_findings(recording)
+    return found
+
+
+def test_a_log_without_a_fault_has_none(smooth, noisy):
+    assert sample_findings(smooth) == [] == sample_findings(noisy)
+
+
+@pytest.mark.parametrize("name", ["v_y", "r", "a_y", "delta_f"])
+def test_a_channel_that_stops_for_a_while_is_frozen_there_for_so_long(noisy, name):
+    still = changed(noisy, name, slice(1200, 1280), getattr(noisy, name)[1200])
+    found = only(still)
+    assert (found.code, found.channel, found.unit) == ("frozen", name, "s")
+    assert found.size == pytest.approx(0.8)
+    assert "from 12 s on for 0.8 s" in found.text
+    assert sample_findings(changed(noisy, name, slice(1200, 1225), 0.01)) == [], "not for 0.3 s"
+
+
+def test_a_channel_that_stops_while_the_car_stands_is_not_frozen(noisy):
+    here = slice(1200, 1280)
+    standing = changed(changed(noisy, "r", here, 0.0), "v_x", here, 0.2)
+    assert not [one for one in sample_findings(standing) if one.code == "frozen"]
+
+
+@pytest.mark.parametrize("lasts", [2, 5])
+def test_a_slow_channel_is_late_by_half_of_what_its_values_last(noisy, lasts):
+    held = replace(noisy, r=noisy.r[np.arange(T.size) // lasts * lasts])
+    found = only(held)
+    assert (found.code, found.channel) == ("held", "r")
+    assert found.size == pytest.approx(lasts * DT)
+    assert found.repair.delay == {"r": pytest.approx(0.5 * (lasts - 1) * DT)} and found.sure
+
+
+def test_samples_that_are_repeated_now_and_then_are_counted(noisy):
+    signal = noisy.v_y.copy()
+    for k in range(100, 2900, 100):
+        signal[k : k + 3] = signal[k - 1]
+    found = only(replace(noisy, v_y=signal))
+    assert (found.code, found.channel) == ("held", "v_y")
+    assert found.size == pytest.approx(0.04)
+    assert "28 times" in found.text and "2.8 % of the log" in found.text
+
+
+def test_samples_that_are_lost_are_counted_from_the_first_on(noisy):
+    base = replace(noisy, v_x=noisy.v_x)
+    found = only(changed(base, "v_x", [500, 501, 900, 901, 902], 0.0))
+    assert (found.code, found.channel, found.size) == ("dropout", "v_x", 5.0)
+    assert "for 5 of 3000 samples, first at 5 s" in found.text and found.confidence == CERTAIN
+
+
+def test_one_sample_that_is_zero_is_no_dropout(noisy):
+    assert sample_findings(changed(noisy, "v_x", 500, 0.0)) == []
+
+
+@pytest.mark.parametrize("step", [0.5, 1.0, 1.5])
+def test_rounding_makes_as_many_neighbors_alike_as_is_said(step):
+    signal = step * np.round(np.random.default_rng(2).standard_normal(100_000) / step)
+    assert _rounded_alike(signal) == pytest.approx(np.mean(np.diff(signal) == 0.0), rel=0.1)
+
+
+def test_single_samples_far_off_are_spikes(noisy):
+    at = np.array([400, 1100, 2000])
+    spiky = changed(noisy, "r", at, noisy.r[at] + [1.0, -1.0, 1.0])
+    found = only(spiky)
+    assert (found.code, found.channel, found.size) == ("spikes", "r", 3.0)
+    assert "first at 4 s" in found.text
+    two = changed(noisy, "r", at[:2], noisy.r[at[:2]] + 1.0)
+    assert sample_findings(two) == [], "two are none"
+
+
+@pytest.mark.parametrize("step", [0.05, 0.02])
+def test_a_coarse_channel_is_told_with_its_step(noisy, step):
+    found = [one for one in sample_findings(replace(noisy, r=step * np.round(noisy.r / step)))]
+    assert [(one.code, one.channel, one.unit) for one in found] == [("quantized", "r", "rad/s")]
+    assert found[0].size == pytest.approx(step)
+    fine = 0.002 * np.round(noisy.r / 0.002)
+    assert sample_findings(replace(noisy, r=fine)) == [], "of a hundredth of what it moves"
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1.0, "is a copy of"), (-2.5, "is -2.5 times")])
+def test_a_channel_that_is_another_is_told_with_its_factor(noisy, factor, words):
+    found = only(replace(noisy, a_y=factor * noisy.r))
+    assert (found.code, found.channel) == ("copied", "a_y")
+    assert found.size == pytest.approx(factor) and f"a_y {words} r" in found.text
+
+
+@pytest.mark.parametrize("most", [0.02, 0.05])
+def test_samples_that_come_late_at_random_are_late_by_as_much(smooth, noisy, most):
+    late = np.random.default_rng(1).uniform(0.0, most, T.size)
+    moved = {n: np.interp(T - late, T, getattr(smooth, n)) for n in ("r", "delta_f")}
+    quiet = {n: x + 2e-5 * np.sin(997.0 * np.arange(T.size) ** 2) for n, x in moved.items()}
+    found = {one.channel: one for one in sample_findings(replace(noisy, **quiet))}
+    assert set(found) == {"r", "delta_f"} and {one.code for one in found.values()} == {"jitter"}
+    assert found["r"].size == pytest.approx(most, rel=0.3)
+    alone = replace(noisy, v_y=np.interp(T - late, T, smooth.v_y))
+    assert sample_findings(alone) == [], "noise of v_y may grow with slip"
+
+
+def test_a_clock_that_jumps_is_told_where_and_by_how_much(smooth, noisy):
+    names = ("v_x", "v_y", "r", "delta_f", "a_y")
+    kept = np.r_[0:1500, 1540:3000]
+    missing = replace(
+        noisy,
+        t=T[: kept.size],
+        delta_r=np.zeros(kept.size),
+        **{name: getattr(noisy, name)[kept] for name in names},
+    )
+    found = only(missing)
+    assert (found.code, found.unit) == ("clock", "s")
+    assert found.size == pytest.approx(0.4, rel=0.3) and found.deviation == 0.5 * found.size
+    assert float(found.text.split("at once at ")[1].split(" s")[0]) == pytest.approx(15.0, abs=0.06)
+    again = np.r_[0:1500, 1450:3000]
+    twice = replace(
+        noisy,
+        t=np.arange(again.size) * DT,
+        delta_r=np.zeros(again.size),
+        **{name: getattr(noisy, name)[again] for name in names},
+    )
+    (found,) = [one for one in sample_findings(twice) if one.code == "clock"]
+    assert found.size == pytest.approx(-0.5) and found.confidence == CERTAIN
+    assert "0.5 s before 15 s are logged twice" in found.text
+
+
+def test_a_v_y_that_is_switched_off_is_told_with_its_share_and_speed(noisy):
+    off = (T > 8.5) & (T < 11.5) | (T > 27.0)
+    slow = replace(noisy, v_x=noisy.v_x - 10.0 * off)
+    found = only(replace(slow, v_y=np.where(off, 0.0, slow.v_y)))
+    assert (found.code, found.channel) == ("zero", "v_y")
+    assert found.size == pytest.approx(DT * off.sum()) and "exactly 0 2 times" in found.text
+    slowest = float(np.percentile(np.abs(slow.v_x[~off]), 5))
+    assert f"where the car is slower than {slowest:.3g} m/s" in found.text
+
+
+def test_a_channel_without_a_sensor_is_told_and_not_asked_further(noisy):
+    found = only(replace(noisy, a_y=np.full(T.size, 0.25)))
+    assert (found.code, found.channel, found.confidence) == ("frozen", "a_y", CERTAIN)
+    assert (
+        found.size == pytest.approx(noisy.duration) and "a_y is 0.25 m/s^2 throughout" in found.text
+    )
+
+
+def test_samples_are_late_where_those_of_r_and_another_channel_are_alike():
+    assert _is_late("r", {"r": 0.05, "delta_f": 0.04}, DT)
+    assert _is_late("delta_f", {"r": 0.05, "delta_f": 0.04, "v_y": 0.2}, DT)
+    for size in (0.02, 0.2):
+        assert not _is_late("r", {"r": 0.05, "delta_f": size}, DT)
+    assert not _is_late("v_y", {"v_y": 0.05, "a_y": 0.05}, DT), "without r"
+    assert not _is_late("r", {"r": 0.006, "delta_f": 0.006}, DT), "within a sample"

@@ -1,0 +1,90 @@
+"""Braking and driving in the estimate: where a_x comes from, what a car tells of itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from codegen.arrays import Array
+from identifier.estimate import Drive
+from identifier.estimate.priors import OF_CAR, Priors
+from identifier.estimate.solve import simulate
+from identifier.motion.model import SIGNALS
+from identifier.motion.parameters import INDEX
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle, sedan
+
+CAR = replace(sedan(), chassis=None)
+T = 0.01 * np.arange(3000)
+SPEED = 20.0 + 3.0 * np.sin(T) + np.sin(2.5 * T)
+PULL = 3.0 * np.cos(T) + 2.5 * np.cos(2.5 * T)  # d v_x/dt
+
+
+def a_x_of(a_x: Array | None, car: Vehicle = CAR) -> Array:
+    """Return the a_x that the estimate takes of a drive through bends."""
+    r = 0.2 * np.sin(0.7 * T)
+    delta = 0.03 * np.sin(0.7 * T)
+    drive = Recording(
+        name="bends", t=T, v_x=SPEED, v_y=0.0 * T, r=r, delta_f=delta, delta_r=0.0 * T, a_x=a_x
+    )
+    column: Array = Drive.of(drive, car).signals[:, SIGNALS.index("a_x")]
+    return column
+
+
+def test_an_accelerometer_that_follows_the_speed_is_taken_on_a_slope_too() -> None:
+    slope = 0.5 + 0.3 * np.tanh((T - 15.0) / 5.0)  # m/s²: the tires push more than the car gains
+    taken = a_x_of(PULL + slope)
+    np.testing.assert_allclose(taken[200:-200], (PULL + slope)[200:-200], atol=0.1)
+    of_speed = a_x_of(None)
+    np.testing.assert_allclose(of_speed[200:-200], PULL[200:-200], atol=0.4)
+
+
+@pytest.mark.parametrize("felt", [-PULL, PULL / GRAVITY, 2.0 * PULL, np.cos(40.0 * T), 0.0 * T])
+def test_a_channel_that_does_not_follow_the_speed_is_left_aside(felt: Array) -> None:
+    np.testing.assert_array_equal(a_x_of(felt), a_x_of(None))
+
+
+def test_a_car_that_tells_nothing_is_believed_to_be_any_car() -> None:
+    priors = Priors.of(CAR)
+    assert priors.mean[INDEX["load_transfer"]] == OF_CAR["load_transfer"].mean
+    assert priors.mean[INDEX["driving_f"]] == priors.mean[INDEX["driving_r"]]
+
+
+def test_height_and_shares_move_what_is_believed() -> None:
+    L = CAR.wheelbase
+    told = replace(CAR, cg_height=0.6, drive_front_share=0.0, brake_front_share=0.7)
+    priors = Priors.of(told)
+    mean = {name: priors.mean[k] for name, k in INDEX.items()}
+    sd = {name: priors.information[k, k] ** -0.5 for name, k in INDEX.items() if priors.moves[k]}
+    assert mean["load_transfer"] == pytest.approx(0.6 * 0.6 / L)
+    assert sd["load_transfer"] < 0.5 * OF_CAR["load_transfer"].sd
+    assert mean["driving_f"] == 0.0 and sd["driving_f"] == pytest.approx(0.1)
+    assert mean["driving_r"] == pytest.approx(0.65 * L / CAR.l_f / 0.85)
+    assert mean["braking_f"] / mean["braking_r"] == pytest.approx(0.7 / 0.3 * CAR.l_f / CAR.l_r)
+    assert sd["braking_f"] == pytest.approx(0.5 * mean["braking_f"])
+
+
+def test_a_chassis_is_believed_as_the_car_itself_is() -> None:
+    built = sedan()
+    np.testing.assert_array_equal(Priors.of(built).mean, Priors.of(built.without_chassis()).mean)
+    assert Priors.of(built).mean[INDEX["driving_r"]] == 0.0  # front-wheel drive
+
+
+def test_tires_push_against_the_air_at_one_speed() -> None:
+    """A drag of a tenth of the weight is an acceleration of a tenth of g."""
+    area = 0.1 * CAR.weight / (0.6 * 30.0**2)
+    n = len(T)
+    flat = {
+        "name": "bend", "t": T, "v_y": np.full(n, -0.5), "r": np.full(n, 0.2),
+        "delta_f": np.full(n, 0.06), "delta_r": np.zeros(n), "v_x": np.full(n, 30.0),
+    }  # fmt: skip
+    drive = Drive.of(Recording(**flat), replace(CAR, drag_area=0.0))  # type: ignore[arg-type]
+    pushed = drive.signals.copy()
+    pushed[:, SIGNALS.index("a_x")] += 0.1 * GRAVITY
+    p = Priors.of(CAR).mean
+    p[INDEX["driving_f"]] = 2.0
+    against_air = simulate(drive, p, replace(CAR, drag_area=area))["force"]
+    gaining = simulate(replace(drive, signals=pushed), p, replace(CAR, drag_area=0.0))["force"]
+    coasting = simulate(drive, p, replace(CAR, drag_area=0.0))["force"]
+    np.testing.assert_allclose(against_air, gaining, rtol=1e-9)
+    assert np.abs(against_air - coasting)[-1, 0] > 0.01

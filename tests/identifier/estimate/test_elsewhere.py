@@ -1,0 +1,218 @@
+"""A fit where other rooms take it: hidden units, going on learning, C, ONNX, tracker, plan."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from codegen import find_compiler
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.curve import LADDER
+from identifier.estimate.fit import fit
+from identifier.estimate.method import FitMethod
+from identifier.estimate.model import UNITS, FittedModel
+from identifier.estimate.priors import Priors
+from identifier.export.compiled import CompiledPackage
+from identifier.export.onnx import onnx_bytes
+from identifier.export.package import build_package
+from identifier.methods import continuing
+from identifier.motion.parameters import INDEX, NAMES
+from identifier.run import identify
+from models.vehicle import sedan
+from mpc.path.gates import iso_3888_2
+from mpc.tires import prediction_tire
+from mpc.tires.tire import DOUBT_STEP, Car, Point
+from tireid import exporting
+from tireid.driving.runs import LEARNING, make_learner, told_tire
+from tireid.driving.setup import Setup, SpeedWish
+from tireid.planning import plan
+
+CAR = sedan()
+PRIORS = Priors.of(CAR)
+COVARIANCE = np.zeros_like(PRIORS.information)
+COVARIANCE[np.ix_(PRIORS.moves, PRIORS.moves)] = np.linalg.inv(
+    PRIORS.information[np.ix_(PRIORS.moves, PRIORS.moves)]
+)
+
+
+def believed(p=PRIORS.mean, **numbers):
+    """The beliefs about a sedan as a fit, some of its numbers others."""
+    p = p.copy()
+    for name, value in numbers.items():
+        p[INDEX[name]] = value
+    return FittedModel(
+        vehicle=CAR,
+        p=p,
+        covariance=0.01 * COVARIANCE,
+        driven=np.array([0.17, 0.12]),
+        speeds=np.array([16.0, 20.0]),
+        a_x=np.zeros(2),
+        missed=np.array([0.06, 0.04]),
+    )
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return ti.sample_recording(CAR)
+
+
+@pytest.fixture(scope="module")
+def fitted(drive):
+    return fit([drive], CAR).model
+
+
+def off(model, ladder=None):
+    """Largest difference of the projected curves on the identified range [static loads], (2,)."""
+    units = model.in_units(ladder)
+    slips = np.linspace(-1.0, 1.0, 201)[:, None] * model.known_slip
+    each = [model.force_at(x)[:, i] - units.force_at(x)[:, i] for i, x in enumerate(slips.T)]
+    return np.abs(each).max(axis=1) / CAR.axle_loads
+
+
+@pytest.mark.parametrize("ladder", [None, LADDER], ids=["tracker", "learning"])
+def test_hidden_units_follow_a_fit_to_a_percent_of_the_load(fitted, ladder):
+    assert (fitted.known_slip > 0.1).all()
+    assert (off(fitted, ladder) < 0.01).all()
+
+
+def test_hidden_units_of_the_tracker_follow_any_tire_to_a_percent_of_the_load():
+    rng = np.random.default_rng(2)
+    sd = np.sqrt(np.diag(COVARIANCE))
+    for _ in range(20):
+        p = PRIORS.mean + sd * rng.standard_normal(len(NAMES))
+        model = believed(np.clip(p, PRIORS.low, PRIORS.high))
+        assert (off(model) < 0.01).all()
+        assert (off(model.at_friction(0.5)) < 0.01).all()
+    worst = off(believed(residual0_f=0.2), (0.128, 0.256))
+    assert worst[0] > 0.05  # two wide units do not
+
+
+def test_zeros_of_the_sensors_are_those_of_the_speed_of_the_drives():
+    model = believed(v_y_bias=0.02, v_y_angle=0.01, steering_zero=0.003)
+    units = model.in_units()
+    np.testing.assert_allclose(units.own[:, 2], [0.003, 0.02 + 0.01 * 18.0])
+    b, angle = INDEX["v_y_bias"], INDEX["v_y_angle"]
+    P = model.covariance
+    variance = P[b, b] + 36.0 * P[b, angle] + 18.0**2 * P[angle, angle]
+    assert P[b, angle] != 0.0
+    np.testing.assert_allclose(units.covariance[1, -1, -1], variance, rtol=1e-5)
+
+
+def test_the_axle_identifier_goes_on_from_a_fit_with_its_doubt(fitted):
+    design = continuing(fitted, CAR)
+    assert isinstance(design, AxleIdentifier)
+    begun = design.frozen(CAR, design.setup(CAR, fitted).carry)
+    units = fitted.in_units(LADDER)
+    np.testing.assert_allclose(begun.W, units.W)
+    np.testing.assert_allclose(begun.own, units.own)
+    slips = np.array([0.02, 0.1])
+    assert (begun.relative_sd(slips) < 0.5 * design.frozen(CAR, design.setup(CAR).carry)
+            .relative_sd(slips)).all()  # fmt: skip
+
+
+def test_going_on_from_a_fit_begins_with_its_forces(fitted, drive):
+    part = drive.taken(slice(2500, 2700))
+    gone_on = identify(part, CAR, AxleIdentifier.for_vehicle(CAR), fitted)
+    afresh = identify(part, CAR, AxleIdentifier.for_vehicle(CAR))
+    errors = [
+        np.sqrt(np.mean((one.axle_force[20:] - part.axle_force[20:]) ** 2))
+        for one in (gone_on, afresh)
+    ]
+    assert errors[0] < 0.6 * errors[1]
+
+
+def test_the_exported_step_of_a_fit_is_its_exact_one(fitted, drive):
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    method, part = FitMethod.for_vehicle(CAR), drive.taken(slice(2000, 3000))
+    package = build_package(method, CAR, fitted, name="fit")
+    assert not package.specialized.learnt
+    found = CompiledPackage.of(package).run(part)
+    np.testing.assert_allclose(
+        found.outputs["axle_force"], fitted.setup(0.01).output(part, "axle_force"), atol=1e-6
+    )
+
+
+def test_a_run_of_a_fit_is_exported_to_go_on_learning(drive, fitted, tmp_path, monkeypatch):
+    monkeypatch.setattr(exporting, "export_method", lambda method, car, start, *_, **__: (
+        method, method.setup(car, start)
+    ))  # fmt: skip
+    run = ti.identify(drive, CAR, FitMethod.for_vehicle(CAR))
+    method, begun = ti.export(run, tmp_path / "ecu")
+    assert isinstance(method, AxleIdentifier)
+    np.testing.assert_allclose(begun.carry["W"], fitted.in_units(LADDER).W)
+
+
+def test_a_fit_exports_on_another_car_by_its_loads(fitted):
+    heavy = replace(CAR, mass=1.2 * CAR.mass)
+    carried = FitMethod.for_vehicle(heavy).setup(heavy, fitted)
+    np.testing.assert_allclose(carried.constants["loads"], 1.2 * np.array(CAR.axle_loads))
+
+
+@pytest.mark.parametrize("start", [None, AxleIdentifier])
+def test_sample_by_sample_nothing_but_a_fit_has_a_step(start):
+    if start is not None:
+        design = start.for_vehicle(CAR)
+        start = design.frozen(CAR, design.setup(CAR).carry)
+    with pytest.raises(ValueError, match="the method axle learns"):
+        FitMethod.for_vehicle(CAR).setup(CAR, start)
+
+
+def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
+    runtime = pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")
+    session = runtime.InferenceSession(onnx_bytes(fitted, with_band=True))
+    alpha = np.linspace(-0.1, 0.1, 21)
+    out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
+    loads = np.array(CAR.axle_loads)
+    assert (np.abs(np.hstack(out[:2]) - fitted.force_at(alpha)) < 0.01 * loads).all()
+    band = fitted.half_band(alpha, v_x=float(fitted.speeds.mean()))
+    np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=0.02, atol=0.001 * loads.min())
+
+
+def test_a_tracker_takes_the_errors_of_the_sensors_off():
+    model = believed(v_y_bias=0.05, v_y_angle=-0.02, steering_zero=0.004, steering_gain=0.03)
+    tire = prediction_tire(model)
+    v_y, r, delta, v_x = 0.6, 0.3, 0.07, 25.0
+    at = Point(v_y, r, delta, v_x, Car(*tire.car), tire.weights)
+    true = v_y - 0.05 + 0.02 * v_x
+    expected = (
+        1.03 * delta + 0.004 - np.arctan((true + CAR.l_f * r) / v_x),
+        -np.arctan((true - CAR.l_r * r) / v_x),
+    )
+    np.testing.assert_allclose([float(x) for x in tire.structure.slip(at)], expected)
+    slips = DOUBT_STEP * np.arange(26)
+    np.testing.assert_allclose(tire.doubt.T, model.half_band(slips))
+
+
+def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does():
+    model = believed()
+    motion, tire = model.casadi_function().dynamics, prediction_tire(model)
+    v_y, r, delta, v_x, slip = -0.5, 0.2, 0.03, 20.0, (0.04, 0.02)
+    x_dot, force = motion([v_y, r, *slip], delta, v_x)
+    at = Point(v_y, r, delta, v_x, Car(*tire.car), tire.weights)
+    loads = np.array(CAR.axle_loads)
+    pushed = np.array([float(F) for F in tire.structure.force(slip, at)])
+    assert (np.abs(pushed - np.array(force).ravel()) < 0.01 * loads).all()
+    lag = np.array([float(sigma) for sigma in tire.structure.lag_length(slip, at)])
+    kinematic = np.array([float(x) for x in tire.structure.slip(at)])
+    np.testing.assert_allclose(
+        v_x / lag * (kinematic - slip), np.array(x_dot).ravel()[2:], rtol=0.02
+    )
+
+
+def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
+    path = iso_3888_2()
+    wish = SpeedWish(0.9, None)
+    setup = Setup(path=path, vehicle=CAR, plant="double-track", mu=1.0, drops=(), wish=wish)
+    told = told_tire(LEARNING, setup, fitted)
+    learner = make_learner(fitted, CAR)
+    handed = prediction_tire(learner.supervisor.identifier.model())
+    assert told.structure == handed.structure
+    np.testing.assert_allclose(told.weights, handed.weights)
+
+
+def test_a_plan_goes_on_from_a_fit(fitted):
+    found = plan(CAR, after=fitted, area=(60.0, 20.0), speed=12.0, time=1.5)
+    assert found.error_before < 0.03  # of the grip; before learning it is above a tenth
+    assert isinstance(fitted.in_units(), AxleModel) and fitted.in_units().ladder == UNITS

@@ -1,0 +1,114 @@
+"""The estimate finds what was planted, from one log or several, whatever stiffness is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import identifier.estimate.fit as fitting
+from identifier.estimate.fit import fit
+from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
+from identifier.estimate.roads import cheapest
+from identifier.motion.parameters import INDEX, NAMES
+from models.vehicle import sedan
+from tests.identifier.estimate.conftest import DROP, driven
+
+GRID = np.linspace(0.005, 0.06, 12)
+
+
+def share_missed(model, recording):
+    missed = model.axle_force(recording) - recording.axle_force
+    return np.sqrt(np.mean(missed**2, axis=0) / np.mean(recording.axle_force**2, axis=0))
+
+
+@pytest.fixture(scope="module")
+def planted():
+    """A drive whose sensors of v_y and steering are off."""
+    drive = driven(3)
+    v_y = drive.v_y + 0.15 + np.radians(0.5) * drive.v_x
+    return replace(drive, v_y=v_y, delta_f=drive.delta_f - 0.01)
+
+
+def test_planted_errors_of_sensors_are_found_within_their_doubt(planted):
+    found = fit([planted], sedan())
+    truth = {"v_y_bias": 0.15, "v_y_angle": np.radians(0.5), "steering_zero": 0.01}
+    for name, value in truth.items():
+        assert abs(found.posterior[name] - value) < 3.0 * found.posterior.sd(name), name
+        assert found.posterior.sd(name) < 0.3 * value, name
+    assert share_missed(found.model, planted).max() < 0.05
+
+
+def test_the_curve_predicts_a_drive_that_did_not_teach(learnt):
+    other = driven(5)
+    assert share_missed(learnt.model, other).max() < 0.08
+    half = learnt.model.half_band_over(other)
+    held = np.mean(np.abs(learnt.model.axle_force(other) - other.axle_force) <= half, axis=0)
+    assert held.min() > 0.8
+
+
+@pytest.mark.parametrize("factor", [0.25, 4.0])
+def test_a_told_stiffness_changes_nothing(learnt, factor):
+    car = sedan()
+    front, rear = (factor * C for C in car.bicycle[4:])
+    told = replace(car, cornering_stiffness_front=front, cornering_stiffness_rear=rear)
+    np.testing.assert_array_equal(fit([driven(3)], told).posterior.p, learnt.posterior.p)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.1])
+def test_every_belief_has_a_reason_and_lies_within_its_bounds(scale):
+    car = sedan()
+    sizes = {"l_f": scale, "l_r": scale, "yaw_inertia": scale**2}
+    small = replace(car, **{name: size * getattr(car, name) for name, size in sizes.items()})
+    priors = Priors.of(small)
+    for belief in (OF_AXLES | OF_CAR).values():
+        assert belief.reason and belief.sd > 0.0
+        assert belief.low < belief.high and belief.low <= belief.mean <= belief.high
+    assert set(ALIKE) <= set(OF_AXLES)
+    assert set(NAMES) >= {f"{name}_{axle}" for name in OF_AXLES for axle in "fr"} | set(OF_CAR)
+    inside = (priors.low <= priors.mean) & (priors.mean <= priors.high)
+    assert inside.all()
+    moving = priors.information[np.ix_(priors.moves, priors.moves)]
+    assert np.linalg.eigvalsh(moving).min() > 0.0
+    k = INDEX["v_y_lever"]
+    assert priors.information[k, k] == pytest.approx((0.015 * small.wheelbase) ** -2)
+
+
+def test_two_logs_tell_more_than_one(learnt):
+    both = fit([driven(3), driven(5)], sedan())
+    for name in ("ln_stiffness_f", "ln_grip_r", "steering_gain", "v_y_bias"):
+        assert both.posterior.sd(name) < learnt.posterior.sd(name), name
+    assert share_missed(both.model, driven(5)).max() < share_missed(learnt.model, driven(5)).max()
+
+
+def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt, monkeypatch):
+    monkeypatch.setattr(fitting, "BLOCK", 8.0)
+    blocks = fit([driven(3)], sedan()).model
+    np.testing.assert_allclose(blocks.force_at(GRID), learnt.model.force_at(GRID), rtol=0.05)
+    np.testing.assert_allclose(blocks.relative_sd(GRID), learnt.model.relative_sd(GRID), rtol=0.7)
+
+
+def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
+    assert learnt.model.segments == ()
+    wet = fit([driven(5, scale=0.5, amplitude=0.06, swing=0.0)], sedan()).model
+    (segment,) = wet.segments
+    begins = segment.begin > 0.0  # else what came before the drop is the segment
+    assert (segment.begin if begins else segment.end) == pytest.approx(DROP, abs=1.5)
+    ratio = segment.ratio if begins else 1.0 / segment.ratio
+    assert 0.4 < ratio < 0.75
+    at = np.array([DROP - 5.0, DROP + 5.0])
+    assert wet.road_differs(at).tolist() == [not begins, begins]
+    (note,) = (text for _, text in wet.notes)
+    assert f"{segment.ratio:.2f} ±" in note
+
+
+def test_the_cheapest_path_changes_where_it_gains_more_than_the_price():
+    loss = np.zeros((2, 30))
+    loss[0, 10:20], loss[1, :10], loss[1, 20:] = 1.0, 1.0, 1.0
+    assert cheapest(loss, 4.0).tolist() == [0] * 10 + [1] * 10 + [0] * 10
+    assert not cheapest(loss, 6.0).any()
+
+
+def test_a_log_without_a_sample_that_counts_is_refused_by_its_name():
+    slow = replace(driven(3), v_x=np.full(len(driven(3)), 0.5))
+    with pytest.raises(ValueError, match="drive3: no sample is fast enough to learn from"):
+        fit([slow], sedan())

@@ -1,0 +1,120 @@
+"""A fitted model as a file, in other units and sample by sample."""
+
+import json
+
+import numpy as np
+import pytest
+
+from codegen.arrays import blocks
+from identifier.estimate.model import FittedModel
+from identifier.frozen import FrozenModelError
+from identifier.tire_model import load_model
+from tests.identifier.estimate.conftest import driven
+
+
+def test_a_saved_model_is_the_same(learnt, tmp_path):
+    model = learnt.model.with_calibration(None, np.array([0.02, 0.03]))
+    model.save(tmp_path / "tires.json")
+    loaded = load_model(tmp_path / "tires.json")
+    assert isinstance(loaded, FittedModel)
+    assert loaded.to_dict() == model.to_dict()
+    drive = driven(5)
+    np.testing.assert_array_equal(loaded.axle_force(drive), model.axle_force(drive))
+    np.testing.assert_array_equal(loaded.half_band_over(drive), model.half_band_over(drive))
+
+
+def without_grip(data):
+    del data["parameters"]["ln_grip_f"]
+
+
+def too_stiff(data):
+    data["parameters"]["ln_stiffness_r"]["value"] = 9.0
+
+
+def lopsided(data):
+    data["covariance"][0][1] += 1.0
+
+
+def endless(data):
+    data["speeds_m_s"] = [1.0, float("inf")]
+
+
+def short(data):
+    data["driven_slip_rad"] = [0.1]
+
+
+def unheard(data):
+    data["vehicle"]["mass"] = -1.0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (without_grip, "ln_grip_f"),
+        (too_stiff, "ln_stiffness_r must be within"),
+        (lopsided, "covariance must be symmetric"),
+        (endless, "speeds_m_s"),
+        (short, "driven"),
+        (unheard, "mass"),
+    ],
+)
+def test_a_bad_file_is_one_line_that_names_file_field_and_rule(learnt, tmp_path, change, said):
+    data = json.loads(json.dumps(learnt.model.to_dict()))
+    change(data)
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(FrozenModelError) as refused:
+        load_model(path)
+    text = str(refused.value)
+    assert "bad.json" in text and said in text and "\n" not in text
+
+
+def test_its_units_are_within_a_percent_of_the_static_load_where_it_is_identified(learnt):
+    model = learnt.model
+    units = model.in_units()
+    for i, known in enumerate(model.known_slip):
+        assert known > 0.04
+        slip = np.linspace(-known, known, 101)
+        away = np.abs(units.force_at(slip) - model.force_at(slip))[:, i]
+        assert away.max() < 0.01 * model.vehicle.axle_loads[i]
+
+
+def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
+    """Without the smoothing of a drive: within noise, and as near to the truth."""
+    drive, model = driven(5), learnt.model
+    run = model.setup(drive.dt).run(drive, tuple(blocks(len(drive))), ports=("axle_force",))
+    step = np.concatenate([block.outputs["axle_force"] for block in run])
+    size = np.sqrt(np.mean(drive.axle_force**2, axis=0))
+    away = np.sqrt(np.mean((step - model.axle_force(drive)) ** 2, axis=0))
+    assert (away < 0.03 * size).all()
+
+
+def test_braking_takes_of_the_lateral_force_and_shifts_load(learnt):
+    model = learnt.model
+    free, braked = (model.ratio(np.array([15.0]), np.array([a]))[0] for a in (0.0, -5.0))
+    assert (free == 1.0).all()
+    transfer = model["load_transfer"] * model.vehicle.wheelbase * 5.0 / 9.81
+    used = np.array([model["braking_f"], model["braking_r"]]) * 5.0 / 9.81
+    load = 1.0 + transfer * np.array([1.0 / model.vehicle.l_r, -1.0 / model.vehicle.l_f])
+    expected = load * np.sqrt(np.maximum(1.0 - used**2, 0.05))
+    np.testing.assert_allclose(braked, expected, rtol=1e-3)
+    alone, with_a_x = model.force(0.03, "front"), model.force(0.03, "front", a_x=-5.0)
+    assert with_a_x == pytest.approx(alone * braked[0], rel=1e-3)
+
+
+def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
+    model = learnt.model
+    slip = np.array([0.0005, 0.05])
+    own, other = model.half_band(slip), model.on_another_road().half_band(slip)
+    np.testing.assert_allclose(other[0], own[0], rtol=0.05)  # the stiffness stays
+    assert (other[1] > 2.0 * own[1]).all()
+    np.testing.assert_array_equal(model.on_another_road().force_at(slip), model.force_at(slip))
+    with pytest.raises(ValueError, match="sd_friction"):
+        model.on_another_road(-0.1)
+
+
+def test_on_half_the_friction_its_stiffness_stays(learnt):
+    model, slip = learnt.model, np.array([0.001, 0.02, 0.05])
+    half = model.at_friction(0.5)
+    np.testing.assert_allclose(half.force_at(0.5 * slip), 0.5 * model.force_at(slip), rtol=1e-9)
+    np.testing.assert_allclose(half.cornering_stiffness, model.cornering_stiffness, rtol=1e-9)

@@ -1,0 +1,51 @@
+"""Numbers as people read them: three digits, ± of one or two, one unit of stiffness."""
+
+import pytest
+
+import tireid as ti
+from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value, with_doubt
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "words"),
+    [
+        (0.886, 0.0604, "0.886 ± 0.060"),
+        (127.04, 4.8, "127 ± 5"),
+        (0.4437, 0.153, "0.44 ± 0.15"),
+        (-0.00101, 0.0112, "-0.001 ± 0.011"),
+        (-1e-9, 0.0112, "0.000 ± 0.011"),
+        (127.04, 0.018, "127.04 ± 0.02"),
+        (9.996, None, "10.0"),
+        (126986.0, None, "127000"),
+        (0.0, None, "0"),
+        (float("nan"), 1.0, "nan"),
+        (0.5, float("inf"), "0.500"),
+    ],
+)
+def test_a_value_has_three_digits_and_none_that_its_doubt_hides(value, sd, words):
+    assert with_doubt(value, sd) == words
+
+
+def test_a_stiffness_is_printed_in_kilonewtons_of_a_car_of_any_size():
+    assert printed_value(126986.0, 4800.0, "N/rad") == "127 ± 5"
+    assert printed_value(51.23, 2.04, "N/rad") == "0.0512 ± 0.0020"
+    assert (printed_unit("N/rad"), printed_unit("m")) == ("kN/rad", "m")
+
+
+def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
+    run = ti.identify(ti.sample_recording(), ti.sedan())
+    verdict, tire = run.verdict, run.tire
+    assert tuple(tire.force_missed) == verdict.force_missed
+    front, rear = (with_doubt(100.0 * share) for share in verdict.force_missed)
+    (line,) = (one for one in tire.summary().splitlines() if one.startswith("force missed"))
+    assert line.split()[-2:] == [front, rear]
+    for number in verdict.numbers:
+        assert number.words in tire.summary()
+    gentle = run.freeze(2.0)  # the sample has not turned by then
+    assert f"({NOT_IDENTIFIABLE})" in gentle.summary()
+    tire.save(tmp_path / "tire.json")
+    assert ti.TireModel.load(tmp_path / "tire.json").summary() == tire.summary()
+    assert run.freeze().force_missed is None
+    assert "force missed" not in run.freeze().summary()
+    for other in (tire.at_friction(0.5), tire.mounted_on(tire.vehicle)):
+        assert other.force_missed is None

@@ -1,0 +1,181 @@
+"""Files of a few kilobytes that say to hold gigabytes: refused by what they tell of themselves."""
+
+import contextlib
+import re
+import struct
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+import pytest
+
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from models.schema import SWELLS
+
+MANY = 100_000_000  # samples of a channel that the limits allow
+ROOM = 700_000_000  # bytes beyond what the readers themselves take
+# Opens a log and reads what it lists in little memory, and tells the refusal, or "read".
+READER = f"""
+import resource, sys
+import h5py, pyarrow.parquet, numpy
+from models.logs.door import open_log
+taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (taken + {ROOM}, resource.RLIM_INFINITY))
+for path in sys.argv[1:]:
+    try:
+        log = open_log(path)
+        log.read([one.name for one in log.listed()])
+        print("read")
+    except ValueError as error:
+        print(error)
+"""
+
+
+def hdf5(path, **shapes):
+    h5py = pytest.importorskip("h5py", reason="needs the package h5py")
+    with h5py.File(path, "w") as file:
+        for name, (shape, kind) in shapes.items():
+            kind = h5py.string_dtype() if kind == "text" else kind
+            chunks = tuple(min(one, 1000) for one in shape)
+            one = file.create_dataset(name, shape, kind, chunks=chunks)
+            if name == "zipped":
+                del file[name]
+                one = file.create_dataset(name, shape, kind, chunks=(shape[0],), compression="gzip")
+                one[:] = np.zeros(shape, kind)
+    return path
+
+
+def parquet(path, **columns):
+    pyarrow = pytest.importorskip("pyarrow", reason="needs the package pyarrow")
+    from pyarrow import parquet
+
+    t = np.arange(2000) / 100
+    word = pyarrow.array(np.zeros(t.size, np.int32))
+    table = {"t": t, "v": t}
+    for name, words in columns.items():
+        codes = pyarrow.array(np.arange(t.size, dtype=np.int32) % len(words))
+        table[name] = pyarrow.DictionaryArray.from_arrays(codes if len(words) > 1 else word, words)
+    parquet.write_table(
+        pyarrow.table(table),
+        path,
+        compression="zstd",
+        store_schema=False,  # texts, which only the file keeps as a dictionary
+        dictionary_pagesize_limit=1 << 30,
+    )
+    return path
+
+
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def numbers(name, count):
+    """A variable of MATLAB: zeros of one byte."""
+    flags, shape = struct.pack("<II", 8, 0), struct.pack("<ii", count, 1)
+    parts = element(6, flags) + element(5, shape) + element(1, name) + element(1, bytes(count))
+    return element(14, parts)
+
+
+def struct_of(name, count):
+    """A struct of MATLAB with one field, t."""
+    flags, shape = struct.pack("<II", 2, 0), struct.pack("<ii", 1, 1)
+    head = element(6, flags) + element(5, shape) + element(1, name)
+    return element(
+        14,
+        head
+        + element(5, struct.pack("<i", 8))
+        + element(1, b"t".ljust(8, b"\0"))
+        + numbers(b"", count),
+    )
+
+
+def matlab(path, *variables):
+    packed = [zlib.compress(one, 9) for one in variables]
+    body = b"".join(struct.pack("<II", 15, len(one)) + one for one in packed)
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + body)
+    return path
+
+
+def test_what_swells_in_memory_is_refused_before_it_does(tmp_path):
+    cases = [
+        # What a file never stored is its fill value.
+        (
+            hdf5(tmp_path / "channels.h5", t=((MANY,), "f8"), v=((MANY,), "i1")),
+            r"not read: t \(100000000 numbers in 0 bytes\), v \(100000000 numbers in 0 bytes\)",
+        ),
+        (hdf5(tmp_path / "matrix.h5", m=((MANY // 4, 4), "f4")), r"m \(100000000 numbers in 0 "),
+        (hdf5(tmp_path / "wide.h5", units=((5000,), "S1000000")), r"units \(a long text\)"),
+        (hdf5(tmp_path / "many.h5", units=((90_000,), "text")), r"units \(a long text\)"),
+        (matlab(tmp_path / "v.mat", numbers(b"t", MANY)), r"t \(100000000 numbers in \d+ bytes\)"),
+        (matlab(tmp_path / "s.mat", struct_of(b"s", MANY)), r"holds no signal"),
+        (
+            matlab(tmp_path / "several.mat", *(struct_of(b"s%d" % k, MANY) for k in range(3))),
+            rf"structs and cells must be a log, they swell to \d+ times their size, above {SWELLS}",
+        ),
+        (parquet(tmp_path / "text.parquet", note=["x" * 3_000_000]), "read"),
+        (parquet(tmp_path / "time.parquet", time=["1" * 3_000_000]), "read"),
+        (parquet(tmp_path / "run.parquet", run=["x" * 3_000_000]), "run must be at most 200"),
+    ]
+    assert max(path.stat().st_size for path, _ in cases) < 500_000
+    reader = subprocess.run(
+        [sys.executable, "-c", READER, *(str(path) for path, _ in cases)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert reader.returncode == 0, reader.stderr
+    for (path, words), line in zip(cases, reader.stdout.splitlines(), strict=True):
+        assert re.search(words, line), (path.name, line)
+
+
+def mdf(path):
+    asammdf = pytest.importorskip("asammdf", reason="needs the package asammdf")
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(SAME, SAME, name="v")])
+        return file.save(path, compression=2)
+
+
+def bag(path):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
+    typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    writer = rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP)
+    writer.set_compression(rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        kind, of = "geometry_msgs/msg/PointStamped", store.types
+        topic = writer.add_connection("/point", kind, typestore=store)
+        stamp = of["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
+        header = of["std_msgs/msg/Header"](stamp=stamp, frame_id="x" * 500_000)
+        point = of[kind](header=header, point=of["geometry_msgs/msg/Point"](x=1.0, y=2.0, z=3.0))
+        text = store.serialize_cdr(point, kind)
+        writer.write(topic, 0, text)
+    return path
+
+
+SAME = np.zeros(60_000)
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        (lambda path: hdf5(path, zipped=((60_000,), "f8")), r"not read: zipped \(60000 numbers in"),
+        (
+            lambda path: parquet(path, note=[f"{'x' * 5000}{k}" for k in range(100)]),
+            "the cells of 'note' must be a log",
+        ),
+        (mdf, "groups of channels must be a log"),
+        (bag, "chunks must be a log"),
+    ],
+)
+def test_what_a_file_unpacks_to_is_told_by_it_and_judged_first(
+    written, words, tmp_path, monkeypatch
+):
+    path = written(tmp_path / "log")
+    monkeypatch.setattr("models.schema.SWOLLEN_FROM", 10_000_000)
+    with contextlib.suppress(RecordingError):  # such as that nothing rises
+        open_log(path).listed()
+    monkeypatch.setattr("models.schema.SWOLLEN_FROM", 100_000)
+    with pytest.raises(RecordingError, match=words):
+        open_log(path)

@@ -1,0 +1,56 @@
+"""Keys of summary.json: programs read them, so that a key that comes, goes or moves is a diff.
+
+`python -m tests.tireid.test_summary_keys FOLDER NAME` prints those of a folder, to be committed.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from tireid.cli import main
+
+EXPECTED = Path(__file__).with_name("summary_keys.json")
+NAMES = {"slalom": "LOG", "8": "TIME"}  # of the log, and when its run was frozen
+LISTS = ("findings", "numbers")  # of which each entry has the same keys
+
+
+def keys_of(table, above=""):
+    """Paths of all keys, with the names of this log and time left out."""
+    found = set()
+    for key, value in table.items():
+        path = f"{above}{NAMES.get(key, key)}"
+        found.add(path)
+        inner = value[0] if key in LISTS and value else value
+        if isinstance(inner, dict):
+            found |= keys_of(inner, f"{path}/")
+    return found
+
+
+def summary_keys(folder):
+    return sorted(keys_of(json.loads((Path(folder) / "summary.json").read_text())))
+
+
+@pytest.mark.parametrize("method", ["fit", "axle", "integral"])
+def test_identify_and_predict_write_the_keys_that_are_listed(method, logs, tmp_path, undrawn):
+    expected = json.loads(EXPECTED.read_text())
+    log, out = str(logs / "slalom.csv"), tmp_path / "out"
+    car = ["--vehicle", str(logs / "car.toml"), "--accept"]
+    assert main(["identify", log, *car, "--method", method, "--out", str(out)]) == 0
+    assert summary_keys(out) == expected[f"identify {method}"]
+    asked = ["predict", str(out / "weights.json"), log, "--out", str(tmp_path / "p")]
+    assert main([*asked, "--accept"]) == 0
+    assert summary_keys(tmp_path / "p") == expected[f"predict {method}"]
+
+
+def test_a_key_that_moves_is_seen():
+    told = {"verdict": {"valid": True, "findings": [{"code": "x"}]}, "rms": {"slalom": None}}
+    assert keys_of(told) == {
+        *("verdict", "verdict/valid", "verdict/findings", "verdict/findings/code"),
+        *("rms", "rms/LOG"),
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(summary_keys(sys.argv[1]), indent=1))

@@ -1,0 +1,47 @@
+"""tireid's own packages are those beside it, whatever else of their names lies on Python's path.
+
+`codegen`, `models`, `identifier` and `mpc` are plain names: a script beside a folder `models/` or a
+file `codegen.py` would import these. From the import of tireid on they are looked for in the folder
+that holds tireid, first.
+"""
+
+import os
+import sys
+from importlib.machinery import ModuleSpec, PathFinder
+from types import ModuleType
+
+HOME = __file__.rsplit(os.sep, 2)[0]
+PACKAGES = ("codegen", "models", "identifier", "mpc")
+
+
+class OwnPackages:
+    """What Python asks where a module lies; it answers for the packages of tireid alone."""
+
+    @staticmethod
+    def find_spec(name: str, *_: object) -> ModuleSpec | None:
+        """Return where a package lies."""
+        return PathFinder.find_spec(name, [HOME]) if name in PACKAGES else None
+
+
+def find_own_packages() -> None:
+    """Look for the packages in the folder that holds tireid, before all other folders.
+
+    Raises
+    ------
+    ImportError
+        Where another module has such a name already; one line that says which.
+    """
+    for name in PACKAGES:
+        place = _place(sys.modules.get(name))
+        if place and os.path.realpath(place) != os.path.realpath(f"{HOME}/{name}"):
+            raise ImportError(
+                f"{place} hides the package {name!r} of tireid, as it was imported first: rename it"
+            )
+    if OwnPackages not in sys.meta_path:
+        sys.meta_path.insert(0, OwnPackages)
+
+
+def _place(module: ModuleType | None) -> str:
+    """Return the folder of a package, the file of another module; nothing where there is none."""
+    folders = list(getattr(module, "__path__", ()))
+    return str(folders[0] if folders else getattr(module, "__file__", None) or "")

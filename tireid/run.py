@@ -1,0 +1,148 @@
+"""What `ti.identify` returns: a run of a method over a drive, which answers all about it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+
+from codegen.arrays import Array
+from identifier.axle.guarantee import ForceBound
+from identifier.certificate import Certificate
+from identifier.method import Method
+from identifier.run import History
+from identifier.tire_model import TireModel
+from identifier.verdict import Verdict, calibrated, guaranteed, judge
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid.output import output_folder, write_json
+
+
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Run:
+    """A method's run over a recording; what takes long is computed where it is first asked for.
+
+    Parameters
+    ----------
+    history : states and outputs, sample by sample.
+    """
+
+    history: History
+
+    @property
+    def recording(self) -> Recording:
+        """What it ran over, with the v_y that the method estimated where there was none."""
+        return self.history.recording
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The car, as far as the method knew it."""
+        return self.history.vehicle
+
+    @property
+    def method(self) -> Method:
+        """The method that ran."""
+        return self.history.design
+
+    @property
+    def force(self) -> Array:
+        """Axle forces (n, 2) [N]: by the weights of each instant, or of a whole-log fit."""
+        return self.history.axle_force
+
+    @cached_property
+    def tire(self) -> TireModel:
+        """What was learnt at the end, its band calibrated on the drive.
+
+        It is `freeze()` but for the band; that itself where the method has no band, or too little
+        is driven.
+
+        Raises
+        ------
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        """
+        return calibrated(self.history)
+
+    def freeze(self, t: float | None = None) -> TireModel:
+        """Return what was learnt until a time; its band is not calibrated.
+
+        Parameters
+        ----------
+        t : time in the recording's own clock [s]; None is the end.
+
+        Raises
+        ------
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the recording begins after that time.
+        """
+        return self.history.freeze(t)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the tire is good, and what speaks against it.
+
+        Raises
+        ------
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        """
+        return judge(self.history)
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What is proven of the method for this car."""
+        return self.method.certify(self.vehicle)
+
+    def guarantee(self, bound: float | ForceBound | None = None) -> TireModel:
+        """Return the tire with a guaranteed band beside the calibrated one.
+
+        Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
+        lies in `guaranteed_band`. It is `tire` where the method learns no curve of slip, no lateral
+        velocity was measured, or too little is driven.
+
+        Parameters
+        ----------
+        bound : e of both axles [static axle loads], or e and τ of each, as a `ForceBound`; None
+            estimates them from the drive.
+
+        Raises
+        ------
+        BoundViolatedError
+            Where no curve keeps a bound that was given.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the bound is impossible.
+        """
+        return guaranteed(self.history, bound, None, self.tire)
+
+    def save(self, folder: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write weights.json, as `TireModel.load` reads it, and verdict.json into a folder.
+
+        Parameters
+        ----------
+        folder : to write, whole or not at all.
+        overwrite : replace what an earlier run wrote there.
+
+        Raises
+        ------
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        FileExistsError
+            Where the folder is not empty and is not to be replaced.
+        OutputError
+            Where it holds what no run of tireid wrote.
+        OSError
+            Where it cannot be written.
+        """
+        target = Path(folder)
+        if not overwrite and target.is_dir() and any(target.iterdir()):
+            raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
+        verdict, tire = self.verdict, self.tire
+        with output_folder(target, force=overwrite) as scratch:
+            tire.save(scratch / "weights.json", valid=verdict.valid)
+            write_json(scratch / "verdict.json", verdict.to_dict())
+
+    def __repr__(self) -> str:
+        return f"<Run of {type(self.method).__name__} over {self.recording!r}>"
