@@ -145,7 +145,7 @@ def _warnings() -> Iterator[list[Finding]]:
         log.removeFilter(keep)
 
 
-def _run(log: Recording, told: Vehicle) -> tuple[ti.History, bool]:
+def _run(log: Recording, told: Vehicle) -> tuple[ti.Run, bool]:
     """Return the run over a log, and whether it was let in without insisting."""
     signals = {name: getattr(log, of) for name, of in COLUMNS.items()}
     table = {name: signal for name, signal in signals.items() if signal is not None}
