@@ -322,7 +322,10 @@ class Search:
         return self.problem.vehicle
 
     def priors(self, wide: Widths) -> Priors:
-        """Return what is believed where some of it is believed wide."""
+        """Return what is believed where some of it is believed wide.
+
+        Without the tails of a typed number, which would be a suspect that is wide from the first.
+        """
         apart = "v_y_bias" in wide or "v_y_angle" in wide
         of_model = {name: sd for name, sd in wide.items() if not name.startswith("a_y.")}
         if "downforce_f" in wide:
@@ -331,7 +334,7 @@ class Search:
         mean = priors.mean.copy()
         for name, value in self.mean.items():
             mean[INDEX[name]] = value
-        return replace(priors, mean=mean)
+        return replace(priors, mean=mean, typed=())
 
     def nominal(self) -> Posterior:
         """Return the estimate before anything is searched."""

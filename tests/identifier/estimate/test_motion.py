@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from identifier.estimate.drive import Drive
-from identifier.estimate.priors import FAULTS, Priors
-from identifier.estimate.solve import Problem, arguments, car_numbers, simulate
+from identifier.estimate.priors import Priors
+from identifier.estimate.solve import DELAYS, Problem, arguments, car_numbers, simulate
 from identifier.motion.model import RATE, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, sedan
@@ -15,8 +15,8 @@ FINE = 10  # steps of the integration in a sample
 SENSORS = {
     "v_y_bias": 0.1, "v_y_angle": 0.01, "v_y_lever": 0.05, "v_y_delay": 0.02,
     "steering_zero": 0.004, "steering_gain": 0.05, "steering_delay": 0.01, "r_bias": 0.01,
-    "r_delay": 0.01,
-    "v_x_factor": 0.02, "cg_shift": 0.05, "ln_inertia": 0.1, "bank": 0.01, "ln_road": -0.2,
+    "r_delay": 0.01, "v_y_lag": 0.01, "steering_lag": 0.01, "r_lag": 0.005, "r_gain": 0.02,
+    "downforce_f": 1e-5, "downforce_r": -2e-5, "v_x_factor": 0.02, "cg_shift": 0.05, "ln_inertia": 0.1, "bank": 0.01, "ln_road": -0.2,
     "compliance_f": 0.03, "compliance_r": 0.04, "residual1_f": 0.05, "residual3_r": -0.04,
 }  # fmt: skip
 
@@ -58,17 +58,17 @@ def of(drive, p, car):
             slope[i] = max(slope[i], 0.02 * C)
         return phi, slope
 
-    n = len(drive.signals)
+    drive, n = drive.on_time(p[DELAYS]), len(drive.signals)
     steps = np.arange(n * FINE) / FINE
     v_x, v_y, r, d, _, a_x, bank, *_ = (
         np.interp(steps, np.arange(n), column) for column in drive.signals.T
     )
     v_y_rate, r_rate, d_rate = (np.interp(steps, np.arange(n), c) for c in drive.rates.T)
     v_x = v_x * (1.0 + one["v_x_factor"])
-    r = r + one["r_delay"] * r_rate - one["r_bias"]
-    v_y = v_y + one["v_y_delay"] * v_y_rate - one["v_y_bias"]
+    r = (1.0 + one["r_gain"]) * (r + one["r_lag"] * r_rate) - one["r_bias"]
+    v_y = v_y + one["v_y_lag"] * v_y_rate - one["v_y_bias"]
     v_y = v_y - one["v_y_angle"] * v_x - one["v_y_lever"] * r
-    d = (1.0 + one["steering_gain"]) * (d + one["steering_delay"] * d_rate) + one["steering_zero"]
+    d = (1.0 + one["steering_gain"]) * (d + one["steering_lag"] * d_rate) + one["steering_zero"]
     inertia = I_z * np.exp(one["ln_inertia"])
     force, missed = np.zeros((n, 2)), np.zeros((n, 2))
     x = rho = rate = late = None
@@ -79,7 +79,8 @@ def of(drive, p, car):
         slip = slip - k * rate / (omega**2 * v_x[j])
         phi, slope = curve(x)
         f = a_x[j] / GRAVITY
-        load = np.maximum(1.0 + one["load_transfer"] * L * f * np.array([1, 1]) / arm * -1.0, 0.2)
+        press = np.array([one["downforce_f"], one["downforce_r"]]) * v_x[j] ** 2
+        load = np.maximum(1.0 - one["load_transfer"] * L * f / arm + press, 0.2)
         kind = "driving" if f > 0.0 else "braking"
         use = np.array([one[f"{kind}_{a}"] for a in "fr"]) * f
         F = phi * load * np.sqrt(np.maximum(1.0 - use**2, 0.05))
@@ -130,11 +131,13 @@ def test_slopes_over_all_that_moves_are_finite_differences(drive):
 
 def test_slopes_over_faults_and_the_road_are_finite_differences(drive):
     """Of numbers that move only where a log shows them."""
-    names, p, car = (*FAULTS, "ln_road"), parameters(), car_numbers(sedan())
-    scan = motion_scan(names)
+    moves = Priors.of(sedan()).moves
+    names = tuple(name for name, moving in zip(NAMES, moves, strict=True) if not moving)
+    scan, p, car = motion_scan(names), parameters(), car_numbers(sedan())
+    inputs = arguments(drive, np.zeros(len(p)), car, scan)  # delays as the model reads them
 
     def run(p, port):
-        return scan(len(drive.signals), arguments(drive, p, car, scan), ports=(port,))[port]
+        return scan(len(drive.signals), {**inputs, "parameters": p}, ports=(port,))[port]
 
     slopes = run(p, "missed_slopes")
     for column, name in enumerate(names):
