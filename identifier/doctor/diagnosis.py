@@ -22,8 +22,7 @@ from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
 ROUNDS, SETTLED = 4, 0.02  # to which the ratio of a steering wheel is settled
-# By which the screen may be off, and a yaw inertia that was told: it and the ratio look alike.
-WIDE = {"steering_gain": 1.0, "ln_inertia": 0.1}
+WIDE = 1.0  # of that ratio, by which the screen may be off
 ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
@@ -171,7 +170,7 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
         search = prepared(drive, car)
         if search is None:
             return coarse
-        search.wide.update(WIDE)
+        search.wide["steering_gain"] = WIDE
         post = search.run()  # what distorts the motion distorts the ratio
         gain, deviation = post["steering_gain"], post.sd("steering_gain")
         factor *= 1.0 + gain

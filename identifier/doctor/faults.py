@@ -42,6 +42,7 @@ from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
 Widths = Mapping[str, float]  # standard deviation of what is believed wide, by suspect's parameter
+BESIDE = {"ln_inertia": 0.1}  # believed of any car: what is told of it is an estimate
 OF_A_Y = ("a_y.offset", "a_y.factor", "a_y.delay", "a_y.place", "a_y.lag")
 
 
@@ -146,14 +147,6 @@ class Accelerometer:
             box(_averaged(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
             for one, drive in zip(stretches, drives, strict=True)
         ]
-
-    def level(self) -> float:
-        """Return by how much a_y is above the motion as logged, in the median [m/s²]."""
-        gaps = []
-        for one, shown in zip(self.drives, self.shown, strict=True):
-            v_x, v_y, r = one.signals[:, :3].T
-            gaps.append((shown - gradient(v_y, one.dt) - v_x * r)[one.counts])
-        return float(np.median(np.concatenate(gaps)))
 
     def line(self, p: Array, wide: Widths) -> Line:
         """Return how well a_y follows from the motion without the sensors' faults p.
@@ -327,7 +320,7 @@ class Search:
         Without the tails of a typed number, which would be a suspect that is wide from the first.
         """
         apart = "v_y_bias" in wide or "v_y_angle" in wide
-        of_model = {name: sd for name, sd in wide.items() if not name.startswith("a_y.")}
+        of_model = BESIDE | {name: sd for name, sd in wide.items() if not name.startswith("a_y.")}
         if "downforce_f" in wide:
             of_model["downforce_r"] = wide["downforce_f"]
         priors = Priors.of(self.vehicle, wide=of_model, apart=apart)
@@ -456,16 +449,18 @@ class Search:
         """Return the suspects that may be believed beside what is there, the best first."""
         promised = self.promised(base, at)
         listed = [self.fitted(one, base) for one in self.left(of_model=False)]
-        some = []
+        standing, some = [], []
         for one in self.left(of_model=True):
             state, least = base.sd(one.parameter), one.scaled(one.least, self.vehicle)
             stands = state > 0.0 and abs(base[one.parameter]) > 2.0 * math.hypot(state, least)
-            hopeful = promised[one.parameter][0] > 0.3 * RULES.gain
-            if one.code != "lag" and (hopeful or stands):
+            if stands:  # it promises no gain: the nominal estimate has it
+                standing.append(one)
+            elif one.code != "lag" and promised[one.parameter][0] > 0.3 * RULES.gain:
                 some.append(one)
         some.sort(key=lambda one: -promised[one.parameter][0])
         listed += [
-            self.fitted(one, base, promised[one.parameter][1]) for one in some[: RULES.fitted]
+            self.fitted(one, base, promised[one.parameter][1])
+            for one in (*standing, *some[: RULES.fitted])
         ]
         # A low pass is a delay but for its bend: it is asked where a delay is.
         best = max(listed, key=lambda one: one.gain, default=None)
@@ -494,7 +489,8 @@ class Search:
             listed = self.candidates(base, at)
             chosen = [one for one in listed if one.gain > RULES.gain][:1]
             if not chosen:
-                chosen = [one for one in listed if one.shown > RULES.state][:1]
+                states = [one for one in listed if one.shown > max(one.gain, RULES.state)]
+                chosen = sorted(states, key=lambda one: -one.shown)[:1]
             if not chosen:
                 break
             best = chosen[0]
@@ -627,9 +623,6 @@ def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
         return None
     accelerometer = None
     if has_a_y:
-        level = Accelerometer(stretches, drives, vehicle).level()
-        leveled = [replace(one, a_y=one.needed("a_y") - level) for one in stretches]
-        drives = read(leveled)
         accelerometer = Accelerometer(stretches, drives, vehicle)
         accelerometer.line(Priors.of(vehicle).mean, dict.fromkeys(OF_A_Y[:4], 1.0))
     problem = Problem(drives, vehicle, Priors.of(vehicle), every=True)
@@ -678,6 +671,8 @@ def findings(search: Search, post: Posterior) -> tuple[Finding, ...]:
             listed.append(
                 _finding(search, which, (float(share), group), others, sure and which is best)
             )
+    if search.accelerometer is None:
+        return tuple(listed)
     return tuple(_of_one_device(listed, search.vehicle))
 
 
@@ -713,18 +708,25 @@ def _finding(
 
 
 def _of_one_device(listed: list[Finding], vehicle: Vehicle) -> list[Finding]:
-    """Return findings with the lateness of an inertial unit as one, not of r and of a_y."""
+    """Return findings with the lateness of an inertial unit as one, not of r and of a_y.
+
+    To be late by as much are v_y and the steering early: clocks tell no more.
+    """
     late = {one.channel: one for one in listed if one.code == "delay"}
-    r, a_y = late.get("r"), late.get("a_y")
-    if r is None or a_y is None or abs(r.size - a_y.size) > max(0.015, 0.2 * abs(r.size)):
-        return listed
-    repair = TURNING.repair(r.size, vehicle)
-    text = TURNING.words(r.size, r.deviation, vehicle)
-    both = replace(
-        r, channel=TURNING.channel, text=text, repair=repair, sure=r.sure and a_y.sure,
-        confidence=min(r.confidence, a_y.confidence), group=max(r.group, a_y.group),
-    )  # fmt: skip
-    return [both if one is r else one for one in listed if one is not a_y]
+    for names, sign in ((("r", "a_y"), 1.0), (("v_y", "delta_f"), -1.0)):
+        if any(name not in late for name in names):
+            continue
+        one, other = (late[name] for name in names)
+        size = sign * 0.5 * (one.size + other.size)
+        if abs(one.size - other.size) > max(0.015, 0.2 * abs(size)):
+            continue
+        both = replace(
+            one, channel=TURNING.channel, size=size, repair=TURNING.repair(size, vehicle),
+            text=TURNING.words(size, one.deviation, vehicle), sure=one.sure and other.sure,
+            confidence=min(one.confidence, other.confidence), group=max(one.group, other.group),
+        )  # fmt: skip
+        return [both if x is one else x for x in listed if x is not other]
+    return listed
 
 
 def unseen(search: Search, post: Posterior) -> tuple[str, ...]:

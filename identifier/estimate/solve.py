@@ -350,7 +350,7 @@ def descend(
     """
     priors, index = problem.priors, problem.index
     low, high = priors.low[index], priors.high[index]
-    p, damping = start.copy(), 1e-3
+    p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     now = problem.residuals(p)
     T, count = problem.memory(now.e) if memory is None else memory, 0
     for count in range(1, iterations + 1):
@@ -376,7 +376,7 @@ def descend(
             break
         p, now, gained = better
         damping = max(damping / 5.0, 1e-6)
-        if gained < enough and (count > 3 or memory is not None or enough > ENOUGH):
+        if gained < enough and (count > 3 or memory is not None):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
     H = normal(problem, now, S2, T)[0] + around_beliefs(priors, p)[1][np.ix_(index, index)]
