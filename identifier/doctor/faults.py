@@ -498,7 +498,8 @@ class Search:
             alike = tuple(
                 one
                 for one in others
-                if one.gain > 0.5 * best.gain
+                if self.in_place_of(best, one, base)
+                and one.gain > 0.5 * best.gain
                 and (one.gain > best.gain - RULES.alike or twins(one.suspect, best.suspect))
             )
             rival = next((one for one in others if not twins(one.suspect, best.suspect)), None)
@@ -514,6 +515,12 @@ class Search:
             start = base.p if best.post is None else best.post.p
             base = descend(problem, start, enough=RULES.enough)
         return base
+
+    def in_place_of(self, best: Candidate, other: Candidate, base: Posterior) -> bool:
+        """Return whether another explains what the best does: with it, the best is less needed."""
+        left = base if other.post is None else other.post
+        names = best.suspect.parameters[:1]
+        return all(abs(left[name]) < 0.5 * abs(best.value) for name in names)
 
     def stands(self, best: Candidate, rival: Candidate | None, base: Posterior) -> bool:
         """Return whether a fault's repair makes the model better on a part left out.
