@@ -9,15 +9,15 @@ from identifier.export.processor import (
     measure,
     missing_tools,
 )
-from identifier.methods import DEFAULT, REFERENCE, WITHOUT_V_Y, make_method
+from identifier.methods import LIVE, REFERENCE, WITHOUT_V_Y, make_method
 from models.vehicle import sedan
 from mpc.export.pair import build_pair
 from mpc.export.processor import measure_mpc
 
-WITH_A_Y = f"{DEFAULT}_a_y"
+WITH_A_Y = f"{LIVE}_a_y"
 METHODS = {
     REFERENCE: "paper, n_h = 10",
-    DEFAULT: "default, axle curves",
+    LIVE: "default, axle curves",
     WITH_A_Y: "default, with a_y",
     WITHOUT_V_Y: "inertial, tells v_y",
 }
@@ -38,7 +38,7 @@ def print_arm_costs(targets: Targets) -> None:
     print(f"on Arm, {compiler_version(CROSS_COMPILER)}, -O2, QEMU counts instructions:")
     print("method                processor   precision   flash    RAM  stack  a step  largest")
     packages = {
-        name: build_package(make_method(DEFAULT, car), car, with_a_y=True)
+        name: build_package(make_method(LIVE, car), car, with_a_y=True)
         if name == WITH_A_Y
         else build_package(make_method(name, car), car)
         for name in METHODS
@@ -72,7 +72,7 @@ def print_tracker_costs(targets: Targets) -> None:
     if missing_tools():
         return
     car = sedan()
-    pair = build_pair(build_package(make_method(DEFAULT, car), car))
+    pair = build_pair(build_package(make_method(LIVE, car), car))
     print("tracker              processor   precision   flash    RAM  stack  a step  largest")
     for cost in measure_mpc(pair.tracker):
         run, precision = cost.replay, "float" if cost.single else "double"

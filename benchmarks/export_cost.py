@@ -34,7 +34,7 @@ from codegen import find_compiler
 from codegen.arrays import Array
 from identifier.export.compiled import samples_of
 from identifier.export.package import Package, build_package
-from identifier.methods import DEFAULT, REFERENCE, WITHOUT_V_Y, make_method
+from identifier.methods import LIVE, REFERENCE, WITHOUT_V_Y, make_method
 from identifier.paper.design import PaperIdentifier, axle_impulse
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -59,7 +59,7 @@ KEYS = {
     NUMPY: "numpy",
 }
 ROUNDING = 1e-9  # where the same is computed
-OTHERS = (DEFAULT, WITHOUT_V_Y)  # methods beside the paper's
+OTHERS = (LIVE, WITHOUT_V_Y)  # methods beside the paper's
 MOST = 5.0  # us of a step of the last of them
 
 

@@ -9,7 +9,7 @@ from benchmarks.targets import Targets, show
 from codegen.arrays import Array
 from identifier.compare.course import Course
 from identifier.method import CannotFreezeError
-from identifier.methods import DEFAULT, METHODS, make_method
+from identifier.methods import LIVE, METHODS, make_method
 from identifier.run import identify
 from models.recordings import Recording
 from models.vehicle import sedan
@@ -28,7 +28,7 @@ def faults(targets: Targets) -> None:
     """
     car = sedan()
     clean = plant_recordings(car, np.random.default_rng(0))[0]
-    course = Course(vehicle=car, recordings=(clean,), min_speed=make_method(DEFAULT, car).min_speed)
+    course = Course(vehicle=car, recordings=(clean,), min_speed=make_method(LIVE, car).min_speed)
     print("Slalom with faults, every method")
     for fault, recording in faulty(clean, np.random.default_rng(0)).items():
         lost = []
@@ -43,10 +43,10 @@ def faults(targets: Targets) -> None:
             except ValueError:
                 finite = np.bool_(False)
             lost += [] if finite else [name]
-            if name == DEFAULT and finite:
+            if name == LIVE and finite:
                 error = course.share(clean.name, course.error(clean, force.axle_force(clean)))
-                show(f"{fault}: {DEFAULT} frozen, on the clean slalom", f"{error:.1f} %")
-                targets.record(f"faults/{_slug(fault)}/{DEFAULT}", error, "%")
+                show(f"{fault}: {LIVE} frozen, on the clean slalom", f"{error:.1f} %")
+                targets.record(f"faults/{_slug(fault)}/{LIVE}", error, "%")
         text = f" ({', '.join(lost)})" if lost else ""
         label = f"{fault}: methods that are not finite{text}"
         targets.at_most(label, len(lost), 0, "", key=f"faults/{_slug(fault)}/lost")

@@ -13,7 +13,7 @@ from identifier.baselines import fit_floor, structure_of
 from identifier.compare.course import Course
 from identifier.compare.floors import STRUCTURES
 from identifier.method import Method
-from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.methods import LIVE, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse
 from identifier.run import identify
 from models.friction import Friction, FrictionChange
@@ -44,15 +44,15 @@ def maneuvers(targets: Targets) -> None:
     for seed in range(SEEDS):
         recordings = _drives(np.random.default_rng(seed))
         course = Course(vehicle=car, recordings=recordings, min_speed=slowest)
-        row = {name: _learnt_on_first(name, course, seed) for name in (DEFAULT, REFERENCE)}
+        row = {name: _learnt_on_first(name, course, seed) for name in (LIVE, REFERENCE)}
         structure = structure_of(make_method(STRUCTURES["axle units"], car), car)
         for label, fitted in (("floor", recordings[:1]), ("best of all", recordings)):
             model = fit_floor(structure, fitted, rng=np.random.default_rng(seed))
             row[label] = course.replays(model)
         rows.append(row)
-    names = list(rows[0][DEFAULT])
+    names = list(rows[0][LIVE])
     print(f"Plant with noise, learnt on {names[0]}, median (smallest-largest) of {SEEDS} seeds")
-    worst = max(max(e.front, e.rear) for row in rows for e in [row[DEFAULT][names[0]]]) / 1e3
+    worst = max(max(e.front, e.rear) for row in rows for e in [row[LIVE][names[0]]]) / 1e3
     label = "in-sample, larger axle, worst seed"
     targets.at_most(label, worst, 0.15, "kN", key="plant/in_sample/worst")
     for name in names:
@@ -64,7 +64,7 @@ def maneuvers(targets: Targets) -> None:
                     f"plant/{name}/{label.replace(' ', '_')}/{axle}", _median(values), "kN"
                 )
         ratios = {
-            other: [row[DEFAULT][name].both / row[other][name].both for row in rows]
+            other: [row[LIVE][name].both / row[other][name].both for row in rows]
             for other in rows[0]
         }
         if name != names[0]:
@@ -75,13 +75,13 @@ def maneuvers(targets: Targets) -> None:
             label = f"{name}: over the integral law, median"
             targets.at_most(label, law, 1 / 3, "-", key=f"plant/{name}/over_integral")
     laws = [
-        _median([row[DEFAULT][name].both / row[REFERENCE][name].both for row in rows])
+        _median([row[LIVE][name].both / row[REFERENCE][name].both for row in rows])
         for name in names[1:]
     ]
     targets.record("plant/over_integral/least", min(laws), "-")
     targets.record("plant/over_integral/most", max(laws), "-")
     exact = Course(vehicle=car, recordings=_drives(None)[:1], min_speed=slowest)
-    (clean,) = _learnt_on_first(DEFAULT, exact, 0).values()
+    (clean,) = _learnt_on_first(LIVE, exact, 0).values()
     largest = max(clean.front, clean.rear) / 1e3
     label = "in-sample without noise, larger axle"
     targets.at_most(label, largest, 0.1, "kN", key="plant/in_sample/exact")
@@ -97,7 +97,7 @@ def random_fleet(targets: Targets) -> None:
     targets : collects what is missed.
     """
     makes: dict[str, Callable[[Vehicle], Method]] = {
-        **{name: partial(make_method, name) for name in (DEFAULT, *TEXTBOOK)},
+        **{name: partial(make_method, name) for name in (LIVE, *TEXTBOOK)},
         **{f"{name}, textbook": make for name, make in TEXTBOOK.items()},
     }
     errors: dict[str, list[float]] = {name: [] for name in makes}
@@ -117,10 +117,10 @@ def random_fleet(targets: Targets) -> None:
     for name, value in means.items():
         show(name, f"{value:.1f}, worst {max(errors[name]):.1f}")
         targets.record(f"fleet/{key_of(name)}", value, "%")
-    best = min((name for name in means if name != DEFAULT), key=means.__getitem__)
+    best = min((name for name in means if name != LIVE), key=means.__getitem__)
     targets.record("fleet/best", best)
     label = f"random cars, over {best}"
-    targets.at_most(label, means[DEFAULT] / means[best], BEHIND, "-", key="fleet/over_best")
+    targets.at_most(label, means[LIVE] / means[best], BEHIND, "-", key="fleet/over_best")
     for name in TEXTBOOK:
         gain = means[name] / means[f"{name}, textbook"]
         targets.at_most(
@@ -153,12 +153,12 @@ def friction_drop(targets: Targets) -> None:
         print(
             f"Friction 1 to {drop} at {CHANGE:g} s and back at {BACK:g} s, worst of {SEEDS} seeds"
         )
-        for name in (DEFAULT, REFERENCE):
+        for name in (LIVE, REFERENCE):
             recordings = [run.recording(SENSORS, np.random.default_rng(s)) for s in range(SEEDS)]
             errors = [_phases(recording, name, seed) for seed, recording in enumerate(recordings)]
             for (label, *_), value in zip(PHASES, np.max(errors, axis=0).tolist(), strict=True):
                 phase = label.replace(",", "").replace(" ", "_")
-                if name == DEFAULT and drop == DROPS[0] and "from 2 s on" in label:
+                if name == LIVE and drop == DROPS[0] and "from 2 s on" in label:
                     targets.at_most(
                         f"{name}, {label}", value, 15.0, key=f"drop/{drop}/{name}/{phase}"
                     )

@@ -28,7 +28,7 @@ from identifier.compare.course import (
 from identifier.compare.study import Comparison, Frozen, run_comparison
 from identifier.compare.sweep import best_candidate
 from identifier.method import Method
-from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.methods import LIVE, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse, axle_rms
 from identifier.run import identify
 from models.recordings import Recording, read_recording
@@ -74,11 +74,11 @@ def carmaker(targets: Targets) -> None:
     """
     drives = {n: read_recording(DATA / "carmaker.csv.gz", run=run) for n, run in RUNS.items()}
     runs = tuple(drives.values())
-    found = _compare((DEFAULT,), CARMAKER, runs, starts=STARTS)
-    others = [_compare((DEFAULT,), car, runs) for car in told_cars()[1:]]
-    every = [one.trials[DEFAULT].frozen for one in (found, *others)]
+    found = _compare((LIVE,), CARMAKER, runs, starts=STARTS)
+    others = [_compare((LIVE,), car, runs) for car in told_cars()[1:]]
+    every = [one.trials[LIVE].frozen for one in (found, *others)]
     floors, course = found.floors[FLOOR], found.course
-    print(f"CarMaker, effective vehicle, {DEFAULT} [% of rms force]")
+    print(f"CarMaker, effective vehicle, {LIVE} [% of rms force]")
     for learnt, first in drives.items():
         for unseen, other in drives.items():
             errors = [_percent(course, other, one[first.name][other.name]) for one in every if one]
@@ -88,7 +88,7 @@ def carmaker(targets: Targets) -> None:
             label = f"learnt on {RUNS[learnt]}, replayed on {RUNS[unseen]}"
             for k, axle in enumerate(AXLES):
                 key = f"carmaker/{learnt}/{unseen}"
-                targets.record(f"{key}/{DEFAULT}/{axle}", error[k], "%")
+                targets.record(f"{key}/{LIVE}/{axle}", error[k], "%")
                 targets.record(f"{key}/floor/{axle}", floor[k], "%")
                 told = f"{label}, {axle}, worst told stiffness"
                 if (learnt, unseen) in LIMITS:
@@ -146,7 +146,7 @@ class BySlip(NamedTuple):
 
 def _learnt(car: Vehicle, recording: Recording) -> AxleModel:
     """What a drive teaches of a car as it is told."""
-    model = identify(recording, car, make_method(DEFAULT, car)).freeze()
+    model = identify(recording, car, make_method(LIVE, car)).freeze()
     assert isinstance(model, AxleModel)
     return model
 
@@ -195,9 +195,9 @@ def dart(targets: Targets) -> None:
     targets : collects what is missed.
     """
     runs = tuple(read_recording(DATA / "dart.csv.gz", run=run) for run in REAL_RUNS)
-    found = _compare((DEFAULT, *BASELINES), DART, runs)
+    found = _compare((LIVE, *BASELINES), DART, runs)
     print("Real 1:10 car, frozen, on the other runs: both axles [% of rms force]")
-    rows = {"floor": _compare((DEFAULT,), DART, runs, starts=STARTS).floors[FLOOR]}
+    rows = {"floor": _compare((LIVE,), DART, runs, starts=STARTS).floors[FLOOR]}
     for name, trial in found.trials.items():
         if trial.frozen is None or trial.diverged_at:
             show(name, "diverged")
@@ -216,10 +216,10 @@ def dart(targets: Targets) -> None:
         targets.record(f"dart/{key_of(name)}/both", means[name], "%")
         for axle, value in zip(AXLES, axles, strict=True):
             targets.record(f"dart/{key_of(name)}/{axle}", value, "%")
-    best = min((name for name in means if name not in (DEFAULT, "floor")), key=means.__getitem__)
+    best = min((name for name in means if name not in (LIVE, "floor")), key=means.__getitem__)
     targets.record("dart/best_baseline", best)
     label = f"real car: mean over the six, against {best}"
-    targets.at_most(label, means[DEFAULT], means[best], key="dart/mean_against_best")
+    targets.at_most(label, means[LIVE], means[best], key="dart/mean_against_best")
     _in_hindsight(targets, runs)
 
 
@@ -249,10 +249,10 @@ def side_by_side(targets: Targets) -> None:
                         key = f"side_by_side/{place}/{key_of(name)}/{part}"
                         targets.record(key, float(value), "%")
     for where in ("carmaker", "brisk"):
-        others = {name: errors[where].other for name, errors in rows.items() if name != DEFAULT}
+        others = {name: errors[where].other for name, errors in rows.items() if name != LIVE}
         least = {name: float(value) for name, value in others.items() if value is not None}
         best = min(least, key=least.__getitem__)
-        own = rows[DEFAULT][where].other
+        own = rows[LIVE][where].other
         assert own is not None
         targets.record(f"side_by_side/best_of_{where}", best)
         targets.record(f"side_by_side/best_of_{where}/other", least[best], "%")
@@ -265,10 +265,10 @@ def side_by_side(targets: Targets) -> None:
         }
         for name, value in means.items():
             targets.record(f"side_by_side/both_{where}/{key_of(name)}", value, "%")
-        best = min((name for name in means if name != DEFAULT), key=means.__getitem__)
+        best = min((name for name in means if name != LIVE), key=means.__getitem__)
         targets.record(f"side_by_side/best_{where}", best)
-        label = f"elsewhere, CarMaker and {where}, {means[DEFAULT]:.1f} % over that of {best}"
-        over, key = means[DEFAULT] / means[best], f"side_by_side/over_best_{where}"
+        label = f"elsewhere, CarMaker and {where}, {means[LIVE]:.1f} % over that of {best}"
+        over, key = means[LIVE] / means[best], f"side_by_side/over_best_{where}"
         targets.at_most(label, over, BEHIND, "-", key=key)
     for name in sorted(means, key=means.__getitem__):
         cells = (
@@ -308,7 +308,7 @@ def _courses() -> dict[str, tuple[Vehicle, tuple[Recording, ...]]]:
 
 def _in_hindsight(targets: Targets, runs: tuple[Recording, ...]) -> None:
     """Show what the best of random designs has, chosen on the runs that it is judged on."""
-    found = _compare((DEFAULT, BEST), DART, runs, designs=DESIGNS)
+    found = _compare((LIVE, BEST), DART, runs, designs=DESIGNS)
     for name, candidates in found.sweeps.items():
         best = best_candidate(candidates)
         assert best is not None and best.shares.other is not None

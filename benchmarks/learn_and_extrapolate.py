@@ -16,7 +16,7 @@ from benchmarks.extrapolate_recorded import carmaker, dart, side_by_side
 from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
 from identifier.compare.course import step_times
-from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.methods import LIVE, REFERENCE, make_method
 from identifier.run import identify
 from models.vehicle import sedan
 from tireid.commands.demo_story import plant_recordings
@@ -29,7 +29,7 @@ def cost(targets: Targets) -> None:
     ----------
     targets : collects what is missed.
     """
-    methods = {name: make_method(name, sedan()) for name in (DEFAULT, REFERENCE)}
+    methods = {name: make_method(name, sedan()) for name in (LIVE, REFERENCE)}
     slalom = plant_recordings(sedan())[0]
     times = step_times(methods, sedan(), slalom, repeats=200)
     print(
@@ -38,11 +38,11 @@ def cost(targets: Targets) -> None:
     )
     for name, duration in times.items():
         targets.record(f"step/{name}", 1e6 * duration, "µs")
-    ratio = times[DEFAULT] / times[REFERENCE]
+    ratio = times[LIVE] / times[REFERENCE]
     targets.at_most("time per step over the paper's", ratio, 2.0, "-", key="step/ratio")
     runs = {name: partial(identify, slalom, sedan(), method) for name, method in methods.items()}
     whole = shortest(runs, turns=200, clock=time.process_time)
-    recorded = whole[DEFAULT] / whole[REFERENCE]
+    recorded = whole[LIVE] / whole[REFERENCE]
     show("the same with everything recorded, as identify() does", f"{recorded:.2f}")
     targets.record("step/ratio_recorded", recorded, "-")
 

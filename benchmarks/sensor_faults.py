@@ -28,7 +28,7 @@ from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
 from identifier.axle.gate import GateState
-from identifier.methods import DEFAULT, make_method
+from identifier.methods import LIVE, make_method
 from identifier.refused import SampleLimits
 from identifier.run import History, identify
 from models.faults import KINDS, SIZED, SensorFault
@@ -197,7 +197,7 @@ def run(count: int) -> tuple[dict[str, list[Result]], float]:
 
 
 def _design(car: Vehicle) -> AxleIdentifier:
-    design = make_method(DEFAULT, car)
+    design = make_method(LIVE, car)
     assert isinstance(design, AxleIdentifier)
     return design
 

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.targets import Targets, keeps
-from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.methods import LIVE, REFERENCE, make_method
 from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -62,7 +62,7 @@ def main() -> int:
     car, targets = sedan(), Targets("speed")
     plant = Plant(car)
     recording = plant.simulate(SLALOM, speed=20.0).recording()
-    methods = {name: make_method(name, car) for name in (REFERENCE, DEFAULT)}
+    methods = {name: make_method(name, car) for name in (REFERENCE, LIVE)}
     print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
     actions: dict[str, tuple[Callable[[], object], int]] = {
         name: (partial(identify, recording, car, method), REPEATS)
@@ -81,7 +81,7 @@ def main() -> int:
         "plant_and_identifier": f"identify({simulate}.recording(), sedan(), "
         f"make_method({REFERENCE!r}, sedan()))",
         "plant_and_default": f"identify({simulate}.recording(), sedan(), "
-        f"make_method({DEFAULT!r}, sedan()))",
+        f"make_method({LIVE!r}, sedan()))",
     }.items():
         duration = first_use(statement)
         print(f"{name + ', first use with compiling':44} {duration:8.2f} s")

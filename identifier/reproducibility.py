@@ -270,7 +270,7 @@ def replay(model: TireModel, online: History, *, since: float | None = None) -> 
         recording=online.recording,
         axle_force=force,
         against_truth=None if truth is None else axle_rms(force, counted, truth),
-        against_online=axle_rms(force, counted, online.axle_force),
+        against_online=axle_rms(force, counted, online.axle_force) if online.online else None,
     )
 
 

@@ -149,9 +149,10 @@ class LaggedEkf(Method):
 
     Parameters
     ----------
-    v_y_noise, r_noise, a_y_noise : standard deviations of what is heard [m/s], [rad/s], [m/s²].
+    v_y_noise, r_noise : standard deviations of what is measured [m/s], [rad/s].
     v_y_disturbance, r_disturbance : what the tires miss, as random change [m/s/√s], [rad/s/√s].
     relaxation_length : of both axles [m].
+    a_y_noise : standard deviation of the accelerometer [m/s²].
     walk : of ln C and ln μ [1/√s].
     stiffness_spread, friction_spread : standard deviations of ln C and ln μ at first [-].
     steering_spread : standard deviation of the zero of the front steering at first [rad].

@@ -77,7 +77,7 @@ ALIKE = {  # standard deviation of front less rear
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
 TYPED = ("steering_gain",)
-TAILS = 2.0  # degrees of freedom of their priors
+TAILS = 1.0  # degrees of freedom of their priors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +124,8 @@ class Priors:
             mean[k], sd[k] = size * belief.mean, size * belief.sd
             low[k], high[k] = size * belief.low, size * belief.high
         for name, (value, doubt) in _told(vehicle).items():
-            mean[INDEX[name]], sd[INDEX[name]] = value, doubt
+            k = INDEX[name]
+            mean[k], sd[k] = min(max(value, low[k]), high[k]), doubt
         for name, value in wide.items():
             sd[INDEX[name]] = value
         for name in fixed:
@@ -167,7 +168,7 @@ class Priors:
         cost = 0.5 * float(away @ self.information @ away)
         for k in self.typed:
             z2 = float(self.information[k, k] * away[k] ** 2)
-            cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / TAILS) - z2)
+            cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / (TAILS + 1.0)) - z2)
         return cost
 
     def around(self, p: Array) -> tuple[Array, Array]:
@@ -175,7 +176,7 @@ class Priors:
         away, curvature = p - self.mean, self.information.copy()
         for k in self.typed:
             z2 = self.information[k, k] * away[k] ** 2
-            curvature[k, k] *= (TAILS + 1.0) / (TAILS + z2)
+            curvature[k, k] *= (TAILS + 1.0) / (TAILS + 1.0 + z2)
         gradient: Array = curvature @ away
         return gradient, curvature
 

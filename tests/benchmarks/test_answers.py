@@ -126,7 +126,7 @@ def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
         valid = False
         findings = (Finding("b", True), Finding("note", False), Finding("a", True))
 
-    monkeypatch.setattr("identifier.run.History.verdict", lambda _: Verdict, raising=False)
+    monkeypatch.setattr("tireid.run.judge", lambda _: Verdict)
     asked = answer(log, drive.car.told, drive.exact)
     assert (asked.valid, asked.codes) == (False, ("a", "b"))
 
@@ -273,12 +273,12 @@ def test_a_verdict_that_stops_or_is_none_is_found_where_it_is_asked(monkeypatch)
 
     judged, not_judged = noisy_runs.JUDGED, noisy_runs.JUDGED + 1
     assert math.gcd(noisy_runs.JUDGED, noisy_runs.DRIVES) == 1
-    monkeypatch.setattr("identifier.run.History.verdict", stops)
+    monkeypatch.setattr("tireid.run.judge", stops)
     assert noisy_runs.run(judged).what == "ZeroDivisionError: of a verdict"
     assert noisy_runs.run(not_judged).what == ""
     for value in (math.nan, math.inf):
         none = ti.Verdict(findings=(), numbers=(), measures={"force_missed": (0.1, value)})
-        monkeypatch.setattr("identifier.run.History.verdict", lambda _, none=none: none)
+        monkeypatch.setattr("tireid.run.judge", lambda _, none=none: none)
         assert noisy_runs.run(judged).what == "verdict that is none"
 
 

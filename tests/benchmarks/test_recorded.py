@@ -9,7 +9,7 @@ from benchmarks import recorded_cars
 from benchmarks.documents import recorded
 from benchmarks.targets import Targets
 from identifier.compare.course import Course
-from identifier.methods import DEFAULT, make_method
+from identifier.methods import LIVE, make_method
 from identifier.run import identify
 from models.vehicle import sedan
 from tireid.commands.demo_story import plant_recordings
@@ -25,7 +25,7 @@ def test_the_errors_on_recorded_cars_are_those_recorded():
 
 def test_what_the_default_method_learns_on_the_plant_is_that_recorded():
     car = sedan()
-    slalom, method = plant_recordings(car)[0], make_method(DEFAULT, car)
+    slalom, method = plant_recordings(car)[0], make_method(LIVE, car)
     course = Course(vehicle=car, recordings=(slalom,), min_speed=method.min_speed)
     model = identify(slalom, car, method).freeze(float(slalom.t[-1]))
     error = course.error(slalom, model.axle_force(slalom))

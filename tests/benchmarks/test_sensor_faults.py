@@ -12,7 +12,7 @@ from benchmarks.random_cars import CLASSES
 from benchmarks.recorded_cars import DART
 from benchmarks.sensor_faults import RIGHT, Result, random_fault, shown
 from benchmarks.targets import Targets
-from identifier.methods import DEFAULT, make_method
+from identifier.methods import LIVE, make_method
 from identifier.run import OnlineIdentifier, identify
 from models.faults import KINDS, SensorFault
 from models.vehicle import sedan
@@ -34,7 +34,7 @@ FAULTS = {
 def test_the_compiled_run_is_that_of_a_car_sample_by_sample(drive, name):
     """Beside a car samples that are no numbers are refused, and the forces go on, bit for bit."""
     fault, car = FAULTS[name], drive.car
-    design, log = make_method(DEFAULT, car), drive.recording
+    design, log = make_method(LIVE, car), drive.recording
     seen = shown(log, fault, car)
     history = identify(seen, car, design)
     online, broken = OnlineIdentifier(design, car, log.dt), fault.active(log.t)
@@ -57,7 +57,7 @@ def test_the_compiled_run_is_that_of_a_car_sample_by_sample(drive, name):
 def test_a_fault_that_is_none_is_not_noticed_and_leaves_no_error(drive):
     none = SensorFault(channel="v_y", kind="biased", start=18.0, duration=2.0, size=0.0)
     history = identify(
-        shown(drive.recording, none, drive.car), drive.car, make_method(DEFAULT, drive.car)
+        shown(drive.recording, none, drive.car), drive.car, make_method(LIVE, drive.car)
     )
     np.testing.assert_array_equal(history.axle_force, drive.forces)
     assert sensor_faults.after_fault(drive, none, history.axle_force) == 0.0
@@ -68,7 +68,7 @@ def test_a_fault_that_is_none_is_not_noticed_and_leaves_no_error(drive):
 
 def test_a_plain_fault_is_noticed_soon_and_harms_where_nobody_doubts(drive):
     fault = SensorFault(channel="v_y", kind="biased", start=18.0, duration=2.0, size=3.0)
-    design = make_method(DEFAULT, drive.car)
+    design = make_method(LIVE, drive.car)
     never = replace(design, watch=replace(design.watch, noticed=sensor_faults.NEVER))
     seen = shown(drive.recording, fault, drive.car)
     watched, unwatched = (identify(seen, drive.car, one) for one in (design, never))

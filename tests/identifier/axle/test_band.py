@@ -89,7 +89,8 @@ def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
     for name in ("W", "own", "covariance", "prior_covariance", "excitation"):
         np.testing.assert_array_equal(getattr(model, name), getattr(frozen, name))
     assert "band" not in frozen.to_dict()
-    assert model.to_dict() == frozen.to_dict() | {"band": model.calibration.to_dict()}
+    more = {"band": model.calibration.to_dict(), "force_missed": model.force_missed.tolist()}
+    assert model.to_dict() == frozen.to_dict() | more
     np.testing.assert_array_equal(calibrated(run, 15.0).W, run.freeze(15.0).W)
 
 

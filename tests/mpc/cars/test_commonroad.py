@@ -30,7 +30,7 @@ def gentle(request):
 def test_a_missing_package_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "vehiclemodels.parameters_vehicle2", None)
     for make in CARS.values():
-        with pytest.raises(MissingCommonRoadError, match=r"pip install tireid\[commonroad\]"):
+        with pytest.raises(MissingCommonRoadError, match=r"pip install commonroad-vehicle-models"):
             make()
 
 
