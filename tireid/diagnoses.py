@@ -167,7 +167,6 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
 
     Parameters
     ----------
-    diagnosis : of the log that taught the model.
     repair : that was taken out of it before: nothing of that speaks against the answer.
     """
     left = [] if repair else [one for one in diagnosis.findings if one.sure]

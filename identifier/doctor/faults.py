@@ -122,12 +122,7 @@ class Line(NamedTuple):
 
 
 class Accelerometer:
-    """a_y over the motion of drives.
-
-    Parameters
-    ----------
-    stretches, drives : the same, as logged and as the estimate reads them.
-    """
+    """a_y over the motion of drives."""
 
     FILTERED, STRIDE = 0.25, 0.1  # [s] of means, and between them
     ERROR, RELATIVE = 0.02, 0.03  # of g, and of the acceleration

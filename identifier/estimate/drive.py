@@ -40,7 +40,6 @@ class Drive:
     signals : columns as `motion.model.SIGNALS`, (n, 9).
     rates : d/dt of v_y, r and δ_f, (n, 3).
     counts : samples that count, (n,).
-    every : samples of the recording that make one of these.
     begins : first samples of its stretches, rising, (k,).
     """
 

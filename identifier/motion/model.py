@@ -223,7 +223,6 @@ def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, An
 
     Parameters
     ----------
-    signals : as logged, those of `SENSED`.
     p : parameters, those of `SENSORS`.
     """
     v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate = signals
