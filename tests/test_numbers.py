@@ -37,7 +37,6 @@ TO_RECORD = {
     "guaranteed",
     "learn_and_extrapolate",
     "mpc_caution",
-    "mpc_speed",
     "road_friction",
     "sensor_faults",
 }
