@@ -393,6 +393,10 @@ class Vehicle:
             told = getattr(self.chassis, name)
         return told
 
+    def moves_as(self, other: "Vehicle") -> bool:
+        """Return whether another file tells the same car: its bicycle and its downforce."""
+        return self.bicycle == other.bicycle and self.downforce == other.downforce
+
     def without_chassis(self) -> "Vehicle":
         """Return the car alone, with the numbers of `OF_CHASSIS` that its chassis tells."""
         told: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}

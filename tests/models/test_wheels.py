@@ -30,7 +30,8 @@ def run():
     steer = RandomSteer(
         amplitude=np.radians(3.0), frequency=0.4, seed=3, onset=1.0, rate_limit=1.0, duration=39.99
     )
-    return Plant(CAR).simulate(steer, speed=speed)
+    chassis = replace(CAR.require_chassis(), brake_front_share=1.0)  # the rear wheels roll freely
+    return Plant(replace(CAR, chassis=chassis)).simulate(steer, speed=speed)
 
 
 def slipping(run, columns, slip):
@@ -99,7 +100,7 @@ def test_without_the_track_an_axle_tells_it_by_its_mean(run):
 def test_slip_costs_a_fraction_of_what_it_costs_the_mean(run, driven, columns, event):
     slips = slipping(run, columns, event(run.t))
     ours, mean, result = against_mean(run, slips, replace(KNOWN, driven=driven))
-    assert ours < 0.4 * mean  # the wheels behind slip too, where the car brakes
+    assert ours < 0.3 * mean
     assert ours < 0.2
     assert result.gated > 50
 

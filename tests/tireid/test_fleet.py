@@ -612,10 +612,13 @@ def test_a_question_in_sql_chooses_rows_and_sees_nothing_else(store):
 
 def test_stiffness_of_a_small_car_has_digits_in_the_table(store):
     (group, *_) = merge(used(Store(store).rows(where="vehicle = 'red'")), [])
-    small = replace(group.model, W=1e-3 * group.model.W)
+    n, unit = group.model.W.shape[1], np.ones(group.model.covariance.shape[1])
+    unit[:n] = 1e-3
+    tires, doubt = group.model, np.outer(unit, unit)
+    small = replace(tires, W=1e-3 * tires.W, covariance=doubt * tires.covariance)
     words = command._table([replace(group, model=small)]).split("kN/rad")[0].replace(",", "")
     told = [float(one) for one in re.findall(r"([\d.]+) ±", words)[-2:]]
-    assert told == pytest.approx(small.cornering_stiffness / 1e3, rel=0.3)  # its ± rounds
+    assert told == pytest.approx(small.cornering_stiffness / 1e3, rel=0.02)
 
 
 def test_cars_of_another_kind_are_not_merged(store):

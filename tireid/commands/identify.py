@@ -184,7 +184,7 @@ def run(options: argparse.Namespace) -> int:
     _require_inside(freeze_times, recording)
     if network is None:
         _require_model(law, design, vehicle)
-    if start is not None and start.scales_with_load and start.vehicle != vehicle:
+    if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
     parts = {LEARNING: 1.0 + count, JUDGING: count, DRAWING: 2.0 + 3.0 * count}

@@ -120,7 +120,7 @@ def _model(options: argparse.Namespace) -> TireModel:
         vehicle = repaired_vehicle(model.vehicle, options)
     else:
         vehicle = read_vehicle(options)
-    if vehicle == model.vehicle:
+    if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:
         raise ValueError(
