@@ -13,9 +13,9 @@ from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
-from identifier.estimate.solve import ENOUGH, estimate, simulate
+from identifier.estimate.solve import ENOUGH, STRIDE, error_size, estimate, simulate
 from models.recordings import Recording
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
 BLOCK = 600.0  # [s] that are estimated at once
 ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
@@ -24,7 +24,7 @@ LONG, COARSE = (
     2.0,
 )  # [s] of logs from which samples are averaged to intervals so much longer
 REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
-MISSED = 0.06  # of the force, by which drives of one car differ from one model; of one log a belief
+LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
 class Fit(NamedTuple):
@@ -66,7 +66,7 @@ def fit(
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
         segments += _segments(drives, roads)
-        reach = reach.and_of(drives, found, vehicle)
+        reach = reach.and_of(drives, roads, found, vehicle)
         information = np.zeros_like(beliefs.information)
         information[np.ix_(found.index, found.index)] = found.information
         beliefs = replace(beliefs, mean=found.p, information=information, typed=())
@@ -83,7 +83,7 @@ def fit(
         driven=reach.slip,
         speeds=reach.speeds,
         a_x=reach.a_x,
-        missed=np.full(2, MISSED),
+        unexplained=np.sqrt(np.maximum(reach.alike, 0.0) / max(reach.pairs, 1)),
         segments=tuple(segments),
     )
     return Fit(model, found)
@@ -106,26 +106,47 @@ def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
 
 
 class Reach(NamedTuple):
-    """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²]."""
+    """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²].
+
+    alike, pairs : sum of products of what the model misses, over its size, at two times `LASTS`
+    apart, (2,), and how many there are: white noise of the sensors has no part in it.
+    """
 
     slip: Array = np.zeros(2)
     speeds: Array = np.array([np.inf, -np.inf])
     a_x: Array = np.array([np.inf, -np.inf])
+    alike: Array = np.zeros(2)
+    pairs: int = 0
 
-    def and_of(self, drives: Sequence[Drive], found: Posterior, vehicle: Vehicle) -> "Reach":
+    def and_of(
+        self, drives: Sequence[Drive], roads: Roads | None, found: Posterior, vehicle: Vehicle
+    ) -> "Reach":
         """Return what these drives reached, too."""
-        slip, speeds, a_x = (np.array(one) for one in self)
-        for one in drives:
+        slip, speeds, a_x, alike = (
+            np.array(one) for one in (self.slip, self.speeds, self.a_x, self.alike)
+        )
+        pairs = self.pairs
+        later = LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+        for i, one in enumerate(drives):
             on = one.counts
             if not on.any():
                 continue
-            size = np.abs(simulate(one, found.p, vehicle)["slip"][on])
+            if roads is not None:
+                one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+            driven = simulate(one, found.p, vehicle)
+            size = np.abs(driven["slip"][on])
+            force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
+            e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
+            n = max(round(max(later, STRIDE) / one.dt), 1)
+            both = on[n:] & on[:-n]
+            alike += (e[n:] * e[:-n])[both].sum(axis=0)
+            pairs += int(np.count_nonzero(both))
             k = min(max(round(REACHED / one.dt), 1), len(size))
             slip = np.maximum(slip, np.partition(size, len(size) - k, axis=0)[-k])
             for both, column in ((speeds, 0), (a_x, 5)):
                 low, high = np.quantile(one.signals[on, column], [0.005, 0.995])
                 both[:] = min(both[0], low), max(both[1], high)
-        return Reach(slip, speeds, a_x)
+        return Reach(slip, speeds, a_x, alike, pairs)
 
 
 def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[Drive]]:

@@ -24,7 +24,7 @@ from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
 
 STRIDE = 0.05  # [s] between residuals
-ERROR, RELATIVE = 0.02, 0.04  # b: of a static load, and of the lateral acceleration in g
+ERROR_SIZE = 0.02, 0.04  # b: of a static load, and of the lateral acceleration in g
 NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far off
 LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 SHORTEST_MEMORY, LONGEST_MEMORY = 0.25, 8.0  # T [s]
@@ -82,7 +82,7 @@ class Problem:
         for one, stride, kept in zip(drives, self._strides, self._kept, strict=True):
             v_x, r = one.signals[::stride][kept][:, [0, 2]].T
             forces.append(np.abs(v_x * r) / GRAVITY)
-            sizes.append(np.hypot(ERROR, RELATIVE * forces[-1]))
+            sizes.append(error_size(forces[-1]))
             weights.append(np.full(kept.size, one.dt * stride))
         self.size = np.concatenate(sizes)
         self.weight = np.concatenate(weights)
@@ -234,6 +234,12 @@ class Problem:
         """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
+
+
+def error_size(force: Array) -> Array:
+    """Return b, what a good model misses of a force, both in static loads."""
+    floor, share = ERROR_SIZE
+    return np.hypot(floor, share * force)
 
 
 def car_numbers(vehicle: Vehicle) -> Array:

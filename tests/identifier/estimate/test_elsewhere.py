@@ -48,7 +48,7 @@ def believed(p=PRIORS.mean, **numbers):
         driven=np.array([0.17, 0.12]),
         speeds=np.array([16.0, 20.0]),
         a_x=np.zeros(2),
-        missed=np.array([0.06, 0.04]),
+        unexplained=np.array([0.6, 0.4]),
     )
 
 
