@@ -37,6 +37,7 @@ LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale c
 LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
 LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
 SURE_PAIR, NO_PAIR = 0.9, 0.3  # correlations of two channels that are of one bend, or of none
+COPY = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
 LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
 SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
 LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
@@ -166,6 +167,12 @@ def _check_turns(w: Windows) -> str | None:
     r_delta = pair(turn, steered, w.grips)
     if felt is None:
         return _check_two(r_delta)
+    rest = felt - w.r * (float(felt @ w.r) / max(float(w.r @ w.r), 1e-300))
+    if float(rest @ rest) < COPY**2 * float(felt @ felt):
+        return (
+            "ay must be an acceleration, it is r times a number: a copy of the yaw rate? "
+            "leave it out"
+        )
     r_a, a_delta = pair(turn, felt), pair(felt, steered, w.grips)
     dot, dot_error = _of_v_y(least_squares(_kinematics(w), felt), w)
     against_v_y = dot_error < 0.6 and abs(dot) > dot_error

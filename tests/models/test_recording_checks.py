@@ -476,6 +476,12 @@ def test_an_a_y_without_v_x_r_is_not_turned() -> None:
         assert "change the sign" not in message
 
 
+def test_an_a_y_that_is_the_yaw_rate_is_named() -> None:
+    made = replace(drive(peak=1.0), axle_force=None)
+    for factor in (1.0, 9.81, -1.0):
+        assert "a copy of the yaw rate? leave it out" in refusal(replace(made, a_y=factor * made.r))
+
+
 @pytest.mark.parametrize("axes", ["east-north", "north-east", "begun at 120 degrees"])
 @pytest.mark.parametrize("peak", [1.5, 5.0])
 def test_velocities_of_the_world_are_named(axes: str, peak: float) -> None:
