@@ -7,7 +7,7 @@ the same code; they differ in the `Method` that is handed over.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeGuard, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.setup import AXLE_FORCE, HALF_BAND, Block, Port, Setup
 from identifier.tire_model import Reached, TireModel
-from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -202,20 +201,6 @@ class Method(ABC):
         """
         del history
         return Certificate()
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has; empty: nothing."""
-        return {}
-
-    def tuned(self, values: Mapping[str, float]) -> Self:
-        """Return the method with other numbers.
-
-        Parameters
-        ----------
-        values : by name of its `tunables`; empty leaves it as it is.
-        """
-        return with_numbers(self, values)
 
     def numbers(self) -> dict[str, Any]:
         """Return all that was chosen, as plain data: gains, network, the rest and the seed.

@@ -47,7 +47,6 @@ from identifier.baselines.without_v_y import (
 from identifier.method import Method
 from identifier.setup import COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, ranges_around
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 
@@ -352,11 +351,6 @@ class HorizonEstimator(Method):
     def needs_a_y(self) -> bool:
         """Whether it learns nothing from a recording without an accelerometer: so it is."""
         return True
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return ranges_around(self, {f"filter.{name}": 4.0 for name in self.filter.tunables})
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -33,7 +33,6 @@ from identifier.baselines.without_v_y import OVER, corrected, heard_ports
 from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, ranges_around
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
@@ -203,13 +202,6 @@ class LaggedEkf(Method):
             learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
         )
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        noise = ("v_y_noise", "r_noise", "a_y_noise", "v_y_disturbance", "r_disturbance")
-        own = ("relaxation_length", "stiffness_spread", "friction_spread")
-        return ranges_around(self, dict.fromkeys(noise, 4.0) | dict.fromkeys(own, 3.0))
 
     @property
     def ports(self) -> tuple[Port, ...]:

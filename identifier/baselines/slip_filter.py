@@ -36,7 +36,6 @@ from identifier.baselines.without_v_y import (
 from identifier.method import Method, resumed
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, ranges_around
 from models.bicycle import BicycleParameters
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
@@ -260,13 +259,6 @@ class SlipFilter(Method):
     def learns(self) -> bool:
         """Whether there is a tire to learn."""
         return TIRES[self.tire].unknowns > 0
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        noise = ("r_noise", "a_y_noise", "v_y_disturbance", "r_disturbance")
-        own = ("walk", "stiffness_spread", "friction_spread") if self.learns else ()
-        return ranges_around(self, dict.fromkeys((*noise, *own), 4.0))
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -5,7 +5,6 @@ dv/dt = a_y - v_x r + ω (v_s - v): v is the integral washed out by s/(s + ω), 
 for rates that hold over a step. A complementary filter; what bank and bias do to it is 1/ω of them.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Self
@@ -24,7 +23,6 @@ from identifier.baselines.without_v_y import (
 from identifier.method import Method
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, around
 from models.rules import require_positive
 from models.vehicle import Vehicle
 
@@ -117,11 +115,6 @@ class Washout(Method):
     def needs_a_y(self) -> bool:
         """Whether it tells nothing from a recording without an accelerometer: so it is."""
         return True
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return {"cutoff": around(self.cutoff, 10.0)}
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -6,7 +6,6 @@ from identifier.stability.certificate import certify
 from identifier.stability.gain_design import DesignError, GainDesign, design_gains
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, along_run
 from identifier.stability.operation import Operation
-from identifier.stability.pi_lead import pi_lead
 
 __all__ = [
     "INSTANTANEOUS",
@@ -20,5 +19,4 @@ __all__ = [
     "along_run",
     "certify",
     "design_gains",
-    "pi_lead",
 ]

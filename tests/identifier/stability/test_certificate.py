@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
+from benchmarks.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.certificate import Property, at_least, at_most
 from identifier.paper.laws import LAWS, Gains, diagonal
 from identifier.stability import (
@@ -14,7 +15,6 @@ from identifier.stability import (
     certify,
     design_gains,
 )
-from identifier.stability.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import worst_loop
 from identifier.stability.sampled_bound import Disturbance
