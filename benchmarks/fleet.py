@@ -506,7 +506,7 @@ def watching(targets: Targets, driven: int, jobs: int) -> None:
     driven : cars that are driven.
     jobs : processes.
     """
-    from benchmarks.spread import spread
+    from identifier.compare.work import spread
 
     with spread(jobs) as spread_map:
         cars = list(spread_map(driven_car, range(FIRST_SEED, FIRST_SEED + driven)))

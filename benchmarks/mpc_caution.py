@@ -30,8 +30,8 @@ import numpy as np
 
 from benchmarks.mpc_cases import options_of
 from benchmarks.random_cars import FIRST_SEED, random_beginning, random_car
-from benchmarks.spread import spread
 from benchmarks.targets import Targets, keeps
+from identifier.compare.work import spread
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.recordings import Recording

@@ -28,8 +28,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks.mpc_cases import drive_with, options_of
-from benchmarks.spread import spread
 from benchmarks.targets import Targets, keeps, show
+from identifier.compare.work import spread
 from models.vehicle import sedan
 from mpc.handover import Learner
 from mpc.loop.sensing import cornering_limit

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.mpc_cases import drive_with, options_of
-from benchmarks.spread import spread
 from benchmarks.targets import Targets, keeps
+from identifier.compare.work import spread
 from mpc.handover.rules import Verdict
 from tireid.commands.drive_case import conditions_of, parse_fault
 from tireid.driving.runs import FROZEN, LEARNING

@@ -23,8 +23,8 @@ import numpy as np
 
 from benchmarks import mpc_friction_drop as drops
 from benchmarks.mpc_cases import options_of
-from benchmarks.spread import spread
 from benchmarks.targets import Targets, keeps
+from identifier.compare.work import spread
 from identifier.tire_model import TireModel
 from mpc.handover import Learner
 from mpc.handover.rules import Verdict

@@ -22,8 +22,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks.mpc_cases import TIRES, Case, run
-from benchmarks.spread import spread
 from benchmarks.targets import Targets, keeps
+from identifier.compare.work import spread
 
 PATHS = ("iso-3888-2", "course")
 SHARES = (0.9, 0.97)

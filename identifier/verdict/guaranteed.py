@@ -9,6 +9,9 @@ The bound that is estimated is `RESERVE` times the least one with which any curv
 and a little more: the quick part of errors, which means hide, has to find room in it.
 """
 
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,17 +26,82 @@ from identifier.axle.guarantee import (
     possible_weights,
 )
 from identifier.axle.learning import Regression
-from identifier.run import History
+from identifier.run import History, state_index
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict.motion import BRISK, FEWEST, WINDOW, Windows, impulse_signals
-from identifier.verdict.parts import asked_run
+from identifier.verdict.motion import FEWEST, WINDOW, Windows, brisk_from, impulse_signals
 from models.recordings import Recording
+from models.recordings.portion import Portion, portion
 
 OVERLAPPING = 4  # moments that begin within the length of one
 RESERVE = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
 OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
 SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
 OVER_LATENESS = Regression().lateness  # s, added before the reserve
+
+
+class AskedRun(NamedTuple):
+    """A run whose frozen model is asked about a portion of its drive, k samples.
+
+    model : frozen.   history : the run.   portion : of its recording.   end : time of the freeze
+    in the recording's own clock [s].   until : the same in that of the portion, None at its end.
+    road : what a banked road pushed (k,) [weights], None unknown.
+    """
+
+    model: TireModel
+    history: History
+    portion: Portion
+    end: float
+    until: float | None
+    road: Array | None
+
+
+def asked_run(history: History, t: float | None = None) -> AskedRun:
+    """Return what of a run is asked.
+
+    Parameters
+    ----------
+    t : time of the freeze in the recording's own clock [s]; None is the end.
+
+    Raises
+    ------
+    DivergedError
+        Where the law had diverged by then.
+    CannotFreezeError
+        Where the method estimates a signal, not a model.
+    """
+    model, whole = history.freeze(t), history.recording
+    end = float(whole.t[-1]) if t is None else t
+    frozen = state_index(whole, end)
+    asked = portion(whole, frozen)
+    n = asked.place(frozen)
+    until = None if n == len(asked.recording) else float(asked.recording.t[n])
+    roads = _felt.setdefault(history, {})
+    if frozen not in roads:
+        roads[frozen] = road_felt(history, asked)
+    return AskedRun(model, history, asked, end, until, roads[frozen])
+
+
+# What is felt takes as long as learning: it is found once of each run and sample of the freeze.
+_felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
+
+
+def road_felt(history: History, asked: Portion) -> Array | None:
+    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
+    pushes = []
+    for block in history.blocks(asked.samples):
+        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
+        mine = asked.samples[first:last] - block.part.start
+        tell = history.design.beside_force if without_v_y(asked) else history.design.road_push
+        push = tell(block.state)
+        if push is None:
+            return None
+        pushes.append(push[mine])
+    return np.concatenate(pushes)
+
+
+def without_v_y(asked: Portion) -> bool:
+    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows."""
+    return asked.recording.logged_v_y is None
 
 
 class BoundViolatedError(TireidError, ValueError):
@@ -53,7 +121,7 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     """
     if recording.logged_v_y is None:
         return None
-    drives = recording.v_x >= least_speed(model)
+    drives = recording.v_x >= brisk_from(model)
     windows = Windows.where(drives, recording, WINDOW, OVERLAPPING)
     if len(windows) < FEWEST:
         return None
@@ -78,11 +146,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
         v_x=mean(recording.v_x[:, None], g)[:, 0],
         t=recording.t[windows.starts],
     )
-
-
-def least_speed(model: TireModel) -> float:
-    """Return the speed [m/s] from which a moment counts."""
-    return max(model.min_speed, BRISK * model.vehicle.froude_speed)
 
 
 def triangle(n: int, dt: float) -> tuple[Array, Array]:

@@ -10,9 +10,8 @@ from identifier.axle.gate import GateState
 from identifier.methods import METHODS, make_method
 from identifier.prediction import predict
 from identifier.refused import GATE
-from identifier.reproducibility import motion_error
 from identifier.run import identify
-from identifier.verdict.motion import Windows
+from identifier.verdict.motion import Windows, motion_error
 from models.recordings import Recording, RecordingError, Repair, joined
 from models.recordings.evidence import windows
 from models.recordings.portion import portion
