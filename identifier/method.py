@@ -236,22 +236,11 @@ class Method(ABC):
         del vehicle, state
         return ()
 
-    def road_push(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
-
-        What learning did not take for a force of the tires; None where a method takes all for one.
-
-        Parameters
-        ----------
-        state : carried values by port at n + 1 instants, of a run.
-        """
-        del state
-        return None
-
     def beside_force(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what an accelerometer showed beside the forces of the tires, (n,) [weights].
+        """Return what a run found to be no force of the tires, to the left (n,) [weights].
 
-        Bias, and the roll of the body, as far as they were found; None where a method finds none.
+        What a banked road pushes; without a v_y what the accelerometer shows beside forces: bias,
+        and the roll of the body. None where a method takes all for a force.
 
         Parameters
         ----------

@@ -29,7 +29,7 @@ from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
     from identifier.axle.band import BandCalibration
-    from identifier.axle.guarantee import Doubt, Guarantee
+    from identifier.axle.guarantee import Guarantee
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -509,28 +509,6 @@ class TireModel(ABC):
         """Weights that the drive left possible; None where nobody asked, or none are of curves."""
         return None
 
-    def with_guarantee(self, guarantee: "Guarantee") -> "TireModel":
-        """Return the model with its guaranteed band; as it is where it can carry none.
-
-        Parameters
-        ----------
-        guarantee : weights that are possible.
-        """
-        del guarantee
-        return self
-
-    def signals_of(self, recording: Recording) -> "tuple[Array, Doubt] | None":
-        """Return what a guarantee reads of a drive: units of the curves (n, 2, k), and doubt.
-
-        None where forces are no curves of slip.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
-        del recording
-        return None
-
     def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
         """Return `guaranteed_band` of both axles, (k, 2) each [N]; None where none is stated.
 
@@ -540,16 +518,6 @@ class TireModel(ABC):
         rate : of the force, static axle loads per second (k,).
         """
         del alpha, rate
-        return None
-
-    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
-        del recording
         return None
 
     @overload

@@ -335,7 +335,7 @@ class AxleIdentifier(Method):
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)
 
-    def road_push(self, state: Mapping[str, Array]) -> Array | None:
+    def beside_force(self, state: Mapping[str, Array]) -> Array | None:
         """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
 
         Parameters

@@ -408,10 +408,6 @@ class AxleModel(TireModel):
         low[stands], high[stands] = np.nan, np.nan
         return low * self._loads, high * self._loads
 
-    def with_guarantee(self, guarantee: Guarantee) -> "AxleModel":
-        """Return the model with its guaranteed band."""
-        return replace(self, guarantee=guarantee)
-
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
         """Return units times load and cos δ over a drive, (n, 2, ladder), and what opens a band.
 

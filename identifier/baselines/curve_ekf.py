@@ -90,7 +90,6 @@ def filtered_tire(textbook: bool) -> FilteredTire:
         lag=None if textbook else lag,
         unknowns=n + own,
         prior=1 + prior,
-        follows=False,
     )
 
 

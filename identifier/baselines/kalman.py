@@ -45,8 +45,7 @@ class FilteredTire(NamedTuple):
     force(bicycle parameters, prior, θ, slip (2,), u) -> axle forces (2,) [N].
     lag(prior, θ) -> σ (2,) [m]; None: the force reads α, nothing lags.
     unknowns, prior : sizes of θ and of whatever else it reads.
-    follows : whether the force told is that of the corrected θ (a signal), else that of the θ
-        carried into the sample (a model, which then freezes to the same force).
+    The force told is that of the θ carried into the sample, to which a model freezes.
     """
 
     slip: Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
@@ -54,7 +53,6 @@ class FilteredTire(NamedTuple):
     lag: Callable[[Any, Any], Any] | None
     unknowns: int
     prior: int
-    follows: bool
 
     @property
     def carry(self) -> tuple[str, ...]:
@@ -112,13 +110,12 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     P_afresh += ca.diag(unsteady**2)
     following = ca.if_else(going, corrected, afresh)
     theta_next = ca.fmin(ca.fmax(following[2 + lags :], -limit), limit)
-    output_theta = theta_next if tire.follows else theta
     last = lag_symbols()
     lag_next: tuple[Any, ...] = ()
     if tire.lag is not None:
         told_slip = lagged_slip(last, alpha_now, s.speed * dt, tire.lag(known, theta))
         lag_next = (told_slip, alpha_now, ca.if_else(s.moving, 1, 0))
-    axle_force = tire.force(p, known, output_theta, told_slip, s.u)
+    axle_force = tire.force(p, known, theta, told_slip, s.u)
     return ca.Function(
         name,
         [

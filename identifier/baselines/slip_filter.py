@@ -94,7 +94,6 @@ def _tire(curve: str, force: Any, unknowns: int) -> FilteredTire:
         lag=None,
         unknowns=unknowns,
         prior=1,
-        follows=False,
     )
 
 

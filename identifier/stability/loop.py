@@ -310,20 +310,3 @@ def root(
     from scipy.optimize import brentq  # takes longer to import than a log of a minute to learn from
 
     return float(brentq(f, low, high, xtol=xtol, rtol=rtol))
-
-
-def along_run(loop: Loop, gains_along: ArrayLike, integrator: str, dt: float) -> Array:
-    """Spectral radius of the sampled loop at each sample of a run, (n,).
-
-    Parameters
-    ----------
-    loop : A_d, law and input of the design; its own G is not used.
-    gains_along : (n, 2, 2) G along the run, from `regressor_gains`.
-    integrator : "euler", "rk4" or "exact".
-    dt : sampling interval [s].
-    """
-    G = np.asarray(gains_along, dtype=np.float64)
-    unit = replace(loop, G=np.eye(2)).matrix()
-    stack = np.repeat(unit[None], G.shape[0], axis=0)
-    stack[:, 4:, :4] = G @ unit[4:, :4]
-    return spectral_radius(stack, INTEGRATORS[integrator], dt)

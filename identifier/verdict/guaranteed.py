@@ -9,6 +9,7 @@ The bound that is estimated is `RESERVE` times the least one with which any curv
 and a little more: the quick part of errors, which means hide, has to find room in it.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -26,6 +27,7 @@ from identifier.axle.guarantee import (
     possible_weights,
 )
 from identifier.axle.learning import Regression
+from identifier.axle.model import AxleModel
 from identifier.run import History, state_index
 from identifier.tire_model import AXLES, TireModel
 from identifier.verdict.motion import FEWEST, WINDOW, Windows, brisk_from, impulse_signals
@@ -87,21 +89,17 @@ _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 def road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
+    if history.design.needs_v_y == (asked.recording.logged_v_y is None):
+        return None  # it was learnt of another motion than that which is asked
     pushes = []
     for block in history.blocks(asked.samples):
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
         mine = asked.samples[first:last] - block.part.start
-        tell = history.design.beside_force if without_v_y(asked) else history.design.road_push
-        push = tell(block.state)
+        push = history.design.beside_force(block.state)
         if push is None:
             return None
         pushes.append(push[mine])
     return np.concatenate(pushes)
-
-
-def without_v_y(asked: Portion) -> bool:
-    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows."""
-    return asked.recording.logged_v_y is None
 
 
 class BoundViolatedError(TireidError, ValueError):
@@ -119,16 +117,13 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     model : frozen; its lag, sway and offsets make the slip.
     road : what a banked road pushes to the left at each sample [weights], (n,); None unknown.
     """
-    if recording.logged_v_y is None:
+    if recording.logged_v_y is None or not isinstance(model, AxleModel):
         return None
     drives = recording.v_x >= brisk_from(model)
     windows = Windows.where(drives, recording, WINDOW, OVERLAPPING)
     if len(windows) < FEWEST:
         return None
-    signals = model.signals_of(recording)
-    if signals is None:
-        return None
-    units, doubt = signals
+    units, doubt = model.signals_of(recording)
     g, slope = triangle(windows.n, recording.dt)
     impulse, sideways = impulse_signals(recording, model.vehicle, road)
 
@@ -194,7 +189,7 @@ def guaranteed(
     told = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
     carries, box = run.model if model is None else model, history.design.possible_tires()
-    if box is None:
+    if box is None or not isinstance(carries, AxleModel):
         return carries
     strips = strips_of(run.model, run.portion.recording, run.road)
     if strips is not None and run.until is not None:
@@ -215,7 +210,7 @@ def guaranteed(
         speed=float(strips.v_x.mean()),
         fastest=fastest(strips),
     )
-    return carries.with_guarantee(guarantee)
+    return replace(carries, guarantee=guarantee)
 
 
 def fastest(strips: Strips) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from identifier.paper.design import (
 from identifier.paper.laws import LAWS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
-from identifier.stability.along import loop_along
+from identifier.stability.along import strongest_along
 from identifier.stability.certificate import judged_loop
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from identifier.stability.loop import direction_matrix
@@ -354,11 +354,10 @@ def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> s
     history = identify(recording, vehicle, design)
     if history.diverged_at is not None:
         return f"along {recording.name}: the law diverged at {history.diverged_at:g} s"
-    along = loop_along(history, design)
-    at = along.strongest
+    at = strongest_along(history, design)
     return (
-        f"along {recording.name}: largest loop gain {along.gain[at]:.4g} at {along.t[at]:g} s, "
-        f"gain margin there {along.margin:.3g}"
+        f"along {recording.name}: largest loop gain {at.gain:.4g} at {at.t:g} s, "
+        f"gain margin there {at.margin:.3g}"
     )
 
 
