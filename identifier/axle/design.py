@@ -144,12 +144,7 @@ class AxleIdentifier(Method):
         )
 
     def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of the curves that a run of it taught.
-
-        Parameters
-        ----------
-        history : of this method.
-        """
+        """Return what is proven of the curves that a run of it taught."""
         return Certificate(properties=certified_along(self, history))
 
     def possible_tires(self) -> HalfSpaces:
@@ -166,7 +161,6 @@ class AxleIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -234,11 +228,6 @@ class AxleIdentifier(Method):
         Parameters
         ----------
         start : as of `setup`; without a calibration errors are taken to be as learning is told.
-
-        Raises
-        ------
-        ValueError
-            Where stored weights are those of another structure.
         """
         setup = self.setup(vehicle, start)
         stored = None if start is None else self._resumed(start).calibration

@@ -198,18 +198,7 @@ class CurveEkf(Method):
         return "lag of the tires and offsets of the sensors are learnt, as by the default"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is the prior.
-        start : a frozen curve of the same kind to begin with; None begins with the prior.
-
-        Raises
-        ------
-        ValueError
-            Where the stored model is of another kind.
-        """
+        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
         theta, own = np.zeros(len(KINDS)), np.zeros(0 if self.textbook else OWN)
         if start is not None:
             refusal = "the stored model is not a curve 'magic_formula'"

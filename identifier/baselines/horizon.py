@@ -326,10 +326,6 @@ class HorizonEstimator(Method):
         well. The trajectory that is likeliest together with its tires makes tires too stiff where
         much of the motion may be chance, so less of the yaw rate's is. A longer window, or more
         steps, errs no less there.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
         """
         window = max(vehicle.froude_time, 2.0 * dt)
         joint = joint_ekf(vehicle, dt=dt)
@@ -363,18 +359,7 @@ class HorizonEstimator(Method):
         return f"{self.filter.remark}; solves for the last {self.samples} samples at each"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is the prior.
-        start : a frozen curve of Dugoff to begin with; None begins with the prior.
-
-        Raises
-        ------
-        ValueError
-            Where the stored model is of another kind.
-        """
+        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
         joint, N = self.filter.setup(vehicle, start), self.samples
         z, P = joint.carry["estimate"], joint.carry["P"]
         return Setup(

@@ -186,10 +186,6 @@ class LaggedEkf(Method):
         """Return the filter for a car: its size alone sets the numbers.
 
         Noise, disturbances and spreads were chosen on 24 random cars of our plant.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
@@ -214,18 +210,7 @@ class LaggedEkf(Method):
         return "two numbers an axle, one relaxation length for all cars of a size"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is not looked at.
-        start : None.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
-        """
+        """Return what a run needs; it begins afresh, with no stored model."""
         if start is not None:
             raise ValueError("the lagged filter begins afresh: it goes on from no stored model")
         theta = np.repeat(np.log([STIFFNESS, FRICTION]), 2)

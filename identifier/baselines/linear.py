@@ -33,26 +33,11 @@ class LinearBaseline(Method):
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
-        """Return the method for a car.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
-        """
+        """Return the method for a car."""
         return cls(dt=dt, min_speed=vehicle.lowest_speed)
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        start : None; there is nothing that a stored model could begin.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
-        """
+        """Return what a run needs; it begins afresh, with no stored model."""
         self.require_fresh(start)
         return self.frozen(vehicle, {}).setup(self.dt)
 

@@ -271,18 +271,7 @@ class SlipFilter(Method):
         return f"on {on}"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is the prior.
-        start : a frozen curve of Dugoff to begin with, where one is learnt; None: the prior.
-
-        Raises
-        ------
-        ValueError
-            Where the stored model is of another kind, or no tire is learnt.
-        """
+        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
         theta = np.zeros(TIRES[self.tire].unknowns)
         if not self.learns:
             self.require_fresh(start)

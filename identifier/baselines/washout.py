@@ -99,10 +99,6 @@ class Washout(Method):
 
         Chosen on random cars of our plant, whose roads bank and whose sensors are biased: a higher
         one errs less there by a tenth at most, and is the linear model alone.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
         """
         return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
 
@@ -127,18 +123,7 @@ class Washout(Method):
         return "by integration, and below its cutoff on the vehicle's linear tires"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; the stiffness of its rear axle is used.
-        start : None; no tire is learnt.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
-        """
+        """Return what a run needs; it begins afresh, with no stored model."""
         self.require_fresh(start)
         return Setup(
             scan=_scan(),
