@@ -183,12 +183,7 @@ class Method(ABC):
         return (AXLE_FORCE,)
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: nothing, where a method does not say more.
-
-        Parameters
-        ----------
-        driving : how hard it is driven; None takes what the method was designed for.
-        """
+        """Return what is proven of it: nothing, where a method does not say more."""
         del vehicle, driving
         return Certificate()
 

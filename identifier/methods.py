@@ -155,7 +155,6 @@ def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = No
     Parameters
     ----------
     method : a method, or its name as of `methods`.
-    driving : how hard it is driven; None takes what the method was designed for.
 
     Raises
     ------

@@ -8,7 +8,7 @@ import importlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
@@ -28,7 +28,7 @@ from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
-    from identifier.axle.band import BandCalibration
+    from identifier.axle.band import BandCalibration, SpreadByRange
     from identifier.axle.guarantee import Guarantee
 
 Axle = Literal["front", "rear"]
@@ -395,7 +395,7 @@ class TireModel(ABC):
 
     @property
     def band_calibrated(self) -> bool:
-        """Whether the width of `band` knows what the model misses of the drive that taught.
+        """Whether the width of `band` was found on parts of the drive that did not teach.
 
         As of `Run.tire`, where enough was driven; else it is what learning believes.
         """
@@ -414,6 +414,24 @@ class TireModel(ABC):
         del calibration, force_missed
         return self
 
+    def spread_by_range(
+        self, recording: Recording, mean: Callable[[Array], Array]
+    ) -> "SpreadByRange":
+        """Return the variances that a band is made of, by range of slip and window of a drive.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        mean : over the windows: signals (n, ...) -> (m, ...).
+
+        Raises
+        ------
+        ValueError
+            Where the model cannot tell how sure it is.
+        """
+        del recording, mean
+        raise ValueError(f"a {type(self).__name__} cannot tell how sure it is: it has no band")
+
     def half_band_of_curves(self, recording: Recording, level: float = 0.9) -> Array | None:
         """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
 
@@ -423,7 +441,6 @@ class TireModel(ABC):
         Parameters
         ----------
         recording : its signals are the input.
-        level : share of cases that the band shall hold, above 0 and below 1.
         """
         del recording, level
         return None
@@ -436,7 +453,6 @@ class TireModel(ABC):
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
-        level : share of cases that the band shall hold, above 0 and below 1.
         v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
         """
         del alpha, level, v_x

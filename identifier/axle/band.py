@@ -6,9 +6,8 @@ z: of the level.   v = h'P h, h = [t, 0, 0, φ'/v_x or φ']: variance that learn
 t = tanh(x/α_j) and of the zero of the slip.   m² = (0.04 φ)² + 0.01²: errors of the model, as
 learning is told of them.   s: mean speed of the drive that taught over v_x: an error of a lateral
 velocity is one of slip by 1/v_x.   f: factor of a range of slip times one of a range of speed, by
-which errors are larger or smaller than that; `verdict.bands` finds it of the drive that taught, one
-for all ranges.   ρ: v over that from which on a slip is not known, at most 1; there nothing is
-narrowed.
+which errors on stretches that did not teach the model are larger or smaller than that.   ρ: v over
+that from which on a slip is not known, at most 1; there nothing is narrowed.
 Learning takes errors to be correlated over a time that is told; where they are over a longer one,
 as many samples tell less by `color`, the ratio c of both: P' = (P₀⁻¹ + (P⁻¹ - P₀⁻¹)/c)⁻¹, which
 ends at the prior P₀ where nothing was learnt. With v₀ = h'P₀ h and p = v/v₀, v₀ p c/(1 + p (c - 1))
@@ -44,7 +43,7 @@ TINY = 1e-30  # keeps quotients of variances finite at no slip
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BandCalibration:
-    """How large errors of a model are, over what learning is told of them.
+    """What stretches that did not teach a model say of its errors.
 
     Parameters
     ----------
@@ -162,6 +161,16 @@ class BandCalibration:
         )
 
 
+def ranges_of(slip: Array) -> Any:
+    """Return in which of the six ranges slip angles lie.
+
+    Parameters
+    ----------
+    slip : its size [rad].
+    """
+    return np.searchsorted(RANGES, slip, side="right")
+
+
 def normal_quantile(level: float) -> float:
     """Return z such that |x| <= z holds of a standard normal x in a share of cases.
 
@@ -237,6 +246,18 @@ def root(P: Array) -> Array:
     return half
 
 
+class SpreadByRange(NamedTuple):
+    """What a band is made of at the slip of a drive, by range of slip, in m windows.
+
+    share : of the window in which the slip of an axle was in the range (6, m, 2).   scaled, held :
+    variances at the mean of the slip there, as of `BandSpread` (6, m, 2).
+    """
+
+    share: Array
+    scaled: Array
+    held: Array
+
+
 class BandSpread(NamedTuple):
     """Variances of the force of an axle [static axle loads²], as errors are told to be.
 
@@ -266,7 +287,19 @@ class BandSpread(NamedTuple):
         Parameters
         ----------
         factor : f, (k, 2).
-        level : share of cases that it shall hold.
         """
         wide = np.sqrt(factor**2 * self.scaled + np.maximum(factor, 1.0) ** 2 * self.held)
         return np.asarray(normal_quantile(level) * wide)
+
+    def needed_factor(self, error: Array, noise: Array | float) -> Array:
+        """Return f², with which a band of `LEVEL` just reaches an error; 0 where none is needed.
+
+        Parameters
+        ----------
+        error : [static axle loads].
+        noise : its variance that sensors made [static axle loads²].
+        """
+        size = (error / normal_quantile(LEVEL)) ** 2 - noise
+        small = (size - self.held) / (self.scaled + TINY)
+        large = size / (self.scaled + self.held)
+        return np.maximum(np.where(large < 1.0, small, large), 0.0)

@@ -1,5 +1,6 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
@@ -12,13 +13,16 @@ from codegen import Scan
 from codegen.arrays import Array, blocks
 from codegen.escape import shown
 from identifier.axle.band import (
+    CENTERS,
     LEVEL,
     RELATIVE,
     BandCalibration,
     BandSpread,
+    SpreadByRange,
     colored,
     colored_variance,
     normal_quantile,
+    ranges_of,
     root,
     sensor_noise,
 )
@@ -72,7 +76,7 @@ class AxleModel(TireModel):
     covariance : of [W, own], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
-    calibration : of the band, by the drive that taught; None where nobody calibrated.
+    calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
     guarantee : weights that the drive left possible; None where nobody asked.
     force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
@@ -193,7 +197,7 @@ class AxleModel(TireModel):
 
     @property
     def band_calibrated(self) -> bool:
-        """Whether the width of its band knows what it misses of the drive that taught."""
+        """Whether the width of its band was found on parts of the drive that did not teach."""
         return self.calibration is not None
 
     def with_calibration(
@@ -258,7 +262,6 @@ class AxleModel(TireModel):
         ----------
         slip : of front and rear axle [rad], (n, 2).
         v_x : speeds [m/s], positive, (n,).
-        level : share of cases that the band shall hold, above 0 and below 1.
         """
         both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
         return np.column_stack(both)
@@ -330,6 +333,28 @@ class AxleModel(TireModel):
         left = colored_variance(left, before, calibration.color)
         force = T @ self.W.T * load
         return BandSpread.of(force, left, before, calibration.stretch(v_x)[:, None])
+
+    def spread_by_range(
+        self, recording: Recording, mean: Callable[[Array], Array]
+    ) -> SpreadByRange:
+        """Return the variances that a band is made of, by range of slip and window of a drive.
+
+        Parameters
+        ----------
+        mean : over the windows: signals (n, ...) -> (m, ...).
+        """
+        size, count = np.abs(self.lagged_slip(recording)), len(CENTERS)
+        within, v_x = ranges_of(size), np.tile(mean(recording.v_x), count)
+        share = np.array([mean(1.0 * (within == k)) for k in range(count)])
+        total = np.array([mean(size * (within == k)) for k in range(count)])
+        slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
+        spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
+        pressed = self.vehicle.load_ratio(v_x)
+        for axle in range(2):
+            at = self.band_spread(slip[..., axle].ravel(), v_x, pressed)
+            for into, values in zip(spread, at, strict=True):
+                into[..., axle] = values[:, axle].reshape(slip.shape[:2])
+        return SpreadByRange(share, *spread)
 
     def on_another_road(self, sd_friction: float = SD_FRICTION) -> "AxleModel":
         """Return the model for a road whose friction is not that of the drive that taught.

@@ -167,7 +167,6 @@ class CurveEkf(Method):
         Parameters
         ----------
         dt : sampling interval [s].
-        textbook : without lag and offsets.
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
         missed = 1.0 if textbook else 0.5
@@ -273,12 +272,7 @@ class CurveEkf(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve with the carried parameters, lag and offsets.
-
-        Parameters
-        ----------
-        state : estimate, which ends with θ.
-        """
+        """Return the curve with the carried parameters, lag and offsets."""
         return self.model(vehicle, state["estimate"].ravel()[-self.limit.size :])
 
     def _own_of(self, stored: CurveModel) -> Array:
@@ -298,6 +292,5 @@ def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = Fa
     ----------
     vehicle : the car; its stiffness B C D is the prior.
     dt : sampling interval [s].
-    textbook : without lag and offsets.
     """
     return CurveEkf.for_vehicle(vehicle, dt=dt, textbook=textbook)

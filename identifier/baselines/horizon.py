@@ -377,10 +377,5 @@ class HorizonEstimator(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters.
-
-        Parameters
-        ----------
-        state : estimate, which ends with θ.
-        """
+        """Return the curve of Dugoff with the carried parameters."""
         return self.filter.frozen(vehicle, state)

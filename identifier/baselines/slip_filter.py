@@ -228,7 +228,6 @@ class SlipFilter(Method):
 
         Parameters
         ----------
-        tire : "linear" or "dugoff".
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -298,10 +297,6 @@ class SlipFilter(Method):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the curve of Dugoff with the carried parameters.
-
-        Parameters
-        ----------
-        state : estimate, which ends with θ.
 
         Raises
         ------

@@ -68,7 +68,6 @@ def run_comparison(
     Parameters
     ----------
     recordings : with true forces, or judged by the motion.
-    progress : told of each method that is done.
     others : further methods by name.
 
     Raises

@@ -55,7 +55,6 @@ def judged_loop(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s].
     kept : |W_hat| that is proven [U].
     """

@@ -141,7 +141,6 @@ def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
 
     Parameters
     ----------
-    loop : the loop at factor 1.
     factors : (n,) multipliers of G; complex ones turn the phase.
     """
     base = loop.matrix().astype(np.complex128)
@@ -165,7 +164,6 @@ def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
 
     Parameters
     ----------
-    loop : the loop at factor 1.
     factors : (n,) multipliers of G.
     """
     return eigenvalues(scaled_matrices(loop, factors))
@@ -177,7 +175,6 @@ def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float =
     Parameters
     ----------
     matrices : (..., n, n) loop matrices.
-    integrator : R.
     dt : step [s]; irrelevant for `exact`.
     """
     mu = eigenvalues(matrices)
@@ -193,7 +190,6 @@ def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> A
     Parameters
     ----------
     matrices : (..., n, n) loop matrices.
-    integrator : R.
     dt : step [s].
     """
     return np.exp(growth_rate(matrices, integrator, dt) * dt)

@@ -55,7 +55,6 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
 
     Parameters
     ----------
-    loop : the loop at factor 1.
     integrator : `exact` for continuous time, or the integrator of the step.
     dt : step [s]; irrelevant for `exact`.
     """
@@ -160,7 +159,6 @@ def passivity(
     frequency : (n,) ω [rad/s].
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
     dynamics = require_hurwitz(A_d)
@@ -186,7 +184,6 @@ def drift_frequency(
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
 
@@ -259,7 +256,6 @@ def sufficient_leakage(
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     eta_W : learning rate of (11).
     n_h : hidden units; |s|² <= n_h.
     direction : (2, 2) D, None for -A_d⁻ᵀ.

@@ -172,7 +172,6 @@ def proven_bounds(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s], of `direction_matrix`.
     """
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
@@ -233,7 +232,6 @@ def worst_loop(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
     """

@@ -10,8 +10,6 @@ and a little more: the quick part of errors, which means hide, has to find room 
 """
 
 from dataclasses import replace
-from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,78 +26,17 @@ from identifier.axle.guarantee import (
 )
 from identifier.axle.learning import Regression
 from identifier.axle.model import AxleModel
-from identifier.run import History, state_index
+from identifier.run import History
 from identifier.tire_model import AXLES, TireModel
 from identifier.verdict.motion import FEWEST, WINDOW, Windows, brisk_from, impulse_signals
+from identifier.verdict.parts import asked_run
 from models.recordings import Recording
-from models.recordings.portion import Portion, portion
 
 OVERLAPPING = 4  # moments that begin within the length of one
 RESERVE = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
 OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
 SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
 OVER_LATENESS = Regression().lateness  # s, added before the reserve
-
-
-class AskedRun(NamedTuple):
-    """A run whose frozen model is asked about a portion of its drive, k samples.
-
-    model : frozen.   history : the run.   portion : of its recording.   end : time of the freeze
-    in the recording's own clock [s].   until : the same in that of the portion, None at its end.
-    road : what a banked road pushed (k,) [weights], None unknown.
-    """
-
-    model: TireModel
-    history: History
-    portion: Portion
-    end: float
-    until: float | None
-    road: Array | None
-
-
-def asked_run(history: History, t: float | None = None) -> AskedRun:
-    """Return what of a run is asked.
-
-    Parameters
-    ----------
-    t : time of the freeze in the recording's own clock [s]; None is the end.
-
-    Raises
-    ------
-    DivergedError
-        Where the law had diverged by then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
-    """
-    model, whole = history.freeze(t), history.recording
-    end = float(whole.t[-1]) if t is None else t
-    frozen = state_index(whole, end)
-    asked = portion(whole, frozen)
-    n = asked.place(frozen)
-    until = None if n == len(asked.recording) else float(asked.recording.t[n])
-    roads = _felt.setdefault(history, {})
-    if frozen not in roads:
-        roads[frozen] = road_felt(history, asked)
-    return AskedRun(model, history, asked, end, until, roads[frozen])
-
-
-# What is felt takes as long as learning: it is found once of each run and sample of the freeze.
-_felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
-
-
-def road_felt(history: History, asked: Portion) -> Array | None:
-    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
-    if history.design.needs_v_y == (asked.recording.logged_v_y is None):
-        return None  # it was learnt of another motion than that which is asked
-    pushes = []
-    for block in history.blocks(asked.samples):
-        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
-        mine = asked.samples[first:last] - block.part.start
-        push = history.design.beside_force(block.state)
-        if push is None:
-            return None
-        pushes.append(push[mine])
-    return np.concatenate(pushes)
 
 
 class BoundViolatedError(TireidError, ValueError):

@@ -10,14 +10,18 @@ import pytest
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.band import (
     BandCalibration,
+    BandSpread,
     colored,
     colored_variance,
     normal_quantile,
+    ranges_of,
 )
 from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import load_model
 from identifier.verdict import calibrated, within_band
+from identifier.verdict.bands import color_of, quantile
+from identifier.verdict.motion import Windows
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.vehicle import sedan
@@ -62,26 +66,22 @@ def coverage(model, recording, level=0.9):
 
 def test_bands_hold_on_drives_that_were_not_seen(model, swinging):
     held = np.mean([coverage(model, one) for one in swinging[1][1:]])
-    assert held >= 0.9
+    assert 0.8 <= held <= 0.99
     wrong = replace(model, W=1.4 * model.W)  # the alarm rings: a curve 40 % off leaves its band
     assert np.mean([coverage(wrong, one) for one in swinging[1][1:]]) < 0.6
 
 
-def test_a_band_is_wider_by_as_much_as_the_motion_shows_that_more_is_missed(run, model, swinging):
+def test_a_calibrated_band_follows_errors_and_a_told_one_does_not(run, model, swinging):
     car, (first, *_) = swinging
     rng = np.random.default_rng(2)
     slow = np.cumsum(rng.standard_normal(len(first))) * 0.006  # a velocity sensor that wanders
     other = learnt(replace(first, v_y=first.v_y + slow), car)
     rough, told = calibrated(other), other.freeze()
-    assert (model.force_missed < 0.04).all() and (model.calibration.factors == 1.0).all()
-    assert rough.force_missed.max() > 0.06
-    np.testing.assert_allclose(
-        rough.calibration.factors, np.tile(np.maximum(rough.force_missed / 0.04, 1.0), (6, 1)).T
-    )
+    assert rough.calibration.factors.mean() > 1.5 * model.calibration.factors.mean()
     assert told.calibration is None and run.freeze().calibration is None
     at = np.array([0.03])
-    assert (rough.half_band(at) >= model.half_band(at)).all()
-    assert (rough.half_band(at) > 1.3 * told.half_band(at)).any()
+    assert (rough.half_band(at) > 1.3 * model.half_band(at)).all()
+    assert (rough.half_band(at) > 1.3 * told.half_band(at)).all()
 
 
 def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
@@ -150,6 +150,21 @@ def test_a_band_is_wider_where_the_car_is_slower_than_it_was_taught(model):
         np.testing.assert_allclose(told, times * by_slip)
     with pytest.raises(ValueError, match="v_x of a band must be positive, it is 0"):
         model.band(0.02, v_x=0.0)
+
+
+def test_a_drive_at_two_speeds_gives_each_its_own_factor(swinging):
+    """Errors of a velocity sensor that is rough while the car is slow are errors there alone."""
+    car, _ = swinging
+    together = RandomSteer(
+        amplitude=0.08, frequency=0.6, seed=8, onset=1.0, rate_limit=0.8, duration=40.0
+    )
+    drive = Plant(sedan()).simulate(together, speed=lambda t: np.where(t < 20, 13.0, 20.0))
+    drive = drive.recording()
+    rng = np.random.default_rng(2)
+    slow = np.cumsum(rng.standard_normal(len(drive))) * 0.006 * (drive.v_x < 15.0)
+    rough = calibrated(learnt(replace(drive, v_y=drive.v_y + slow), car)).calibration
+    first, second = (rough.speeds[:, k].mean() for k in (1, 2))
+    assert first > 1.2 * second
 
 
 def test_a_band_over_a_drive_holds_with_noise_in_it(model, swinging):
@@ -232,7 +247,7 @@ def test_models_without_doubt_have_no_band(swinging):
 
 def test_too_short_a_drive_leaves_the_band_as_told(swinging):
     car, drives = swinging
-    assert calibrated(learnt(drives[0].between(0.0, 1.3), car)).calibration is None
+    assert calibrated(learnt(drives[0].between(0.0, 1.5), car)).calibration is None
 
 
 def test_windows_of_a_drive_lie_in_the_band_as_often_as_it_says(model, swinging):
@@ -299,5 +314,37 @@ def test_the_variance_is_that_of_the_force_by_its_slope_over_what_was_learnt(mod
         assert total == pytest.approx(m2 + h @ model.covariance[axle] @ h, rel=1e-5)
 
 
-def test_quantiles_are_those_of_tables():
+def test_the_needed_factor_makes_a_band_that_just_reaches():
+    rng = np.random.default_rng(5)
+    spread = BandSpread.of(*rng.uniform(0.1, 1.0, (2, 40)), np.full(40, 20.0))
+    error = rng.uniform(0.0, 3.0, 40)
+    needed = spread.needed_factor(error, 0.0)
+    reached = spread.half_width(np.sqrt(needed), 0.9)
+    assert (needed > 0.0).sum() > 10
+    np.testing.assert_allclose(reached[needed > 0.0], error[needed > 0.0])
+    assert (reached >= error - 1e-12).all()
+    assert (spread.needed_factor(error, 0.01) <= needed).all()
+
+
+def test_the_quantile_leaves_room_for_one_more_window():
+    values = np.arange(100.0)
+    assert quantile(values, np.ones(100)) == 91.0  # 0.9 of 102, counted from 1
+    assert quantile(values[:10], np.ones(10)) == np.inf
+    assert quantile(values, np.where(values < 50, 1.0, 0.0)) == 46.0
+
+
+@pytest.mark.parametrize(("time", "low", "high"), [(0.0, 2.5, 6.0), (2.0, 15.0, 90.0)])
+def test_errors_that_stay_alike_count_less(swinging, time, low, high):
+    recording = swinging[1][0]
+    windows, rng = Windows.of(recording, 1.0), np.random.default_rng(6)
+    white = rng.standard_normal(len(recording))
+    keep = np.exp(-recording.dt / time) if time else 0.0
+    error = np.zeros(len(recording))
+    for k in range(1, len(recording)):
+        error[k] = keep * error[k - 1] + white[k]
+    assert low <= color_of(windows.mean(error), windows) <= high
+
+
+def test_ranges_and_quantiles_are_those_of_tables():
     assert normal_quantile(0.9) == pytest.approx(1.644854, abs=1e-6)
+    np.testing.assert_array_equal(ranges_of(np.array([0.0, 0.0101, 0.05, 0.5])), [0, 1, 3, 5])
