@@ -536,6 +536,16 @@ class TireModel(ABC):
         del alpha, rate
         return None
 
+    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
+        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        del recording
+        return None
+
     @overload
     def guaranteed_band(
         self, alpha: float, axle: Axle, rate: float = ...
