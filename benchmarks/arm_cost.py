@@ -1,14 +1,9 @@
 """What exported C costs on Arm processors, measured in QEMU, beside the targets."""
 
 from benchmarks.targets import Targets, show
+from codegen.processor import CROSS_COMPILER, compiler_version
 from identifier.export.package import build_package
-from identifier.export.processor import (
-    CROSS_COMPILER,
-    Cost,
-    compiler_version,
-    measure,
-    missing_tools,
-)
+from identifier.export.processor import Cost, measure, missing_tools
 from identifier.methods import LIVE, REFERENCE, WITHOUT_V_Y, make_method
 from models.vehicle import sedan
 from mpc.export.pair import build_pair

@@ -32,11 +32,12 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
+from codegen.processor import PROCESSORS
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.band import RANGES, SPEEDS, normal_quantile, ranges_of
 from identifier.axle.curve import unit_matrix
 from identifier.export.package import build_package, synthetic_samples
-from identifier.export.processor import PROCESSORS, missing_tools, replay_on
+from identifier.export.processor import missing_tools, replay_on
 from identifier.run import identify
 from identifier.tire_model import AXLES
 from identifier.verdict import calibrated, within_band

@@ -98,7 +98,8 @@ def _run(arguments: Sequence[str] | None) -> int:
 def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
     from codegen import CompilationError
-    from identifier.export import compiled, processor
+    from codegen.processor import ReplayError
+    from identifier.export import compiled
     from mpc.converged import NotConvergedError
     from mpc.realtime import instance
     from tireid.exporting import SelfTestError
@@ -106,7 +107,7 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
         *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
-        *(processor.ReplayError, NotConvergedError, SelfTestError),
+        *(ReplayError, NotConvergedError, SelfTestError),
     )
 
 

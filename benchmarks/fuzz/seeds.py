@@ -28,7 +28,6 @@ FRONT = ("name", "mass", "yaw_inertia", "l_f", "l_r")  # of a vehicle file witho
 FROZEN = {  # file of weights, and the method that learnt it
     "axle.json": "axle",
     "network.json": "integral",
-    "regression.json": "rls",
     "curve.json": "magic_formula_ekf",
 }
 DESIGNS = {"integral.toml": "integral", "lead.toml": "pi_lead"}

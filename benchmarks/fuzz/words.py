@@ -4,7 +4,7 @@ import random
 
 from benchmarks.fuzz.hostile import NUMBERS, text
 
-COUNTS = ("--jobs", "--sweep", "--floor", "--monte-carlo", "--seeds", "--laps")
+COUNTS = ("--jobs", "--seeds", "--laps")
 FEW = (
     "-1",
     "0",
@@ -119,7 +119,6 @@ MORE = (
         "--tires",
         "--film mp4",
         "--scheduler tcp://[",
-        "--monte-carlo 2",
     ),
 )
 

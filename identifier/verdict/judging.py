@@ -12,11 +12,18 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
-from identifier.reproducibility import beyond_known, motion_error
+from identifier.reproducibility import beyond_known
 from identifier.run import History, state_index
 from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.verdict.friction import RoadFriction, road_friction
-from identifier.verdict.motion import FEWEST, WINDOW, Evidence, evidence, lateral_noise
+from identifier.verdict.motion import (
+    FEWEST,
+    WINDOW,
+    Evidence,
+    evidence,
+    lateral_noise,
+    motion_error,
+)
 from identifier.verdict.verdict import (
     MOST_MISSED,
     PERCENT,

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.package import manifest_with_figures, renamed
-from codegen.writing import write_file
-from identifier.export.processor import (
+from codegen.processor import (
     CROSS_COMPILER,
     EMULATOR,
     FLAGS,
@@ -18,11 +17,12 @@ from identifier.export.processor import (
     compile_in,
     compiler_version,
     emulation,
-    missing_tools,
     printed,
     size_on,
 )
+from codegen.writing import write_file
 from identifier.export.processor import TARGET as BOARD
+from identifier.export.processor import missing_tools
 from mpc.export.package import MpcPackage
 from mpc.realtime import Tracker
 from mpc.realtime.c_source import PREFIX

@@ -26,7 +26,7 @@ from tireid.commands import COMMANDS
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 HEAVY = {"matplotlib", "control", "scipy", "casadi", "numpy"}
-KINDS = ("axle", "integral", "rls", "linear", "magic_formula_ekf", "dugoff_ekf")
+KINDS = ("axle", "integral", "linear", "magic_formula_ekf", "joint_ekf")
 STATES = ((0.0, 0.0, 0.02), (0.3, 0.4, 0.05), (-1.2, 0.2, -0.1))  # v_y, r, delta
 
 
@@ -404,7 +404,7 @@ def test_force_takes_numbers_and_arrays_of_any_shape(tires, name):
 def test_force_is_what_a_straight_drifting_car_would_be_told(tires, car, name):
     """δ = 0, r = 0 and v_y = -v_x tan α: both axles slip by α, and the lag has settled."""
     tire, n, alpha, v_x = tires[name], 400, 0.03, 15.0
-    small = name in ("integral", "rls", "linear")  # their slip angle is that of (3)
+    small = name in ("integral", "linear")  # their slip angle is that of (3)
     v_y = -v_x * (alpha if small else np.tan(alpha))
     steering, bias = 0.0, 0.0  # of the sensors, where a model takes them off
     if name == "axle":
@@ -520,7 +520,7 @@ def test_the_default_and_the_paper_s_identifier_are_certified(car):
     assert "verdict: pass" in str(axle)
     paper = ti.certify(ti.PaperIdentifier.for_vehicle(car), car)
     assert paper.verdict in ("pass", "warn") and paper["phase_margin"].value > 30.0
-    assert ti.certify(ti.make_method("eso", car), car).verdict == "not certified"
+    assert ti.certify(ti.make_method("washout", car), car).verdict == "not certified"
     wild = ti.PaperIdentifier.for_vehicle(car)
     from dataclasses import replace
 

@@ -9,7 +9,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.certificate import Certificate, Property
-from identifier.driving import natural_driving
+from identifier.driving import Driving, natural_driving
 from identifier.paper.design import (
     PaperIdentifier,
     design_for,
@@ -106,8 +106,7 @@ def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path)
         (["--tune", "d.toml", "--phase-margin", "120"], "phase margin must be in"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["--bandwidth", "0.5"], "which axle has not: add --paper, --method integral"),
-        (["--method", "rls", "--monte-carlo", "3"], "--monte-carlo asks about the gains"),
-        (["--tune", "d.toml", "--method", "rls"], "rls has none"),
+        (["--tune", "d.toml", "--method", "linear"], "linear has none"),
         (["--tune", "d.toml", "--design", "d.toml"], "give no --design FILE"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
     ],
@@ -284,3 +283,17 @@ def test_words_about_a_drive_want_a_drive(capsys, words, said):
     code, told = checked(capsys, *words)
     assert code == 2
     assert said in told.err
+
+
+def test_the_same_file_gives_the_same_verdict_and_options_are_said(tmp_path, capsys):
+    path = tmp_path / "design.toml"
+    words = ["--bandwidth", "0.5", "--slip", "0.09", "--noise-r", "0.02"]
+    assert main(["check", "--tune", str(path), *words, "--json"]) == 0
+    there = json.loads(capsys.readouterr().out)
+    assert read_design(path).driving == Driving(**there["conditions"])
+    main(["check", "--design", str(path), "--json"])
+    assert json.loads(capsys.readouterr().out) == there
+    main(["check", "--design", str(path)])
+    assert "conditions: as stored in the design\n" in capsys.readouterr().out
+    main(["check", "--design", str(path), "--slip", "0.2"])
+    assert "as stored in the design, but for --slip" in capsys.readouterr().out

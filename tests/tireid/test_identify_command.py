@@ -560,7 +560,7 @@ def test_a_filter_of_forces_has_nothing_to_freeze(logs, tmp_path, capsys):
         "--vehicle",
         logs / "car.toml",
         "--method",
-        "ekf_force",
+        "washout",
     ]
     assert "not a tire" in refusal(capsys, [*words, "--out", tmp_path / "out"])
     assert list(tmp_path.iterdir()) == []
@@ -601,7 +601,7 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name, 
     assert set(frozen) == {"carmaker:slalom1_14_5ms", "carmaker:experiment2_40kmh"}
 
 
-SIGNALS = {"washout", "linear_kf", "eso", "ekf_force"}  # which estimate no tire
+SIGNALS = {"washout", "linear_kf"}  # which estimate no tire
 MODELS = [name for name in METHODS if name not in SIGNALS]
 
 

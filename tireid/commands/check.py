@@ -10,8 +10,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
@@ -27,24 +25,19 @@ from identifier.paper.design import (
 from identifier.paper.laws import LAWS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
-from identifier.stability.along import loop_along
+from identifier.stability.along import strongest_along
 from identifier.stability.certificate import judged_loop
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from identifier.stability.loop import direction_matrix
-from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from identifier.stability.operation import proven_bounds
 from models.files import write_atomically
 from models.recordings import Recording
-from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.certificate_table import (
-    bound_rows,
     certificate_of,
     certificate_text,
     method_text,
-    monte_carlo_numbers,
-    monte_carlo_text,
     unit_text,
 )
 from tireid.commands.options import (
@@ -52,18 +45,16 @@ from tireid.commands.options import (
     add_log_map,
     add_method,
     add_output,
-    add_seed,
     add_vehicle,
     chosen_method,
     method_is_given,
     read_log,
     read_vehicle,
-    seed_of,
     told_map,
 )
 from tireid.figures import error_figure, locus_figure, save_figure
 from tireid.output import output_folder, require_free, write_json
-from tireid.progress import Progress, say, tell
+from tireid.progress import say, tell
 
 # The figures of `tireid check`: root locus with its margin, bounds against a real error.
 
@@ -127,10 +118,7 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_delta": "noise_delta",
 }
 OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-OF_GAINS = (
-    *(option for field, option in CONDITIONS.items() if field not in OF_ALL),
-    "monte_carlo",
-)  # options that ask about the paper's gains
+OF_GAINS = tuple(option for field, option in CONDITIONS.items() if field not in OF_ALL)
 TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
@@ -161,13 +149,6 @@ def add_parser(commands: Any) -> None:
         )
     parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
     add_log_map(parser)
-    parser.add_argument(
-        "--monte-carlo",
-        type=int,
-        metavar="N",
-        help="run N random drives within what is judged: is a proven bound ever passed?",
-    )
-    add_seed(parser, "--monte-carlo")
     parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
     parser.add_argument(
         "--tune", type=Path, metavar="FILE", help="find gains and write them, for --design FILE"
@@ -268,9 +249,6 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     if options.along is not None:
         drive = read_log(options.along, vehicle, told_map(options), dt=design.dt)
     _require_free(options)
-    observed = _drive(options, vehicle, driving, design, certificate)
-    rows = [] if observed is None else bound_rows(certificate, observed)
-    passed = any(row.passed for row in rows) or (observed is not None and observed.diverged > 0)
     numbers = {
         "method": design.law,
         "conditions": asdict(driving),
@@ -283,9 +261,6 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     ]
     if drive is not None:
         texts.append(_along(drive, vehicle, design))
-    if observed is not None:
-        numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed_of(options))
-        texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
     text = "\n".join(texts)
@@ -298,7 +273,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
             write_atomically(options.tune, design_text(design))
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
-    return FAILS if certificate.verdict == "fail" or passed else DONE
+    return FAILS if certificate.verdict == "fail" else DONE
 
 
 def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
@@ -326,12 +301,6 @@ def _require_sense(options: argparse.Namespace) -> None:
         value = getattr(options, name)
         if value is not None and not 0.0 <= value < float("inf"):
             raise ValueError(f"--{name.replace('_', '-')} must not be negative, it is {value:g}")
-    if options.seed is not None and options.monte_carlo is None:
-        raise ValueError("--seed goes with --monte-carlo")
-    seed_of(options)
-    if options.monte_carlo is not None and options.monte_carlo < 1:
-        raise ValueError(f"--monte-carlo must be at least 1, it is {options.monte_carlo}")
-    require_few(ValueError, "--monte-carlo", options.monte_carlo or 0, "runs", "runs")
     if options.slip is not None and options.slip > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
@@ -357,34 +326,6 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
     if driving == design.driving:
         return "conditions: as stored in the design"
     return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
-
-
-def _drive(
-    options: argparse.Namespace,
-    vehicle: Vehicle,
-    driving: Driving,
-    design: PaperIdentifier,
-    certificate: Certificate,
-) -> Observed | None:
-    """Run the random drives of --monte-carlo; None where there are none."""
-    if options.monte_carlo is None:
-        return None
-    count = options.monte_carlo
-    known = {entry.name: entry.value for entry in certificate.properties}
-    kept = min(known.get("weight_bound", math.inf), design.gains.W_max)
-    with Progress(f"{count} random drives") as progress:
-        return monte_carlo(
-            design,
-            vehicle,
-            driving,
-            count,
-            beginning=Beginning(
-                W=kept if math.isfinite(kept) else 0.0,
-                V=min(design.operation(vehicle, driving).V_start, design.gains.V_max),
-            ),
-            rng=np.random.default_rng(seed_of(options)),
-            progress=lambda done: progress(done / count),
-        )
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:
@@ -413,11 +354,10 @@ def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> s
     history = identify(recording, vehicle, design)
     if history.diverged_at is not None:
         return f"along {recording.name}: the law diverged at {history.diverged_at:g} s"
-    along = loop_along(history, design)
-    at = along.strongest
+    at = strongest_along(history, design)
     return (
-        f"along {recording.name}: largest loop gain {along.gain[at]:.4g} at {along.t[at]:g} s, "
-        f"gain margin there {along.margin:.3g}"
+        f"along {recording.name}: largest loop gain {at.gain:.4g} at {at.t:g} s, "
+        f"gain margin there {at.margin:.3g}"
     )
 
 

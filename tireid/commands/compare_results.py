@@ -4,9 +4,9 @@ compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or 
 over 0.3 s that the motion shows); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
 recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
-methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio; left_out: by
-name why a method is not compared; floors: by network frozen_N and percent; sweep: by method
-designs, diverged, default, best, front, trials.
+methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio (null: it
+learns from whole logs); left_out: by
+name why a method is not compared.
 verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
 """
@@ -21,24 +21,21 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
+from identifier.compare.course import Shares, Trial, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
-from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
 from identifier.frozen import vehicle_numbers
-from identifier.methods import METHODS, make_method
+from identifier.methods import make_method, methods
 from identifier.reproducibility import AxleRmse
 from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.figures import (
     matrix_figure,
     methods_figure,
-    pareto_figure,
     save_figure,
     side_slip_figure,
 )
 from tireid.output import text_table, write_json
 from tireid.progress import say
-from tireid.reports.compare import HINDSIGHT
 
 # The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
 
@@ -54,13 +51,12 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
     for name in ranking(comparison):
         trial = comparison.trials[name]
         online = [(rec, error) for rec, error in trial.online.items()]
-        time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
+        time = NOT_TOLD
+        if name in comparison.step_times:
+            time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         cells = ["diverged" if trial.diverged_at else _mean(comparison, online)]
         told = _slip_cells(trial)
         lines.append([name, *cells, *_frozen_cells(comparison, trial), *told, time])
-    for name, frozen in comparison.floors.items():
-        cells = [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(frozen)]
-        lines.append([f"floor, {name}", "", *cells, *[""] * len(SLIP), ""])
     return lines
 
 
@@ -92,7 +88,7 @@ def remarks(comparison: Comparison) -> list[str]:
     """Return what the methods say of themselves below the table, those alike in one line."""
     told: dict[str, list[str]] = {}
     for name in comparison.trials:
-        if name in METHODS:
+        if name in methods():
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             told.setdefault(method.remark, []).append(name)
             if not method.needs_v_y:
@@ -114,42 +110,8 @@ def pair_tables(comparison: Comparison) -> str:
                     error = frozen.get(learnt, {}).get(replayed)
                     cell = "diverged" if error is None else cell_text(comparison, replayed, error)
                     lines.append([name, cell])
-            for name, frozen in comparison.floors.items():
-                cell = cell_text(comparison, replayed, frozen[learnt][replayed])
-                lines.append([f"floor, {name}", cell])
             blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
     return "\n".join(blocks)
-
-
-def sweep_table(comparison: Comparison) -> str:
-    """Return the best design of every method's sweep [% of rms, both axles]."""
-    lines = [["method", "designs", "diverged", "default", "best", "online then", "on the front"]]
-    for name, candidates in comparison.sweeps.items():
-        best, own = best_candidate(candidates), frozen_share(comparison.shares(name))
-        lost = sum(bool(candidate.diverged_on) for candidate in candidates)
-        cells = ["signal", "signal", "signal"]
-        if best is None:
-            cells = [percent(own), "diverged", ""]
-        elif own is not None:
-            cells = [percent(own), percent(frozen_share(best.shares)), percent(best.shares.online)]
-        elif frozen_share(best.shares) is None:
-            cells = ["", "", percent(best.shares.online)]
-        front = len(pareto_front(candidates))
-        lines.append([name, str(len(candidates)), str(lost), *cells, str(front or "")])
-    title = "Sweep: frozen error elsewhere, % of rms of both axles, mean over recordings"
-    return _text(title, lines) + HINDSIGHT + "\n"
-
-
-def percent(value: float | None) -> str:
-    """Return a share as text.
-
-    Parameters
-    ----------
-    value : [%], infinite where a run diverged, None where there is none.
-    """
-    if value is None:
-        return ""
-    return f"{value:.1f} %" if np.isfinite(value) else "diverged"
 
 
 def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
@@ -216,28 +178,18 @@ def write_comparison(
     numbers = comparison_numbers(comparison)
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
-    write_file(folder / "tables.txt", comparison_text(comparison) + pair_tables(comparison))
+    write_file(folder / "tables.txt", summary_table(comparison) + pair_tables(comparison))
     _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
-    if comparison.sweeps:
-        _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
     say("drawing figures")
     figures = {"methods": methods_figure(comparison)}
     if any(trial.frozen for trial in comparison.trials.values()):
         figures["matrix"] = matrix_figure(comparison)
-    if comparison.sweeps:
-        figures["pareto"] = pareto_figure(comparison)
     if any(trial.side_slip for trial in comparison.trials.values()):
         told = {name: trial.side_slip for name, trial in comparison.trials.items()}
         figures["side_slip"] = side_slip_figure(comparison.course.recordings, told)
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return figures
-
-
-def comparison_text(comparison: Comparison) -> str:
-    """Return the summary, and that of the sweep, as lines of text."""
-    text = summary_table(comparison)
-    return text + (sweep_table(comparison) if comparison.sweeps else "")
 
 
 def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
@@ -255,19 +207,6 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
         "judged_by": "motion" if course.by_motion else "truth",
         "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
         "left_out": dict(comparison.left_out),
-        "floors": {
-            name: {
-                "frozen_N": _pairs(frozen),
-                "percent": dict(
-                    zip(("in_sample", "other"), frozen_shares(frozen, course), strict=True)
-                ),
-            }
-            for name, frozen in comparison.floors.items()
-        },
-        "sweep": {
-            name: _sweep_numbers(comparison, name, candidates)
-            for name, candidates in comparison.sweeps.items()
-        },
         "vehicle": vehicle_numbers(course.vehicle),
         "min_speed_m_s": course.min_speed,
         "seed": comparison.seed,
@@ -276,7 +215,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
 
 
 def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
-    trial = comparison.trials[name]
+    trial, timed = comparison.trials[name], name in comparison.step_times
     return {
         "online_N": {recording: _axles(error) for recording, error in trial.online.items()},
         "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
@@ -286,30 +225,8 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
             recording: {"rms_deg": _finite(one.rms), "within_two_sigma_percent": one.within}
             for recording, one in trial.side_slip.items()
         },
-        "step_s": comparison.step_times[name],
-        "step_ratio": comparison.time_ratio(name),
-    }
-
-
-def _sweep_numbers(
-    comparison: Comparison, name: str, candidates: tuple[Candidate, ...]
-) -> dict[str, Any]:
-    best = best_candidate(candidates)
-    return {
-        "designs": len(candidates),
-        "diverged": sum(bool(candidate.diverged_on) for candidate in candidates),
-        "default": _percent(comparison.shares(name)),
-        "best": None if best is None else _candidate(best),
-        "front": [_candidate(candidate) for candidate in pareto_front(candidates)],
-        "trials": [_candidate(candidate) for candidate in candidates],
-    }
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    return {
-        "values": dict(candidate.values),
-        "percent": _percent(candidate.shares),
-        "diverged_on": list(candidate.diverged_on),
+        "step_s": comparison.step_times[name] if timed else None,
+        "step_ratio": comparison.time_ratio(name) if timed else None,
     }
 
 
@@ -344,15 +261,6 @@ ERROR_COLUMNS = (
     "rear_percent",
     "both_percent",
 )
-SWEEP_COLUMNS = (
-    "method",
-    "number",
-    "diverged",
-    "online_percent",
-    "in_sample_percent",
-    "other_percent",
-    "values",
-)
 
 
 def _error_rows(comparison: Comparison) -> Iterator[Row]:
@@ -372,20 +280,6 @@ def _error_rows(comparison: Comparison) -> Iterator[Row]:
         for name, error in trial.online.items():
             yield row(method, "online", name, name, error)
         yield from frozen_rows(method, "frozen", trial.frozen or {})
-    for network, frozen in comparison.floors.items():
-        yield from frozen_rows(network, "floor", frozen)
-
-
-def _sweep_rows(comparison: Comparison) -> Iterator[Row]:
-    for method, candidates in comparison.sweeps.items():
-        for number, candidate in enumerate(candidates):
-            found = ["" if value is None else value for value in candidate.shares]
-            values = _words(candidate.values)
-            yield method, number, " ".join(candidate.diverged_on), *found, values
-
-
-def _words(values: Mapping[str, float]) -> str:
-    return " ".join(f"{name}={value:.6g}" for name, value in values.items())
 
 
 def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:

@@ -8,16 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen import find_compiler
+from codegen.processor import CROSS_COMPILER, EMULATOR
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import Package, build_package
-from identifier.export.processor import (
-    CROSS_COMPILER,
-    EMULATOR,
-    Cost,
-    figures_text,
-    measure,
-    missing_tools,
-)
+from identifier.export.processor import Cost, figures_text, measure, missing_tools
 from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS

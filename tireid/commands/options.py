@@ -16,11 +16,11 @@ from identifier.method import Method
 from identifier.methods import (
     DEFAULT,
     LIVE,
-    METHODS,
     REFERENCE,
     WITHOUT_V_Y,
     draws_weights,
     make_method,
+    methods,
 )
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
@@ -176,9 +176,9 @@ def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """
     parser.add_argument(
         "--method",
-        choices=METHODS,
+        choices=methods(),
         metavar="NAME",
-        help=f"what learns: {', '.join(METHODS)} (default: {usual})",
+        help=f"what learns: {', '.join(methods())} (default: {usual})",
     )
     parser.add_argument(
         "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"

@@ -7,7 +7,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tireid.figures.compare import matrix_figure, methods_figure, pareto_figure
+    from tireid.figures.compare import matrix_figure, methods_figure
     from tireid.figures.drive import (
         drive_errors_figure,
         drive_path_figure,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     )
 
 _HOMES = {
-    "compare": ("matrix_figure", "methods_figure", "pareto_figure"),
+    "compare": ("matrix_figure", "methods_figure"),
     "drive": (
         "drive_errors_figure",
         "drive_path_figure",
@@ -72,7 +72,6 @@ __all__ = [
     "matrix_figure",
     "methods_figure",
     "motion_figure",
-    "pareto_figure",
     "plan_area_figure",
     "plan_band_figure",
     "plan_steering_figure",

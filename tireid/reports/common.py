@@ -61,7 +61,6 @@ READ = {
     "matrix": "Off the diagonal is what counts: learnt on one drive, asked about another.",
     "side_slip": "Estimates lie on what was recorded, where there is any, and it lies in the band "
     "but for one sample in twenty. Below, what each estimate misses.",
-    "pareto": "Lower and farther left is better; the star is the default.",
 }
 
 

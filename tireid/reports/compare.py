@@ -13,11 +13,6 @@ from tireid.report import Block, Headline, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.verdicts import verdict_warnings, verdicts_headline
 
-HINDSIGHT = (
-    "The best design of a sweep is chosen with the recordings that it is judged on, for every "
-    "method alike."
-)
-
 
 def write_compare_report(
     folder: Path,
@@ -40,7 +35,6 @@ def write_compare_report(
         "methods": "Errors of every method.",
         "matrix": "Learnt on one recording, asked about another.",
         "side_slip": "Side slip as methods without a lateral velocity told it.",
-        "pareto": "Random designs of every method.",
     }
     blocks: list[Block] = [
         Table(
@@ -106,6 +100,4 @@ def compare_warnings(comparison: Comparison) -> list[str]:
             said.append(f"{name} diverged on {', '.join(at)}.")
     if len(comparison.names) == 1:
         said.append("One recording: nothing says how a method does on a drive it did not learn on.")
-    if comparison.sweeps:
-        said.append(HINDSIGHT)
     return said

@@ -6,9 +6,10 @@ from itertools import product
 import numpy as np
 import pytest
 
+from codegen.processor import PROCESSORS
 from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import run_in_virtual_machine
-from identifier.export.processor import PROCESSORS, missing_tools, replay_here, replay_on
+from identifier.export.processor import missing_tools, replay_here, replay_on
 from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
 

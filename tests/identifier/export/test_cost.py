@@ -4,15 +4,14 @@ import json
 
 import pytest
 
+import codegen.processor as machines
+from codegen.processor import PROCESSORS, ReplayError, size_on
 from identifier.export import processor
 from identifier.export.processor import (
-    PROCESSORS,
-    ReplayError,
     figures_text,
     measure,
     missing_tools,
     replay_on,
-    size_on,
     with_figures,
 )
 
@@ -74,6 +73,6 @@ def test_the_table_has_a_row_for_each_processor_and_precision(packages):
 
 def test_a_processor_that_does_not_end_is_told(monkeypatch, tmp_path):
     """A program that would sleep for an hour ends at the limit, which is a second here."""
-    monkeypatch.setattr(processor, "TIMEOUT", 1.0)
+    monkeypatch.setattr(machines, "TIMEOUT", 1.0)
     with pytest.raises(ReplayError, match="sleep did not end within 1 s"):
         processor._result(["sleep", "10"], tmp_path)

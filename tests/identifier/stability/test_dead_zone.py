@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.monte_carlo import Beginning, bound_rows, monte_carlo
 from identifier.driving import natural_driving
 from identifier.paper.design import PaperIdentifier, with_keeping
 from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INTEGRAL
-from identifier.stability.monte_carlo import Beginning, monte_carlo
 from identifier.stability.sampled_bound import Learning
 from models.vehicle import sedan
-from tireid.commands.certificate_table import bound_rows, certificate_of
+from tireid.commands.certificate_table import certificate_of
 
 CAR = sedan()
 DT, LAM, RHO, DRIVE = 0.01, 8.0, 3.0, 40.0

@@ -235,7 +235,9 @@ def test_a_curve_that_falls_is_no_tire(taught, pairs, libraries):
     assert not taken
 
 
-@pytest.mark.parametrize(("law", "complaint"), [("eso", "no tire"), ("dugoff_ekf", "CurveModel")])
+@pytest.mark.parametrize(
+    ("law", "complaint"), [("washout", "no tire"), ("magic_formula_ekf", "CurveModel")]
+)
 def test_what_cannot_be_handed_over_is_said(law, complaint):
     with pytest.raises(NoHandoverError, match=complaint):
         build_pair(build_package(make_method(law, CAR), CAR))

@@ -5,7 +5,7 @@ frozen model, by nonlinear least squares from several random starts.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial, singledispatch
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,12 +13,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.curve import EDGES
-from identifier.baselines.curve_ekf import CurveEkf
-from identifier.baselines.curves import CurveModel
-from identifier.baselines.linear import LinearBaseline, StiffnessRls
-from identifier.method import CannotFreezeError
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.network import NetworkModel, Weights
+from identifier.baselines import CurveEkf, CurveModel
 from identifier.reproducibility import axle_rms, counted_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
@@ -57,7 +52,7 @@ def fit_floor(
 
     Parameters
     ----------
-    structure : from `floor_structures.structure_of`.
+    structure : of a method.
     recordings : one or several, with true forces; each counts equally, each axle too.
     steps : downhill, at most, in each start.
 
@@ -139,54 +134,11 @@ def _residual(
     return np.concatenate([*errors, RIDGE * (parameters - start)])
 
 
-# What a method freezes to, as a function of parameters that may be fitted offline.
-
 SCATTER = 0.3  # of starts, in standard deviations of the method's own prior
 
 
-@singledispatch
-def structure_of(method: object, vehicle: Vehicle) -> Structure:
-    """Return what a method freezes to, with its parameters free.
-
-    Parameters
-    ----------
-    method : a design of the paper's, an axle design, or a baseline that has a model.
-
-    Raises
-    ------
-    CannotFreezeError
-        Where the method has no model that could be fitted.
-    """
-    del vehicle
-    raise CannotFreezeError(f"{type(method).__name__} has no structure that could be fitted")
-
-
-@structure_of.register
-def _network(method: PaperIdentifier, vehicle: Vehicle) -> Structure:
-    """All weights of the paper's network: W in the force unit, then V, by rows."""
-    n_h, n_in = method.network.hidden, len(method.network.inputs)
-    free = np.full(n_h * (2 + n_in), np.inf)
-
-    def start(rng: np.random.Generator) -> Array:
-        first = method.network.initial_weights(rng)
-        return np.concatenate([first.W.ravel(), first.V.ravel()])
-
-    def model(parameters: Array) -> NetworkModel:
-        W, V = parameters[: 2 * n_h].reshape(2, n_h), parameters[2 * n_h :].reshape(n_h, n_in)
-        return NetworkModel(
-            vehicle=vehicle,
-            network=method.network,
-            weights=Weights(W=W.copy(), V=V.copy()),
-            force_unit=method.force_unit,
-            min_speed=method.min_speed,
-        )
-
-    return Structure(start, model, -free, free)
-
-
-@structure_of.register
-def _axle(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
-    """Weights of the units, and compliance, sway and offsets over their bounds, by rows."""
+def axle_structure(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
+    """Return the axle identifier's: weights, and compliance, sway and offsets over their bounds."""
     n, limits = len(method.ladder), method.bounds
     W, own = method.prior.means(vehicle, method.ladder)
     offsets = (limits.steering, limits.v_y)
@@ -216,9 +168,8 @@ def _axle(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
     return Structure(start, model, lower, upper)
 
 
-@structure_of.register
-def _curve(method: CurveEkf, vehicle: Vehicle) -> Structure:
-    """The filter's own coordinates of a Magic Formula or Dugoff's tire, its lag and offsets."""
+def curve_structure(method: CurveEkf, vehicle: Vehicle) -> Structure:
+    """Return the filter's own coordinates of a Magic Formula, its lag and offsets."""
 
     def start(rng: np.random.Generator) -> Array:
         return SCATTER * method.spread * rng.standard_normal(method.spread.size)
@@ -227,38 +178,3 @@ def _curve(method: CurveEkf, vehicle: Vehicle) -> Structure:
         return method.model(vehicle, parameters)
 
     return Structure(start, model, -method.limit, method.limit)
-
-
-@structure_of.register
-def _linear(method: LinearBaseline, vehicle: Vehicle) -> Structure:
-    """Logarithms of both stiffnesses over those that the car states."""
-    return _straight(vehicle, method.min_speed, 0.0, np.zeros(2))
-
-
-@structure_of.register
-def _lagged_linear(method: StiffnessRls, vehicle: Vehicle) -> Structure:
-    """The same with the lag that it is given, and both offsets over their bounds."""
-    most = np.array([method.most_steering, method.most_v_y])
-    return _straight(vehicle, method.min_speed, method.relaxation_length, most)
-
-
-def _straight(vehicle: Vehicle, min_speed: float, lag: float, most: Array) -> Structure:
-    stated = np.array(vehicle.bicycle)[4:]
-    limit = np.array([4.0, 4.0, *[1.0] * np.count_nonzero(most)])
-
-    def start(rng: np.random.Generator) -> Array:
-        return SCATTER * rng.standard_normal(limit.size)
-
-    def model(parameters: Array) -> CurveModel:
-        offset = np.zeros(2)
-        offset[most > 0.0] = parameters[2:]
-        return CurveModel(
-            vehicle=vehicle,
-            curve="linear",
-            parameters=(stated * np.exp(parameters[:2])).reshape(2, 1),
-            min_speed=min_speed,
-            relaxation_length=np.full(2, lag),
-            offset=most * offset,
-        )
-
-    return Structure(start, model, -limit, limit)

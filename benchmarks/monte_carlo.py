@@ -1,7 +1,7 @@
 """The proven bounds of a design against drives: how far does the identifier really go?
 
 Each drive has its own road, steering and initial weights; the identifier runs over all of them at
-once, one in each lane, and keeps nothing but the largest norms. Sensors err as much as is declared.
+one by one, and keeps nothing but the largest norms. Sensors err as much as is declared.
 Only drives that break a declared condition (slip, speed, steering, yaw rate) are left out: a bound
 that is passed is wrong.
 """
@@ -14,8 +14,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen import BatchScan
+from codegen import Scan
 from codegen.arrays import Array
+from identifier.certificate import Certificate
 from identifier.driving import SPEED_SPREAD, Driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
@@ -24,7 +25,7 @@ from identifier.stability.operation import declared_signals, largest_steering_ra
 from models.bicycle import BicycleParameters, bicycle, slip_angles
 from models.vehicle import GRAVITY, Vehicle
 
-# Random smooth drives of a bicycle on saturating tires, many at once in compiled code.
+# Random smooth drives of a bicycle on saturating tires, in compiled code.
 #
 # The tire is F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))): the stiffness that the vehicle states, and
 # the friction limit. The residual f that the identifier sees of a drive is known exactly: (ξ_{k+1}
@@ -105,20 +106,22 @@ def driven(vehicle: Vehicle, u: Array, speed: Array, road: Array, dt: float) -> 
     road : friction (N,).
     dt : sampling interval [s].
     """
-    count, n = speed.shape
-    record = _plant()(
-        n,
-        {
-            "x": np.zeros((count, 2)),
-            "u": u,
-            "u_ahead": np.concatenate([u[:, 1:], u[:, -1:]], axis=1),
-            "v_x": speed[:, :, None],
-            "vehicle": np.array(vehicle.bicycle),
-            "road": np.column_stack([road, np.full(count, dt)]),
-        },
-        keep=range(n),
-    )
-    return Drives(speed, record["x"], u)
+    plant, n, car = _plant(), speed.shape[1], np.array(vehicle.bicycle)
+    x = [
+        plant(
+            n,
+            {
+                "x": np.zeros(2),
+                "u": steering,
+                "u_ahead": np.concatenate([steering[1:], steering[-1:]]),
+                "v_x": v_x,
+                "vehicle": car,
+                "road": np.array([friction, dt]),
+            },
+        )["x"]
+        for steering, v_x, friction in zip(u, speed, road, strict=True)
+    ]
+    return Drives(speed, np.stack(x), u)
 
 
 def within(vehicle: Vehicle, drives: Drives, driving: Driving, dt: float) -> NDArray[np.bool_]:
@@ -189,14 +192,12 @@ def slips(vehicle: Vehicle, drives: Drives) -> Array:
 
 
 @cache
-def _plant() -> BatchScan:
-    step = saturating_bicycle()
-    over = ("u", "u_ahead", "v_x")
-    return BatchScan(step, carry=("x",), over=over, lanes_over=("x", *over, "road"))
+def _plant() -> Scan:
+    return Scan(saturating_bicycle(), carry=("x",), over=("u", "u_ahead", "v_x"))
 
 
 def _magic(y: Any) -> Any:
-    """sin(1.5 atan(y)) = 3 s - 4 s³ with s = sin(atan(y)/2): roots only, which run in lanes."""
+    """sin(1.5 atan(y)) = 3 s - 4 s³ with s = sin(atan(y)/2)."""
     c = 1.0 / ca.sqrt(1.0 + y * y)
     s = y * c / ca.sqrt(2.0 + 2.0 * c)
     return s * (3.0 - 4.0 * s * s)
@@ -349,33 +350,27 @@ def largest_norms(
     """
     count, n = drives.v_x.shape
     K_inv = np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv)) / design.force_unit
-    record = _batch(design.structure)(
-        n,
-        {
-            "xi_hat": drives.x[:, 0] @ K_inv.T,
-            "z": np.zeros(2),
-            "W": weights.W,
-            "V": weights.V,
-            "x": drives.x,
-            "u": drives.u,
-            "v_x": drives.v_x[:, :, None],
-            "vehicle": np.array(vehicle.bicycle),
-            "A_d": design.gains.matrix,
-            "gains": np.array([getattr(design.gains, name) for name in GAINS]),
-            "sampling": np.array([design.dt, design.force_unit, design.min_speed]),
-            **dict.fromkeys(PEAKS, np.zeros(())),
-        },
-    )
-    xi_tilde, W, V = (record[f"{name}_final"].reshape(count) for name in PEAKS)
-    return xi_tilde, W, V
+    law, begun = _law(design.structure), drives.x[:, 0] @ K_inv.T
+    shared = {
+        "z": np.zeros(2),
+        "vehicle": np.array(vehicle.bicycle),
+        "A_d": design.gains.matrix,
+        "gains": np.array([getattr(design.gains, name) for name in GAINS]),
+        "sampling": np.array([design.dt, design.force_unit, design.min_speed]),
+        **dict.fromkeys(PEAKS, np.zeros(())),
+    }
+    found = np.empty((len(PEAKS), count))
+    for i in range(count):
+        own = {"xi_hat": begun[i], "W": weights.W[i], "V": weights.V[i]}
+        drive = {"x": drives.x[i], "u": drives.u[i], "v_x": drives.v_x[i]}
+        record = law(n, {**shared, **own, **drive}, every=n, ports=())
+        found[:, i] = [record[f"{name}_final"].item() for name in PEAKS]
+    return found[0], found[1], found[2]
 
 
 @cache
-def _batch(structure: Structure) -> BatchScan:
-    step = with_peaks(build_step(structure))
-    return BatchScan(
-        step, carry=(*CARRY, *PEAKS), over=OVER, lanes_over=("xi_hat", "W", "V", *OVER)
-    )
+def _law(structure: Structure) -> Scan:
+    return Scan(with_peaks(build_step(structure)), carry=(*CARRY, *PEAKS), over=OVER)
 
 
 def with_peaks(step: ca.Function) -> ca.Function:
@@ -401,3 +396,47 @@ def with_peaks(step: ca.Function) -> ca.Function:
         [*step.name_in(), *PEAKS],
         [*outputs, *(f"{name}_next" for name in PEAKS)],
     )
+
+
+# The proven bounds beside what happened on random drives.
+
+TOLERANCE = 1e-9  # of rounding, in parts of a bound
+BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it
+    ("error_bound", "xi_tilde", "|xi - xi_hat|, by the leakage"),
+    ("projection_bound", "xi_tilde", "|xi - xi_hat|, by the projection"),
+    ("weight_bound", "W", "|W|, by the leakage"),
+    ("V_bound", "V", "|V|"),
+)
+
+
+class Row(NamedTuple):
+    """A bound beside what was seen.
+
+    name, title, unit : of the bound.   bound : its value.   largest : seen on any drive.
+    passed : drives on which it was exceeded.   tightness : bound over seen: least, median, 90 %.
+    """
+
+    name: str
+    title: str
+    unit: str
+    bound: float
+    largest: float
+    passed: int
+    tightness: tuple[float, float, float]
+
+
+def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
+    """Return every proven bound that the certificate holds, beside what was seen."""
+    known = {entry.name: entry for entry in certificate.properties}
+    rows = []
+    for name, what, title in BOUNDS:
+        if name in known and np.isfinite(known[name].value):
+            seen: Array = getattr(observed, what)
+            bound = known[name].value
+            passed = int(np.count_nonzero(~(seen <= bound * (1.0 + TOLERANCE))))
+            ratio = bound / seen[np.isfinite(seen) & (seen > 0.0)]
+            low, middle, high = np.quantile(ratio, [0.0, 0.5, 0.9]) if ratio.size else [np.nan] * 3
+            largest = float(seen.max())
+            tightness = float(low), float(middle), float(high)
+            rows.append(Row(name, title, known[name].unit, bound, largest, passed, tightness))
+    return rows

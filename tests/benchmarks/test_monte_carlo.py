@@ -6,14 +6,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.driving import natural_driving
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.network import NetworkModel, Weights
-from identifier.run import History, identify
-from identifier.stability import monte_carlo as module
-from identifier.stability.monte_carlo import (
+from benchmarks import monte_carlo as module
+from benchmarks.monte_carlo import (
     Beginning,
     Drives,
+    Observed,
+    bound_rows,
     first_weights,
     largest_norms,
     monte_carlo,
@@ -22,9 +20,15 @@ from identifier.stability.monte_carlo import (
     saturating_bicycle,
     slips,
 )
+from identifier.certificate import Certificate, statement
+from identifier.driving import natural_driving
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.network import NetworkModel, Weights
+from identifier.run import History, identify
 from models.bicycle import bicycle
 from models.recordings import Recording
 from models.vehicle import sedan
+from tireid.commands.certificate_table import certificate_of
 
 CAR = sedan()
 DRIVING = natural_driving(CAR)
@@ -176,3 +180,51 @@ def test_first_weights_of_V_are_shrunk_to_the_largest_that_a_drive_may_begin_wit
     assert long.min() > 2.0
     np.testing.assert_allclose(short, 2.0, rtol=1e-12)
     np.testing.assert_allclose(shrunk * (long / 2.0)[:, None, None], drawn, rtol=1e-12)
+
+
+def observed(xi_tilde):
+    ones = np.ones(len(xi_tilde))
+    return Observed(np.array(xi_tilde), ones, ones, ones, 3)
+
+
+BOUNDED = {"error_bound": "xi_tilde", "projection_bound": "xi_tilde", "weight_bound": "W"}
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+@pytest.mark.parametrize(("over", "passed"), [(0.999, 0), (1.001, 2), (1.9, 2), (np.inf, 2)])
+def test_the_alarm_rings_right_at_the_bound(name, over, passed):
+    """Two of three drives come to a share of the bound, each bound by its own signal."""
+    values = dict.fromkeys(BOUNDED, 7.0)
+    certificate = Certificate(
+        properties=tuple(statement(key, "", value, "U s") for key, value in values.items())
+    )
+    drives = observed([0.5, 0.5, 0.5])
+    seen = np.array([0.5, 7.0 * over, 7.0 * over])
+    rows = bound_rows(certificate, drives._replace(**{BOUNDED[name]: seen}))
+    (row,) = (row for row in rows if row.name == name)
+    assert (row.bound, row.passed) == (7.0, passed)
+    assert row.largest == 7.0 * over
+    others = [row for row in rows if BOUNDED[row.name] != BOUNDED[name]]
+    assert all(row.passed == 0 for row in others)
+
+
+def test_every_row_is_passed_by_a_law_that_breaks_what_it_bounds():
+    """The certificate of a sound design, beside drives of one whose layers leak wrongly."""
+    vehicle, design = sedan(), PaperIdentifier.for_vehicle(sedan())
+    driving = natural_driving(vehicle)
+    passed = {}
+    for name, changed in {
+        "error_bound": {"eta_W": 3e5, "rho_W": 0.0},
+        "weight_bound": {"eta_W": 3e5, "rho_W": 0.0},
+        "V_bound": {"rho_V": 3e3},
+        "projection_bound": {"eta_W": 3e5, "rho_W": 0.0},
+    }.items():
+        kept = replace(design, gains=replace(design.gains, W_max=5.0, V_max=13.0))
+        told = kept if name == "projection_bound" else design
+        planted = replace(design, gains=replace(design.gains, **changed))
+        beginning = Beginning(W=0.0, V=12.0)
+        rng = np.random.default_rng(1)
+        seen = monte_carlo(planted, vehicle, driving, 30, beginning=beginning, rng=rng)
+        found = bound_rows(certificate_of(told, vehicle), seen)
+        passed[name] = {row.name: row.passed for row in found}[name]
+    assert min(passed.values()) > 0, passed
