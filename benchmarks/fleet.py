@@ -37,6 +37,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from identifier.axle.information import Evidence, merged, reference_of, total
 
 from benchmarks.everyday_drives import KINDS, everyday_drive
 from benchmarks.local_cluster import free_port, start
@@ -44,7 +45,6 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, random_car, r
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.information import Evidence, merged, reference_of, total
 from identifier.run import identify, learn
 from identifier.tire_model import TireModel
 from models.faults import SensorFault

@@ -20,8 +20,15 @@ from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers, simulate
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
-from identifier.motion.model import LEAST_GRIP, REPLAYED, curve_symbols, replay_scan
-from identifier.motion.parameters import INDEX, NAMES, PARAMETERS, SLIPS
+from identifier.motion.model import (
+    LEAST_GRIP,
+    REPLAYED,
+    curve_function,
+    curve_index,
+    curve_symbols,
+    replay_scan,
+)
+from identifier.motion.parameters import INDEX, NAMES, PARAMETERS
 from identifier.setup import Setup
 from identifier.tire_model import (
     AXLES,
@@ -50,6 +57,7 @@ BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", Tr
 SMALL = 1e-4  # rad, over which a slope is taken
 SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering that is noted
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
+LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
 LARGEST = 1e6  # of the numbers in a file
 
 
@@ -129,7 +137,7 @@ class FittedModel(TireModel):
 
     def _curve_numbers(self, axle: str) -> Array:
         """Return the numbers of `curve_symbols` of an axle, (9,)."""
-        return self.p[_curve_index(axle)]
+        return self.p[curve_index(axle)]
 
     def curve_at(self, alpha: Array) -> tuple[Array, Array, Array]:
         """Return φ and dφ/dα (k, 2) [static loads], and slopes of φ over curve numbers (2, k, 9).
@@ -141,7 +149,7 @@ class FittedModel(TireModel):
         phi, slope, J = [], [], []
         for i, axle in enumerate("fr"):
             numbers = np.tile(self._curve_numbers(axle)[:, None], (1, len(alpha)))
-            found = _curve_function()(numbers, alpha[:, i][None])
+            found = curve_function()(numbers, alpha[:, i][None])
             values = [np.array(one) for one in found]
             phi.append(values[0].ravel())
             slope.append(values[1].ravel())
@@ -355,15 +363,17 @@ class FittedModel(TireModel):
 
     # How sure.
 
-    def _curve_sd(self, alpha: Array, covariance: Array) -> Array:
-        """Return the standard deviation of φ at slips (k, 2), of the curves' numbers alone."""
+    def _curve_sd(self, alpha: Array) -> tuple[Array, Array]:
+        """Return the standard deviation of φ at slips, and that before learning, (k, 2) each."""
         _, _, J = self.curve_at(alpha)
-        found = [
-            np.einsum("ki,ij,kj->k", J[i], covariance[np.ix_(index, index)], J[i])
-            for i, index in enumerate(map(_curve_index, "fr"))
-        ]
-        sd: Array = np.sqrt(np.maximum(np.column_stack(found), 0.0))
-        return sd
+        sd = []
+        for P in (self.covariance, Priors.of(self.vehicle).covariance):
+            found = [
+                np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
+                for i, index in enumerate(map(curve_index, "fr"))
+            ]
+            sd.append(np.sqrt(np.maximum(np.column_stack(found), 0.0)))
+        return sd[0], sd[1]
 
     def relative_sd(self, alpha: Array) -> Array:
         """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
@@ -372,21 +382,21 @@ class FittedModel(TireModel):
         ----------
         alpha : [rad], (k,).
         """
-        both = np.column_stack([alpha, alpha])
-        prior = self._curve_sd(both, _prior_covariance(self.vehicle))
-        ratio: Array = self._curve_sd(both, self.covariance) / np.maximum(prior, 1e-12)
+        return self._relative_sd(np.column_stack([alpha, alpha]))
+
+    def _relative_sd(self, alpha: Array) -> Array:
+        """Return the same at slips of each axle, (k, 2)."""
+        sd, prior = self._curve_sd(alpha)
+        ratio: Array = sd / np.maximum(prior, 1e-12)
         return ratio
 
     @property
     def known_slip(self) -> Array:
         """Largest slip [rad] that the drives reached and where the doubt is small, (2,)."""
-        known, grid = np.zeros(2), np.linspace(0.0, 1.0, 101)[1:]
-        for i, largest in enumerate(self.driven):
-            if largest > 0.0:
-                sure = self.relative_sd(largest * grid)[:, i] <= LARGEST_SD
-                count = sure.size if sure.all() else int(np.argmin(sure))
-                known[i] = largest * count / grid.size
-        return known
+        grid = np.linspace(0.0, 1.0, 101)[1:]
+        sure = self._relative_sd(np.outer(grid, self.driven)) <= LARGEST_SD
+        count = np.where(sure.all(axis=0), grid.size, np.argmin(sure, axis=0))
+        return self.driven * count / grid.size
 
     @property
     def has_band(self) -> bool:
@@ -463,7 +473,7 @@ class FittedModel(TireModel):
         phi, slope, J = self.curve_at(slip)
         variance = np.empty_like(phi)
         for i, axle in enumerate("fr"):
-            index = [*_curve_index(axle), *_OFFSETS]
+            index = [*curve_index(axle), *_OFFSETS]
             zero = slope[:, i, None] * np.column_stack(
                 [
                     np.full(len(phi), 1.0 if i == 0 else 0.0),
@@ -526,15 +536,15 @@ class FittedModel(TireModel):
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and zeros of sensors, with their doubt."""
-        before = _prior_covariance(self.vehicle)
+        before = Priors.of(self.vehicle).covariance
         given = self.vehicle.bicycle[4:]
         zero = np.zeros((1, 2))
-        stiff = self._curve_slope_sd(self.covariance), self._curve_slope_sd(before)
+        stiff = [sd[0] / SMALL for sd in self._curve_sd(np.full((1, 2), SMALL))]
         peak = np.tile(np.maximum(self.known_slip, 1e-3), (1, 1))
         top, _, _ = self.curve_at(peak)
         _, at_zero, _ = self.curve_at(zero)
         _, at_known, _ = self.curve_at(peak)
-        wide = self._curve_sd(peak, self.covariance), self._curve_sd(peak, before)
+        wide = self._curve_sd(peak)
         listed = []
         for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
             load, s = float(self._loads[i]), INDEX[f"compliance_{short}"]
@@ -577,11 +587,6 @@ class FittedModel(TireModel):
             )
         return tuple(listed)
 
-    def _curve_slope_sd(self, covariance: Array) -> Array:
-        """Return the standard deviation of the slope at zero [static loads/rad], (2,)."""
-        sd: Array = self._curve_sd(np.full((1, 2), SMALL), covariance)[0] / SMALL
-        return sd
-
     def facts(self) -> tuple[Fact, ...]:
         """Return what `summary` says beside the estimates."""
         lines = [Fact("identified up to a slip of", np.degrees(self.known_slip), "deg")]
@@ -623,6 +628,15 @@ class FittedModel(TireModel):
         covariance, k = self.covariance.copy(), INDEX["ln_road"]
         covariance[k, k] += sd_friction**2
         return replace(self, covariance=covariance)
+
+    def as_prior(self, vehicle: Vehicle) -> Priors:
+        """Return what it leaves to believe of a car: its numbers, as sure as they are."""
+        usual = Priors.of(vehicle)
+        where = np.ix_(usual.moves, usual.moves)
+        information = np.zeros_like(usual.information)
+        sure = self.covariance + LEAST_DOUBT * np.diag(usual.sd**2)
+        information[where] = np.linalg.inv(sure[where])
+        return replace(usual, mean=self.p, information=information, typed=())
 
     def beside_v_y(self) -> AxleModel:
         """Return the model as the axle identifier goes on learning from it."""
@@ -667,7 +681,7 @@ class FittedModel(TireModel):
             W=W,
             own=own,
             covariance=self._units_covariance(fits, self.covariance),
-            prior_covariance=self._units_covariance(fits, _prior_covariance(self.vehicle)),
+            prior_covariance=self._units_covariance(fits, Priors.of(self.vehicle).covariance),
             excitation=excitation,
         )
 
@@ -686,7 +700,7 @@ class FittedModel(TireModel):
             if axle == "r":
                 zeros = {"v_y_bias": 1.0, "v_y_angle": float(self.speeds.mean())}
             names = [f"compliance_{axle}", f"sway_share_{axle}", *zeros]
-            index = [*_curve_index(axle), *(INDEX[name] for name in names)]
+            index = [*curve_index(axle), *(INDEX[name] for name in names)]
             to = np.zeros((n + 3, len(index)))
             to[:n, :9] = pseudo @ J[i]
             to[n, 9] = to[n + 1, 10] = 1.0
@@ -771,7 +785,6 @@ class FittedModel(TireModel):
             raise FrozenModelError(f"{source}: {error}") from error
 
 
-_CURVE = ("ln_stiffness", "ln_grip", "shape", "curvature")
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 
 
@@ -786,35 +799,9 @@ def _units_fit(ladder: tuple[float, ...], reach: float) -> tuple[Array, Array]:
     return slip, pseudo
 
 
-@cache
-def _curve_index(axle: str) -> list[int]:
-    """Return where the numbers of `curve_symbols` stand among the parameters."""
-    names = [f"{name}_{axle}" for name in _CURVE]
-    names += [f"residual{j}_{axle}" for j in range(len(SLIPS))]
-    return [INDEX[name] for name in (*names, "ln_road")]
-
-
-@cache
-def _curve_function() -> ca.Function:
-    """Return (numbers (9,), slip) -> φ, dφ/dx, ∂φ/∂numbers (9,)."""
-    numbers, x, phi, slope = curve_symbols()
-    vector = ca.vertcat(*numbers)
-    gradient = ca.densify(ca.jacobian(phi, vector)).T
-    return ca.Function("curve", [vector, x], [phi, slope, gradient])
-
-
 def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
     """Return φ and dφ/dx at a slip, as expressions."""
     symbols, x, phi, slope = curve_symbols()
     one = ca.Function("curve", [ca.vertcat(*symbols), x], [phi, slope])
     phi_there, slope_there = one(ca.DM(numbers), slip)
     return phi_there, slope_there
-
-
-def _prior_covariance(vehicle: Vehicle) -> Array:
-    """Return the covariance of the beliefs about a car, (p, p)."""
-    priors = Priors.of(vehicle)
-    found = np.zeros_like(priors.information)
-    where = np.ix_(priors.moves, priors.moves)
-    found[where] = np.linalg.inv(priors.information[where])
-    return found

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from identifier.axle.information import reference_of
 
 import tireid.commands.fleet as command
 import tireid.fleet.learn as learning
 import tireid.fleet.store as storing
 from benchmarks.local_cluster import free_port, start
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.information import reference_of
 from identifier.axle.prior import fiala_weights
 from identifier.tire_model import load_model
 from identifier.verdict import judge_prediction
