@@ -81,7 +81,7 @@ def fit(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
         )
         told += part
-        parts.append((float(drives[0].t[0]), part))
+        parts.append((drives[0].begin, part))
         done += sum(len(one.signals) * one.dt for one in drives)
         if progress is not None:
             progress(min(done / max(total, 1e-9), 1.0))
