@@ -60,7 +60,7 @@ def fit(
         Where no sample is fast enough to count.
     """
     before = Priors.of(vehicle) if priors is None else priors
-    told, sd = Information.nothing(), before.sd
+    told, sd = Information.nothing(), Priors.of(vehicle).sd
     parts: list[tuple[float, Information]] = []
     total = sum(one.duration for one in recordings)
     done, reach, found = 0.0, Reach(), None
@@ -71,7 +71,7 @@ def fit(
             continue
         begin = None if found is None else found.p
         enough = ENOUGH if begin is None else ENOUGH_MORE
-        beliefs = before.after(told)
+        beliefs = before.after(told) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
         segments += _segments(drives, roads)

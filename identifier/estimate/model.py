@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -367,7 +367,7 @@ class FittedModel(TireModel):
         """Return the standard deviation of φ at slips, and that before learning, (k, 2) each."""
         _, _, J = self.curve_at(alpha)
         sd = []
-        for P in (self.covariance, Priors.of(self.vehicle).covariance):
+        for P in (self.covariance, _covariance_before(self)):
             found = [
                 np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
                 for i, index in enumerate(map(curve_index, "fr"))
@@ -393,10 +393,7 @@ class FittedModel(TireModel):
     @property
     def known_slip(self) -> Array:
         """Largest slip [rad] that the drives reached and where the doubt is small, (2,)."""
-        grid = np.linspace(0.0, 1.0, 101)[1:]
-        sure = self._relative_sd(np.outer(grid, self.driven)) <= LARGEST_SD
-        count = np.where(sure.all(axis=0), grid.size, np.argmin(sure, axis=0))
-        return self.driven * count / grid.size
+        return _known_slip(self).copy()
 
     @property
     def has_band(self) -> bool:
@@ -536,7 +533,7 @@ class FittedModel(TireModel):
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and zeros of sensors, with their doubt."""
-        before = Priors.of(self.vehicle).covariance
+        before = _covariance_before(self)
         given = self.vehicle.bicycle[4:]
         zero = np.zeros((1, 2))
         stiff = [sd[0] / SMALL for sd in self._curve_sd(np.full((1, 2), SMALL))]
@@ -681,7 +678,7 @@ class FittedModel(TireModel):
             W=W,
             own=own,
             covariance=self._units_covariance(fits, self.covariance),
-            prior_covariance=self._units_covariance(fits, Priors.of(self.vehicle).covariance),
+            prior_covariance=self._units_covariance(fits, _covariance_before(self)),
             excitation=excitation,
         )
 
@@ -805,3 +802,19 @@ def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
     one = ca.Function("curve", [ca.vertcat(*symbols), x], [phi, slope])
     phi_there, slope_there = one(ca.DM(numbers), slip)
     return phi_there, slope_there
+
+
+@lru_cache(maxsize=4)
+def _known_slip(model: FittedModel) -> Array:
+    """Return `FittedModel.known_slip`, which a verdict asks for many times."""
+    grid = np.linspace(0.0, 1.0, 101)[1:]
+    sure = model._relative_sd(np.outer(grid, model.driven)) <= LARGEST_SD
+    count = np.where(sure.all(axis=0), grid.size, np.argmin(sure, axis=0))
+    known: Array = model.driven * count / grid.size
+    return known
+
+
+@lru_cache(maxsize=4)
+def _covariance_before(model: FittedModel) -> Array:
+    """Return the covariance of the beliefs about a model's car, (p, p)."""
+    return Priors.of(model.vehicle).covariance
