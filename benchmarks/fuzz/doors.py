@@ -109,7 +109,7 @@ DOORS = (
     _door("predict car", 3, f"{PREDICT} axle.json log.csv --vehicle sedan.toml", "sedan.toml"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
-    _door("fleet learn, begun", 1, f"{FLEET} --weights axle.json", "axle.json"),
+    _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),
     # networks of the user's own
     _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
     _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),

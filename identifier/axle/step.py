@@ -495,46 +495,6 @@ def _recent_force(
     return force, ca.if_else(learns, peak, last_peak)
 
 
-# The same regression with weights that stay: what a drive tells of them, to be added up.
-
-EVIDENCE_CARRY = ("gate", "sway", "slip", "sensitivity", "filters", "peak", "bank")
-
-
-def build_evidence(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
-    """Return the step that tells the regression at given weights, and learns nothing.
-
-    Outputs, rows front and rear: h (2, q), zero but for the offset where there is no force to learn
-    from; y (2,), what h'[w, own] shall be where the regression is replaced by its tangent at the
-    given numbers; R (2,) its variance; learns, 1 or 0.
-    """
-    f = forward(steps, pressed=pressed)
-    n, ports = len(steps) + 1, dict(f.ports)
-    h, y, next_state = _regression(f, ports)
-    y, next_state["bank"] = _without_bank(f, ports, y)
-    numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
-    ports["peak"] = ca.SX.sym("peak", 2)
-    force, next_state["peak"] = _recent_force(ports, numbers, y, ports["peak"], f.gated.learns)
-    next_state["filters"] = ca.horzcat(next_state["filters"], force)
-    next_state |= f.next_state
-    y_hat = ca.sum2(ports["W"] * h[:, :n])
-    seen = ca.horzcat(h[:, :-1] * (next_state["peak"] >= numbers.least_force), h[:, -1])
-    tangent = ca.sum2(seen * ca.horzcat(ports["W"], ports["own"]))
-    return ca.Function(
-        _name("axle_evidence", steps, pressed=pressed),
-        list(ports.values()),
-        [
-            *(next_state[name] for name in EVIDENCE_CARRY),
-            seen,
-            y - y_hat + tangent,
-            _deviation(f, numbers, y_hat) ** 2 * numbers.samples,
-            f.gated.learns,
-        ],
-        list(ports),
-        [*(f"{name}_next" for name in EVIDENCE_CARRY), "h", "y", "R", "learns"],
-        {"cse": True},
-    )
-
-
 def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:
     """Return the standard deviation that y is told to have (2,).
 

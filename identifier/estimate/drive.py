@@ -51,6 +51,11 @@ class Drive:
     every: int
     begins: tuple[int, ...] = (0,)
 
+    @property
+    def begin(self) -> float:
+        """Time of the first sample that its first mean is of [s]."""
+        return float(self.t[0]) - 0.5 * self.dt * (1.0 - 1.0 / self.every)
+
     @classmethod
     def of(
         cls,

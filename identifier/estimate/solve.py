@@ -32,6 +32,7 @@ LEAST_STIFF, STIFF_SD = 0.25, 0.1  # of C: slope at zero, and how firmly it is b
 ITERATIONS = 25
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
+SETTLING, SETTLED = 60, 1e-4  # iterations and improvement [nats] where no drive is looked at
 
 
 Labels: TypeAlias = Sequence[NDArray[np.intp]]
@@ -385,18 +386,20 @@ def descend(
         if gained < enough and (count > 3 or memory is not None):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
-    H = normal(problem, now, S2, T)[0] + around_beliefs(priors, p)[1][np.ix_(index, index)]
+    H, gradient = normal(problem, now, S2, T)
+    slope, curvature = _of_drives(problem, H, gradient)
+    H = H + around_beliefs(priors, p)[1][np.ix_(index, index)]
     cost = problem.cost(now.e, p, T)
     whole = np.zeros((len(p), len(p)))
     whole[np.ix_(index, index)] = np.linalg.inv(H)
-    n, tires = len(NAMES), problem.tires
-    told = np.asarray(np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]), np.float64)
+    n = len(NAMES)
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
         covariance=whole[:n, :n],
-        index=index[:tires],
-        information=told,
+        slope=slope,
+        curvature=curvature,
+        seconds=float(problem.weight.sum()),
         roads=p[n:],
         road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
@@ -404,6 +407,50 @@ def descend(
         cost=cost,
         iterations=count,
     )
+
+
+def _of_drives(problem: Problem, H: Array, gradient: Array) -> tuple[Array, Array]:
+    """Return slope (p,) and curvature (p, p) of the misfit, roads of segments marginal."""
+    n, tires = len(NAMES), problem.tires
+    index, some, roads = problem.index[:tires], slice(0, tires), slice(tires, None)
+    if problem.roads:
+        before = problem.priors.information[n:, n:]
+        gain = np.linalg.solve(before + H[roads, roads], H[roads, some]).T
+        H, gradient = H[some, some] - gain @ H[roads, some], gradient[some]  # at the optimum
+    slope, curvature = np.zeros(n), np.zeros((n, n))
+    slope[index], curvature[np.ix_(index, index)] = gradient, 0.5 * (H + H.T)
+    return slope, curvature
+
+
+def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
+    """Return the optimum (p,) of what is believed, and its covariance (p, p).
+
+    With `Priors.after` these are the parameters that all drives told together.
+
+    Parameters
+    ----------
+    begin : parameters to begin with (p,).
+    """
+    index, p = np.flatnonzero(priors.moves), begin.copy()
+    low, high = priors.low[index], priors.high[index]
+    cost, damping = _beliefs(priors, p), 1e-6
+    for _ in range(SETTLING):
+        gradient, curvature = around_beliefs(priors, p)
+        H = curvature[np.ix_(index, index)]
+        step = _bounded(H + damping * np.diag(np.diag(H)), gradient[index], p[index], low, high)
+        trial = p.copy()
+        trial[index] = np.clip(p[index] + step, low, high)
+        reached = _beliefs(priors, trial)
+        if not reached < cost:
+            damping = max(6.0 * damping, 1e-3)
+            continue
+        gained, p, cost, damping = cost - reached, trial, reached, max(damping / 5.0, 1e-6)
+        if gained < SETTLED:
+            break
+    covariance = np.zeros_like(priors.information)
+    where = np.ix_(index, index)
+    covariance[where] = np.linalg.inv(around_beliefs(priors, p)[1][where])
+    return p, covariance
 
 
 def _beliefs(priors: Priors, p: Array) -> float:

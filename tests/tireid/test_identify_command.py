@@ -500,8 +500,12 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsy
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--method", law, "--accept"]  # the paper's network needs a longer drive
     if law == "fit":
-        stored = ["--weights", result / "weights.json", "--out", tmp_path / "out"]
-        assert "give it all of them, in place of a model" in refusal(capsys, [*words, *stored])
+        sd = []
+        for name, more in (("a", []), ("b", ["--weights", str(result / "weights.json")])):
+            assert main([*words, *more, "--out", str(tmp_path / name)]) == 0
+            told = json.loads((tmp_path / name / "weights.json").read_text())
+            sd.append(told["parameters"]["ln_stiffness_f"]["sd"])
+        assert sd[1] < 0.95 * sd[0]
         return
     errors = {}
     for name, more in (("afresh", []), ("stored", ["--weights", str(result / "weights.json")])):
