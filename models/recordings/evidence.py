@@ -20,7 +20,7 @@ SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars to
 TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
-class Windows(NamedTuple):
+class Means(NamedTuple):
     """Window means of the moving part of a recording, each of shape (k,).
 
     v_x [m/s], v_y [m/s], r [rad/s], delta_f and delta_r [rad]; v_y_dot [m/s^2] and r_dot [rad/s^2]
@@ -67,7 +67,7 @@ class Steering(NamedTuple):
     correlation: float
 
 
-def windows(recording: Recording) -> Windows:
+def windows(recording: Recording) -> Means:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
     No window reaches from one stretch into the next.
@@ -91,7 +91,7 @@ def windows(recording: Recording) -> Windows:
         return slopes
 
     v_y, force = recording.logged_v_y, recording.axle_force
-    return Windows(
+    return Means(
         v_x=mean(recording.v_x),
         v_y=None if v_y is None else mean(v_y),
         r=mean(recording.r),
@@ -136,7 +136,7 @@ def correlation(a: Array, b: Array) -> float:
     return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)
 
 
-def steering(w: Windows) -> Steering | None:
+def steering(w: Means) -> Steering | None:
     """Effective wheelbase sqrt(sum (v_x delta)^2 / sum r^2), or None when nothing turns.
 
     It is the wheelbase L of a neutral car; understeer adds K v_x^2. Samples with the tail out,
@@ -149,7 +149,7 @@ def steering(w: Windows) -> Steering | None:
     return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
 
 
-def onset(w: Windows) -> Steering | None:
+def onset(w: Means) -> Steering | None:
     """Return the same from the windows with less than half the usual peak steering, or None.
 
     A car that slides over its front wheels reads long at large steering and normal here.
@@ -162,7 +162,7 @@ def onset(w: Windows) -> Steering | None:
     return _wheelbase(w, size < 0.5 * np.percentile(size, 95))
 
 
-def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
+def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     """Return the effective wheelbase over some of the windows, None without excitation."""
     if w.v_y is not None:
         tail_out = (w.v_y * w.r < 0.0) & (np.abs(w.v_y) > TAIL_OUT * w.v_x)
