@@ -50,7 +50,7 @@ from identifier.doctor import Finding
 from models.recordings import Recording, Repair, check_against_vehicle
 from models.vehicle import Vehicle
 
-CARS = 2  # of each class; on half of their drives a lane change, on half a slalom
+CARS = 1  # of each class; every other of all drives a slalom, the rest a lane change
 CLEAN = 12  # drives of each class without a fault
 WORSE, SMALL = 1.2, 5.0  # times the error without the fault; % that is good whatever that was
 LATE = (0.07, 0.12)  # s, of the inertial unit
@@ -347,7 +347,7 @@ def main() -> int:
     parser.add_argument("--no-recordings", action="store_true", help="drives of the plant only")
     options, targets = parser.parse_args(), Targets("doctor")
     first = options.first
-    jobs = [(kind, first + k) for kind in CLASSES for k in range(options.cars)]
+    jobs = [(kind, first + i + k) for i, kind in enumerate(CLASSES) for k in range(options.cars)]
     clean = [(kind, first + 500 + k) for kind in CLASSES for k in range(options.clean)]
     with ProcessPoolExecutor(PROCESSES) as pool:
         outcomes = []

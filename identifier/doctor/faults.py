@@ -273,11 +273,17 @@ class Search:
         some = self.promised(base)[: RULES.fitted]
         listed += [self.fitted(one, base, begin) for _, one, begin in some]
         # A low pass is a delay but for its bend: it is asked where a delay is.
-        best = max(listed, key=lambda one: one.gain, default=None)
-        if best is not None and best.suspect.code == "delay" and best.gain > RULES.gain:
-            for one in self.left(of_model=True):
-                if (one.code, one.channel) == ("lag", best.suspect.channel):
-                    listed.append(self.fitted(one, base, max(best.value, 0.0)))
+        enough = max(RULES.gain, 0.5 * max((one.gain for one in listed), default=0.0))
+        late = {
+            one.suspect.channel: max(one.value, 0.0)
+            for one in listed
+            if one.suspect.code == "delay" and one.gain > enough
+        }
+        listed += [
+            self.fitted(one, base, late[one.channel])
+            for one in self.left(of_model=True)
+            if one.code == "lag" and one.channel in late
+        ]
         return sorted(filter(self.believed, listed), key=lambda one: -one.gain)
 
     def believed(self, one: Candidate) -> bool:

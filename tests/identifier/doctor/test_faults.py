@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.answers import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from identifier.doctor import Finding, examine
@@ -15,7 +16,7 @@ from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
 from identifier.estimate.solve import descend, simulate
 from identifier.motion.parameters import INDEX
-from models.faults import Late, Misaligned, SensorFault, Together
+from models.faults import Lagging, Late, Misaligned, SensorFault, Together
 from models.recordings import Repair
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.conftest import areas_of, pressed
@@ -23,19 +24,19 @@ from tireid.diagnoses import NAMES
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
 SIZED = {
-    "offset v_y": 0.02,
-    "offset r": 0.002,
-    "offset a_y": 0.05,
-    "offset delta_f": 0.001,
-    "factor v_x": 0.05,
-    "factor delta_f": 0.05,
-    "delay r": 0.006,
-    "delay delta_f": 0.012,
-    "delay a_y": 0.006,
-    "misaligned": 0.0017,
-    "velocity sensor": 0.1,
-    "accelerometer": 0.1,
-    "bank": 0.005,
+    "offset v_y": 0.008,
+    "offset r": 0.0015,
+    "offset a_y": 0.01,
+    "offset delta_f": 0.0008,
+    "factor v_x": 0.025,
+    "factor delta_f": 0.02,
+    "delay r": 0.003,
+    "delay delta_f": 0.003,
+    "delay a_y": 0.004,
+    "misaligned": 0.0006,
+    "velocity sensor": 0.06,
+    "accelerometer": 0.04,
+    "bank": 0.003,
 }
 
 
@@ -139,6 +140,16 @@ def test_two_faults_at_once_are_both_found(driven):
     assert codes["offset", "delta_f"] == pytest.approx(0.02, abs=0.002)
 
 
+def test_a_slow_yaw_rate_is_found_where_a_place_of_the_accelerometer_explains_more_than_a_delay():
+    drive = drawn("sedan", 8001)
+    log = replace(drive.log(np.random.default_rng([8001, 1])), axle_force=None)
+    slow = Lagging(channels=("r",), time_constant=0.16).apply(log)
+    (found, *others) = found_in(slow, drive.car.told)
+    assert (found.code, found.channel) == ("lag", "r")
+    assert found.size == pytest.approx(0.16, abs=0.02)
+    assert not any(one.code == "acceleration_sensor_x" for one in others)
+
+
 def test_an_inertial_unit_that_is_late_is_one_fault(driven):
     car, log, _ = driven
     found = found_in(Late(channels=("r", "a_y"), delay=0.09).apply(log), car)
@@ -180,10 +191,12 @@ def test_a_number_of_the_car_is_a_note_and_neither_an_alarm_nor_sure(driven):
     assert found.to_dict()["note"] is True
 
 
-def test_swapped_lengths_are_a_note_that_names_the_swap(driven):
-    car, log, _ = driven
-    assert abs(car.l_f - car.l_r) > 0.35
-    (found, *_) = found_in(log, replace(car, l_f=car.l_r, l_r=car.l_f))
+def test_swapped_lengths_are_a_note_that_names_the_swap():
+    drive = drawn_everyday("sedan", "lane change", 7000)
+    log, car = drive.log(np.random.default_rng([7000, 1])), drive.car.told
+    assert abs(car.l_f - car.l_r) > 0.5
+    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
+    (found, *_) = found_in(replace(log, axle_force=None), swapped)
     assert found.code == "center_of_gravity" and found.note and not found.matters
     assert "as if they were swapped" in found.text
     shift = next(one for one in SUSPECTS if one.code == "center_of_gravity")
