@@ -56,6 +56,7 @@ NAMES = {  # of findings by their code, where the code is not the word
 }
 
 GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
+OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
@@ -163,14 +164,23 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
 def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdict:
     """Return a verdict that does not pass over what the doctor is sure of.
 
-    A unit, a sign or a ratio that is surely wrong refuses the answer; a sure size is noted.
+    A unit, a sign, a ratio or a factor of v_x that is surely wrong refuses the answer; another sure
+    size is noted.
 
     Parameters
     ----------
     repair : that was taken out of it before: nothing of that speaks against the answer.
     """
     left = [] if repair else [one for one in diagnosis.findings if one.sure]
-    said = [Objection("doctor", None, f"doctor: {one.text}", one.code in GROSS) for one in left]
+    said = [
+        Objection(
+            "doctor",
+            None,
+            f"doctor: {one.text}",
+            one.code in GROSS or (one.code, one.channel) == OF_ALL_FORCES,
+        )
+        for one in left
+    ]
     ordered = sorted([*verdict.findings, *said], key=lambda one: not one.refuses)
     return replace(verdict, findings=tuple(ordered)) if said else verdict
 

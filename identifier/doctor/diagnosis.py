@@ -21,7 +21,7 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-ROUNDS, SETTLED = 4, 0.02  # to which the ratio of a steering wheel is settled
+ROUNDS, SETTLED = 2, 0.02  # to which the ratio of a steering wheel is settled
 WIDE = 1.0  # of that ratio, by which the screen may be off
 ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
 SURELY = 0.9  # confidence that a law is broken

@@ -159,11 +159,16 @@ class Problem:
                 on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
                 J = np.concatenate([J, of_road * on[:, None, :]], axis=2)
             slopes.append(J)
-        size = self.size[:, None]
+        missed, slope = np.concatenate(e), np.concatenate(slopes)
+        # To shrink v_x shrinks what is missed, and explains nothing: its size shrinks alike.
+        shrunk = min(1.0 + float(p[INDEX["v_x_factor"]]), 1.0)
+        size = self.size[:, None] * shrunk
+        if shrunk < 1.0:
+            slope[:, :, self.index == INDEX["v_x_factor"]] -= missed[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
             return Residuals(
-                np.nan_to_num(np.concatenate(e) / size, nan=1e3, posinf=1e3, neginf=-1e3),
-                np.nan_to_num(np.concatenate(slopes) / size[..., None]),
+                np.nan_to_num(missed / size, nan=1e3, posinf=1e3, neginf=-1e3),
+                np.nan_to_num(slope / size[..., None]),
             )
 
     def memory(self, e: Array) -> Array:
@@ -173,28 +178,10 @@ class Problem:
         ----------
         e : over b [-], (m, 2).
         """
-        found = np.empty(2)
-        step = self.weight[0]
+        step, x = float(self.weight[0]), np.clip(e, -4.0, 4.0)
         lags = int(LONGEST_MEMORY / step) + 1
-        for axle in range(2):
-            total, begin = np.zeros(lags), 0
-            for length in self.lengths:
-                x = np.clip(e[begin : begin + length, axle], -4.0, 4.0)
-                begin += length
-                if length < 20:
-                    continue
-                size = 1 << (2 * length - 1).bit_length()
-                spectrum = np.fft.rfft(x, size)
-                correlation = np.fft.irfft(np.abs(spectrum) ** 2, size)
-                few = max(min(length // 3, lags - 1), 1)
-                total[:few] += correlation[:few]
-            if not total[0] > 0.0:
-                found[axle] = 2.0
-                continue
-            rho = total / total[0]
-            fallen = rho < 0.05
-            until = int(np.argmax(fallen)) if fallen.any() else lags
-            found[axle] = step * (1.0 + 2.0 * rho[1 : max(until, 1)].sum())
+        edges = np.cumsum(self.lengths)[:-1]
+        found = [autocorrelation_time(np.split(x[:, k], edges), step, lags) for k in range(2)]
         return np.maximum(found, SHORTEST_MEMORY)
 
     def scale(self, e: Array) -> Array:
@@ -241,6 +228,31 @@ def error_size(force: Array) -> Array:
     """Return b, what a good model misses of a force, both in static loads."""
     floor, share = ERROR_SIZE
     return np.hypot(floor, share * force)
+
+
+def autocorrelation_time(pieces: Sequence[Array], step: float, lags: int) -> float:
+    """Return the integrated autocorrelation time of a signal [s]; 2 s where it is zero.
+
+    Parameters
+    ----------
+    pieces : of the signal; such below 20 samples do not count.
+    step : between samples [s].
+    lags : of which at most a third of a piece is looked at.
+    """
+    total = np.zeros(lags)
+    for x in pieces:
+        if x.size < 20:
+            continue
+        size = 1 << (2 * x.size - 1).bit_length()
+        correlation = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2, size)
+        few = max(min(x.size // 3, lags - 1), 1)
+        total[:few] += correlation[:few]
+    if not total[0] > 0.0:
+        return 2.0
+    rho = total / total[0]
+    fallen = rho < 0.05
+    until = int(np.argmax(fallen)) if fallen.any() else lags
+    return step * (1.0 + 2.0 * float(rho[1 : max(until, 1)].sum()))
 
 
 def car_numbers(vehicle: Vehicle) -> Array:

@@ -18,9 +18,9 @@ from models.recordings.evidence import (
     STRIDE,
     WINDOW,
     Fit,
+    Means,
     Pair,
     Steering,
-    Windows,
     correlation,
     course_rate,
     least_squares,
@@ -157,7 +157,7 @@ def world_axes(recording: Recording) -> str | None:
     )
 
 
-def _check_turns(w: Windows) -> str | None:
+def _check_turns(w: Means) -> str | None:
     """Answer with the one of r, steering and a_y that turns the other way than both others.
 
     Of two alone nobody can tell which is wrong: they are named both.
@@ -215,7 +215,7 @@ def _check_two(r_delta: Pair) -> str | None:
     )
 
 
-def _check_lateral_acceleration(w: Windows) -> str | None:
+def _check_lateral_acceleration(w: Means) -> str | None:
     """Answer with a_y that is not v̇_y + v_x r in size.
 
     Regressors: v_x r, v̇_y where v_y was measured, ṙ (a sensor off the center of gravity) and,
@@ -249,17 +249,17 @@ def _check_lateral_acceleration(w: Windows) -> str | None:
     return None
 
 
-def _kinematics(w: Windows) -> Array:
+def _kinematics(w: Means) -> Array:
     """Return v_x r, v̇_y where there is one, and ṙ (k, 2 or 3)."""
     return np.column_stack([one for one in (w.v_x_r, w.v_y_dot, w.r_dot) if one is not None])
 
 
-def _of_v_y(fit: Fit, w: Windows) -> tuple[float, float]:
+def _of_v_y(fit: Fit, w: Means) -> tuple[float, float]:
     """Return the slope on v̇_y and four standard errors of it: 1 ± infinity where there is none."""
     return (1.0, np.inf) if w.v_y_dot is None else (fit.theta[1], 4.0 * fit.error[1])
 
 
-def _turned(dot: float, dot_error: float, w: Windows) -> bool:
+def _turned(dot: float, dot_error: float, w: Means) -> bool:
     """Whether a slope on v̇_y is the -1 of a wrong sign, and v̇_y moves enough to say so."""
     moves = w.v_y_dot is not None and float(np.std(w.v_y_dot)) >= 0.003
     return moves and -2.5 < dot < -0.3 and dot + dot_error < 0.0
@@ -291,7 +291,7 @@ def _blame(slope: float, law: str) -> str:
     return f"ay {law}; check its axis, unit and time stamps, or leave the column ay out"
 
 
-def _check_v_x_r(w: Windows) -> str | None:
+def _check_v_x_r(w: Means) -> str | None:
     """Answer with a centripetal acceleration above 60 m/s^2 in 5 % of the moving windows."""
     largest = float(np.percentile(np.abs(w.v_x_r), 95))
     if largest > LARGEST_V_X_R:
@@ -302,7 +302,7 @@ def _check_v_x_r(w: Windows) -> str | None:
     return None
 
 
-def _check_steering(recording: Recording, w: Windows, turn: Steering) -> str | None:
+def _check_steering(recording: Recording, w: Means, turn: Steering) -> str | None:
     """Answer with steering that turns the wrong way or an effective wheelbase out of all cars.
 
     Upper bound 7.5 m + 0.03 v_x^2 (a bus, with three times a sedan's understeer) where small
@@ -339,7 +339,7 @@ def _too_large(L: float, v: float) -> str:
     return "; or ".join(both)
 
 
-def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) -> str | None:
+def _check_lateral_velocity(recording: Recording, w: Means, turn: Steering) -> str | None:
     """Answer with a center of rotation behind the rear axle: its tires would push outward.
 
     v_y/r is the distance from the center of gravity back to where lateral velocity vanishes,
@@ -360,7 +360,7 @@ def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) ->
     return None
 
 
-def _check_forces(w: Windows, turn: Steering | None) -> str | None:
+def _check_forces(w: Means, turn: Steering | None) -> str | None:
     """Answer with axle forces that push against the acceleration, are swapped, or are in kN.
 
     Needs rms(v̇_y + v_x r) >= 0.3 m/s^2. Signs: correlation below -0.5. Unit: the mass that the
@@ -526,7 +526,7 @@ def _check_rises(alpha: Array, force: Array, column: str, other: str) -> str | N
     return None
 
 
-def _check_rear_rises(alpha: Array, w: Windows, l_r: float, other: str) -> str | None:
+def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | None:
     """Answer with a lateral acceleration that falls with the slip of the rear: by v_y or the car.
 
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.

@@ -23,7 +23,7 @@ LEAST = 0.1  # [m/s^2], rms, below which nothing turns
 TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
-class Windows(NamedTuple):
+class Means(NamedTuple):
     """Window means of the moving part of a recording, each of shape (k,).
 
     v_x [m/s], v_y [m/s], r [rad/s], delta_f and delta_r [rad]; v_y_dot [m/s^2] and r_dot [rad/s^2]
@@ -89,7 +89,7 @@ class Pair(NamedTuple):
     seconds: float
 
 
-def windows(recording: Recording) -> Windows:
+def windows(recording: Recording) -> Means:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
     No window reaches from one stretch into the next.
@@ -113,7 +113,7 @@ def windows(recording: Recording) -> Windows:
         return slopes
 
     v_y, force = recording.logged_v_y, recording.axle_force
-    return Windows(
+    return Means(
         v_x=mean(recording.v_x),
         v_y=None if v_y is None else mean(v_y),
         r=mean(recording.r),
@@ -228,7 +228,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     return (turned, r[fast]) if turned.size * WINDOW >= 2.0 else None
 
 
-def steering(w: Windows) -> Steering | None:
+def steering(w: Means) -> Steering | None:
     """Effective wheelbase sqrt(sum (v_x delta)^2 / sum r^2), or None when nothing turns.
 
     It is the wheelbase L of a neutral car; understeer adds K v_x^2. Samples with the tail out,
@@ -242,7 +242,7 @@ def steering(w: Windows) -> Steering | None:
     return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
 
 
-def proportional(w: Windows) -> bool:
+def proportional(w: Means) -> bool:
     """Whether the car turns the more, the more it is steered: it does not slide over its front.
 
     Large steering, beyond 0.7 of what is usual at most, is compared with 0.3 to 0.7 of that.
@@ -263,7 +263,7 @@ def proportional(w: Windows) -> bool:
     return turned > 0.75 * steered
 
 
-def onset(w: Windows) -> Steering | None:
+def onset(w: Means) -> Steering | None:
     """Return the same from the windows with less than half the usual peak steering, or None.
 
     A car that slides over its front wheels reads long at large steering and normal here.
@@ -276,7 +276,7 @@ def onset(w: Windows) -> Steering | None:
     return _wheelbase(w, size < 0.5 * np.percentile(size, 95))
 
 
-def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
+def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     """Return the effective wheelbase over some of the windows, None without excitation."""
     keep = keep & w.grips
     r, kinematic = w.r, w.v_x * w.delta

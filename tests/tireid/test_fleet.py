@@ -96,7 +96,7 @@ def fleet_model(car):
     usual = Priors.of(car)
     return FittedModel(
         vehicle=car, p=usual.mean, covariance=usual.covariance, driven=np.zeros(2),
-        speeds=np.array([10.0, 20.0]), a_x=np.zeros(2), missed=np.full(2, 0.06),
+        speeds=np.array([10.0, 20.0]), a_x=np.zeros(2), unexplained=np.full(2, 0.6),
     )  # fmt: skip
 
 
