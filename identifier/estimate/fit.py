@@ -166,15 +166,15 @@ class Reach(NamedTuple):
             if not on.any():
                 continue
             if roads is not None:
-                one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
-            driven = simulate(one, found.p, vehicle)
+                here = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+            driven = simulate(one if roads is None else here, found.p, vehicle)
             size = np.abs(driven["slip"][on])
             force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
             e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
             n = max(round(max(later, STRIDE) / one.dt), 1)
-            both = on[n:] & on[:-n]
-            alike += (e[n:] * e[:-n])[both].sum(axis=0)
-            pairs += int(np.count_nonzero(both))
+            together = on[n:] & on[:-n]
+            alike += (e[n:] * e[:-n])[together].sum(axis=0)
+            pairs += int(np.count_nonzero(together))
             k = min(max(round(REACHED / one.dt), 1), len(size))
             slip = np.maximum(slip, np.partition(size, len(size) - k, axis=0)[-k])
             for both, column in ((speeds, 0), (a_x, 5)):

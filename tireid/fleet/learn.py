@@ -408,8 +408,8 @@ def _of_model(model: FittedModel) -> dict[str, Any]:
         for axle, value in zip(AXLES, both, strict=True)
     }
     text = json.dumps(model.to_dict(), ensure_ascii=False)
-    numbers = model.driven, model.speeds, model.a_x, model.unexplained
-    reach = [value for one in numbers for value in one.tolist()]
+    reached = model.driven, model.speeds, model.a_x, model.unexplained
+    reach = [value for one in reached for value in one.tolist()]
     return {**told, "model": text, "reach": reach}
 
 
