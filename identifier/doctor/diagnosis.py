@@ -6,10 +6,12 @@ from typing import Any
 
 from identifier.doctor.faults import Examination, examine, prepared
 from identifier.doctor.finding import Finding
+from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import (
     NEAR,
     Screened,
     before_sizes,
+    clock_findings,
     combined,
     doubted,
     screen,
@@ -105,8 +107,8 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
         return Diagnosis(name=recording.name, findings=(finding,), unseen=NEVER)
     if recording.logged_v_y is None:
-        contradicts = tuple(_contradictions(recording, vehicle))
-        return Diagnosis(name=recording.name, findings=contradicts, unseen=(WITHOUT_V_Y, *NEVER))
+        found = (*_contradictions(recording, vehicle), *_samples(recording))
+        return Diagnosis(name=recording.name, findings=found, unseen=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
     found, fine = list(gross.findings), Examination()
@@ -154,6 +156,11 @@ def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     blind = replace(recording, axle_force=None)
     said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
     return [] if said is None else [Finding(code="contradiction", confidence=SURELY, text=said)]
+
+
+def _samples(recording: Recording) -> list[Finding]:
+    """Return what is wrong with the samples of a log without a v_y."""
+    return clock_findings(recording) or sample_findings(recording)
 
 
 def _told_once(findings: list[Finding]) -> list[Finding]:

@@ -66,10 +66,18 @@ class Rules:
 
 RULES = Rules()
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
+SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
-    "sizes of faults: no tire explains the front axle, whichever of them is taken out: a steering "
-    "angle that was commanded and not measured, play, or several faults at once",
-    "sizes of faults: no tire explains the rear axle, whichever of them is taken out",
+    (
+        "delta_f",
+        "no tire explains the front axle, whichever fault is taken out: a steering angle that "
+        "was commanded and not measured, play, or several faults at once",
+    ),
+    (
+        "",
+        "no tire explains the rear axle, whichever fault is taken out: several faults at once, or "
+        "another car",
+    ),
 )
 
 
@@ -484,7 +492,10 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
     worst = search.problem.share_missed(post.p)
     if worst.max() > RULES.unexplained:
-        return Examination(unseen=(UNEXPLAINED[int(np.argmax(worst))],), taken=taken)
+        channel, text = UNEXPLAINED[int(np.argmax(worst))]
+        share = f"{100.0 * worst.max():.0f} % of its force is missed (usual: below 12 %)"
+        one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")
+        return Examination((one,), (SIZES_BLIND,), taken)
     found = list(search.findings(post))
     if search.accelerometer is not None:
         found = _of_one_device(found, vehicle)

@@ -339,12 +339,14 @@ def test_a_yaw_inertia_that_the_file_leaves_out_was_estimated_and_not_told():
     assert suspect.words(1.35, 0.1, left_out).startswith("the estimated yaw inertia is 1.35")
 
 
-def test_a_log_that_no_fault_explains_has_none_and_says_so(driven):
+def test_a_log_that_no_fault_explains_is_found_to_be_one(driven):
     """The steering is what a servo was told, which went another way."""
     car, log, _ = driven
     said = examine(replace(log, delta_f=log.delta_f[::-1].copy()), car)
-    assert said.findings == ()
-    assert "front axle" in said.unseen[0] and "commanded" in said.unseen[0]
+    (found,) = said.findings
+    assert found.matters and found.code == "no_tire" and found.channel == "delta_f"
+    assert "front axle" in found.text and "commanded" in found.text
+    assert said.unseen == ("sizes of faults: no tire explains the log",)
 
 
 def test_what_a_straight_drive_cannot_tell_is_said(driven):
