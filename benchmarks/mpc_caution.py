@@ -127,7 +127,6 @@ def conditions(case: Case) -> Conditions:
     setup = make_setup(
         path,
         vehicle=car,
-        plant="double-track",
         mu=1.0,
         drops=[(place, WET)] if wet else [],
         wish=SpeedWish(None, speed),

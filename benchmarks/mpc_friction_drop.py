@@ -107,7 +107,6 @@ def conditions(case: Case) -> Conditions:
     setup = make_setup(
         path,
         vehicle=None,
-        plant="double-track",
         mu=DRY,
         drops=[(case.place, WET)],
         wish=SpeedWish(None, speed),

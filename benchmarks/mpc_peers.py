@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, Protocol
 import casadi as ca
 import numpy as np
 
+from benchmarks.converged import build_errors
 from benchmarks.mpc_double_lane_change import PROBLEM, SPEED
 from codegen import load_library
 from codegen.arrays import Array
-from mpc.converged import build_errors
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
 from mpc.realtime.instance import FLAGS, tracker_source

@@ -99,14 +99,13 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
     from codegen import CompilationError
     from identifier.export import compiled, processor
-    from mpc.converged import NotConvergedError
     from mpc.realtime import instance
     from tireid.exporting import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
         *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
-        *(processor.ReplayError, NotConvergedError, SelfTestError),
+        *(processor.ReplayError, SelfTestError),
     )
 
 

@@ -17,7 +17,7 @@ from models.plant import Plant
 from models.sensors import Sensor, SensorError
 from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
-from mpc.cars.car import CarState
+from mpc.cars import CarState
 from mpc.path.path import Path
 
 EXACT = Sensor()

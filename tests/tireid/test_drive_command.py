@@ -209,7 +209,6 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
         (["--network-iso"], "go with --network"),
-        (["--plant", "drift", "--vehicle", "car.toml"], "--plant drift brings a car of its own"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -223,12 +222,6 @@ def test_a_car_without_a_chassis_is_refused(bend, tmp_path, capsys):
     replace(sedan(), chassis=None).to_toml(tmp_path / "flat.toml")
     words = ["--path", bend, "--vehicle", tmp_path / "flat.toml", "--out", tmp_path / "out"]
     assert "chassis" in refusal(capsys, words)
-
-
-def test_a_plant_whose_package_is_missing_says_what_to_install(bend, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "vehiclemodels.parameters_vehicle2", None)
-    words = ["--path", bend, "--plant", "multi-body", "--out", tmp_path / "out"]
-    assert "pip install commonroad-vehicle-models (" in refusal(capsys, words)
 
 
 def test_without_a_compiler_it_says_what_is_missing(bend, tmp_path, capsys, monkeypatch):

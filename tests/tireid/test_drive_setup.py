@@ -16,7 +16,7 @@ LANE = Path.from_waypoints(LANE_X, 2.0 * np.tanh((LANE_X - 40.0) / 6.0), name="l
 
 
 def setup(path, wish, drops=(), mu=1.0):
-    return Setup(path=path, vehicle=sedan(), plant="double-track", mu=mu, drops=drops, wish=wish)
+    return Setup(path=path, vehicle=sedan(), mu=mu, drops=drops, wish=wish)
 
 
 def test_at_a_constant_speed_the_car_is_expected_after_way_over_speed_in_any_lap():

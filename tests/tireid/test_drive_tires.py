@@ -25,7 +25,6 @@ def setup():
     return Setup(
         path=LANE,
         vehicle=CAR,
-        plant="double-track",
         mu=0.9,
         drops=((60.0, 0.4),),
         wish=SpeedWish(None, 16.0),

@@ -124,7 +124,6 @@ def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, floa
     return Setup(
         path=BUILT_IN[path](),
         vehicle=story.car,
-        plant="double-track",
         mu=1.0,
         drops=drops,
         wish=SpeedWish(share, None),

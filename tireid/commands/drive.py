@@ -39,7 +39,7 @@ from tireid.driving.runs import (
     require_compiler,
     run_drive,
 )
-from tireid.driving.setup import PERIOD, PLANTS
+from tireid.driving.setup import PERIOD, PLANT
 from tireid.output import output_folder
 from tireid.progress import say, tell
 from tireid.reports.drive import write_drive_report
@@ -60,7 +60,7 @@ def headline(conditions: Conditions) -> str:
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
-        f"{setup.plant} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
         f"{noise}, seed {conditions.seed}"
     )
 
@@ -90,7 +90,7 @@ def inputs_of(
         "tires": list(labels),
         "frozen": source,
         "weights_hash": None if learnt is None else digest(learnt.to_dict()),
-        "plant": setup.plant,
+        "plant": PLANT,
         "vehicle": vehicle_numbers(setup.vehicle),
         "chassis": _chassis(setup.vehicle),
         "delay_ms": 1e3 * PERIOD * conditions.delay,
@@ -173,14 +173,6 @@ def add_parser(commands: Any) -> None:
     add_weights(parser, "the frozen tires, as identified")
     add_method(parser)
     add_vehicle(parser)
-    parser.add_argument(
-        "--plant",
-        choices=PLANTS,
-        default=PLANTS[0],
-        metavar="NAME",
-        help=f"what is driven: {', '.join(PLANTS)}; the last two need commonroad-vehicle-models "
-        "(%(default)s)",
-    )
     parser.add_argument(
         "--delay",
         type=float,

@@ -156,11 +156,9 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
     _require_one_source(options)
-    _require_its_own(options.plant, options.vehicle)
     setup = make_setup(
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
-        plant=options.plant,
         mu=require_friction("--mu", options.mu),
         drops=[parse_drop(text) for text in options.mu_drop],
         wish=parse_speed(options.speed),
@@ -219,7 +217,6 @@ def make_setup(
     path: Path,
     *,
     vehicle: Vehicle | None,
-    plant: str,
     mu: float,
     drops: Sequence[tuple[float, float]],
     wish: SpeedWish,
@@ -228,34 +225,22 @@ def make_setup(
 
     Parameters
     ----------
-    vehicle : the car; None takes the built-in sedan, or the car of the plant.
-    plant : of `PLANTS`.
+    vehicle : the car; None takes the built-in sedan.
     mu : friction before the first drop [-].
     drops : arc length [m] and friction from there on.
 
     Raises
     ------
     ValueError
-        Where the plant brings its own car, or a drop is beyond the path.
+        Where a drop is beyond the path, or the car has no chassis.
     """
     ordered = tuple(sorted(drops))
     for s, _ in ordered:
         if not path.closed and s >= path.length:
             raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
-    if plant == "double-track":
-        car = vehicle or sedan()
-        car.require_chassis()
-    else:
-        _require_its_own(plant, vehicle)
-        from mpc.cars.bmw import bmw
-
-        car = bmw()
-    return Setup(path=path, vehicle=car, plant=plant, mu=mu, drops=ordered, wish=wish)
-
-
-def _require_its_own(plant: str, vehicle: object | None) -> None:
-    if plant != "double-track" and vehicle is not None:
-        raise ValueError(f"--plant {plant} brings a car of its own: give no --vehicle with it")
+    car = vehicle or sedan()
+    car.require_chassis()
+    return Setup(path=path, vehicle=car, mu=mu, drops=ordered, wish=wish)
 
 
 def frozen_tires(
@@ -305,11 +290,6 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
     if learnt.bicycle == setup.vehicle.bicycle:
         return
     mine = f"{options.weights} was learnt on the car {learnt.name!r}, driven is "
-    if setup.plant != "double-track":
-        raise ValueError(
-            f"{mine}the {setup.vehicle.name!r} that --plant {setup.plant} brings: leave --weights "
-            "out to learn on it first"
-        )
     driven = setup.vehicle
     apart = "; ".join(
         f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"

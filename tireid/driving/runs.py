@@ -426,7 +426,6 @@ def drive(
     setup = Setup(
         path=path,
         vehicle=vehicle,
-        plant="double-track",
         mu=require_friction("friction", friction),
         drops=(),
         wish=SpeedWish(share if speed is None else None, speed),

@@ -3,7 +3,7 @@
 Grip is that of the true tire in steady cornering on the friction of the start.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple, cast
@@ -20,7 +20,7 @@ from mpc.loop.sensing import cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
 
-PLANTS = ("double-track", "multi-body", "drift")
+PLANT = "double-track"
 FASTEST = 30.0  # on a closed course [m/s]
 ACCELERATION, BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
 PERIOD = 0.01  # control period [s]
@@ -39,14 +39,12 @@ class Setup:
 
     Parameters
     ----------
-    plant : which equations drive, of `PLANTS`.
     mu : friction of the road over that of the tire's measurement, before the first drop [-].
     drops : arc length [m] and friction from there on.
     """
 
     path: Path
     vehicle: Vehicle
-    plant: str
     mu: float
     drops: tuple[tuple[float, float], ...]
     wish: SpeedWish
@@ -54,12 +52,7 @@ class Setup:
     def car(self, *, open_field: bool = False) -> Car:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
-        if self.plant == "double-track":
-            return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
-        from mpc.cars.commonroad import drift_car, multi_body_car
-
-        make: Callable[..., Car] = multi_body_car if self.plant == "multi-body" else drift_car
-        return make(friction=friction, period=PERIOD)
+        return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
 
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.

@@ -204,7 +204,7 @@ def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does():
 def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
     path = iso_3888_2()
     wish = SpeedWish(0.9, None)
-    setup = Setup(path=path, vehicle=CAR, plant="double-track", mu=1.0, drops=(), wish=wish)
+    setup = Setup(path=path, vehicle=CAR, mu=1.0, drops=(), wish=wish)
     told = told_tire(LEARNING, setup, fitted)
     learner = make_learner(fitted, CAR)
     handed = prediction_tire(learner.supervisor.identifier.model())

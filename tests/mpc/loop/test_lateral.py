@@ -14,8 +14,7 @@ from models.faults import FaultError, SensorFault
 from models.friction import Friction, FrictionChange
 from models.recordings import Recording
 from models.vehicle import GRAVITY, sedan
-from mpc.cars import DoubleTrackCar
-from mpc.cars.car import CarState
+from mpc.cars import CarState, DoubleTrackCar
 from mpc.handover import Learner, Supervisor
 from mpc.loop import (
     CarSensors,

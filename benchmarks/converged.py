@@ -1,4 +1,4 @@
-"""The tracker's problem solved to convergence by IPOPT: slow, and right. The oracle of the tests.
+"""The tracker's problem solved to convergence by IPOPT: slow, and right.
 
 Multiple shooting with the exact cost and `build_rk4`; soft limits by slack variables.
 """
@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
-from codegen.errors import TireidError
 from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
 from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
@@ -19,7 +18,7 @@ from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
 N_SOFT = 3  # e_y, slip in front, slip at the rear
 
 
-class NotConvergedError(TireidError, RuntimeError):
+class NotConvergedError(RuntimeError):
     """IPOPT did not find a solution; the message holds what it said."""
 
 

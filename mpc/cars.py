@@ -1,4 +1,4 @@
-"""What every car that can be driven has in common: a state, and a step of one control period."""
+"""Cars to drive that are not the prediction model: a state, and a step of one control period."""
 
 from typing import Any, NamedTuple, Protocol
 

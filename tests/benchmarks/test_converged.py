@@ -8,8 +8,8 @@ interior point there.
 import numpy as np
 import pytest
 
+from benchmarks.converged import NotConvergedError, build_errors, numbers, solve_converged
 from models.vehicle import sedan
-from mpc.converged import NotConvergedError, build_errors, numbers, solve_converged
 from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
 from mpc.realtime import Status, Tracker
