@@ -16,9 +16,9 @@ import numpy as np
 from benchmarks.mpc_stress import DELAY, PERIOD, PROBLEM, stress, tires
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
-from identifier.export.processor import missing_tools
+from codegen.processor import Replay, missing_tools, replay
 from mpc.export.package import MpcPackage, build_mpc_package
-from mpc.export.processor import Replay, replay_on_processor
+from mpc.export.processor import PROCESSOR, vectors_program
 from mpc.realtime.instance import input_type, params_type
 
 STEPS = 200  # of each tire
@@ -78,7 +78,8 @@ def replayed(
         "src/tireid_mpc_tables.h": changed,
         "tests/tireid_mpc_vectors.h": as_vectors(inputs),
     }
-    return replay_on_processor(package._replace(files=files), single=True, steps=len(inputs))
+    program = vectors_program(package._replace(files=files), steps=len(inputs))
+    return replay(program, PROCESSOR, single=True)
 
 
 def main(*, keep: bool = False) -> int:

@@ -97,8 +97,8 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
-    from codegen import CompilationError
-    from identifier.export import compiled, processor
+    from codegen import CompilationError, processor
+    from identifier.export import compiled
     from mpc.realtime import instance
     from tireid.exporting import SelfTestError
 

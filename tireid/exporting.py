@@ -10,16 +10,17 @@ from typing import NamedTuple
 
 from codegen import find_compiler
 from codegen.errors import TireidError
+from codegen.processor import Cost, with_figures
 from codegen.writing import write_file
 from identifier.export.package import Package, build_package, readme
-from identifier.export.processor import Cost, figures_text, measure, with_figures
+from identifier.export.processor import figures_text, measure
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import continuing
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
 from mpc.export.pair import build_pair, frozen_start
-from mpc.export.processor import measure_mpc, mpc_figures_text, time_here, with_mpc_figures
+from mpc.export.processor import measure_mpc, mpc_figures_text, time_here
 from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
 from tireid.progress import Progress
@@ -49,13 +50,7 @@ class Exported:
     told: tuple[str, ...]
 
     def __str__(self) -> str:
-        lines = []
-        for cost in self.costs:
-            kind = "float" if cost.single else "double"
-            lines.append(
-                f"{cost.processor}, {kind}: {cost.replay.instructions} instructions a step, "
-                f"{cost.flash} B flash, {cost.ram} B RAM, {cost.replay.stack} B stack"
-            )
+        lines = [f"{cost.processor}, {cost.precision}: {cost.words}" for cost in self.costs]
         wrote = f"wrote {self.folder}/, hash {self.package.about['hash']}"
         step = self.package.specialized
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
@@ -279,17 +274,11 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     costs, times = measure_mpc(tracker), time_here(tracker)
     manifest = f"{tracker.name}.json"
     texts = {**tracker.files, "README.md": mpc_readme(tracker, mpc_figures_text(costs, times))}
-    texts[manifest] = with_mpc_figures(texts[manifest], costs)
+    texts[manifest] = with_figures(texts[manifest], costs)
     _write_texts(folder, pair.files)
     _write_texts(folder / TRACKER, texts)
     return [
-        *(
-            f"{cost.processor}, {'float' if cost.single else 'double'}: {tracker.name} takes "
-            f"{cost.replay.instructions} instructions a step, {cost.flash} B flash, "
-            f"{cost.replay.state + cost.replay.params + cost.replay.work} B RAM, "
-            f"{cost.replay.stack} B stack"
-            for cost in costs
-        ),
+        *(f"{one.processor}, {one.precision}: {tracker.name} takes {one.words}" for one in costs),
         f"this machine: {tracker.name} takes {times.median:.0f} us a step, hash "
         f"{tracker.about['hash']}",
     ]

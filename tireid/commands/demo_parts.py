@@ -8,16 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen import find_compiler
+from codegen.processor import CROSS_COMPILER, EMULATOR, Cost, missing_tools
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import Package, build_package
-from identifier.export.processor import (
-    CROSS_COMPILER,
-    EMULATOR,
-    Cost,
-    figures_text,
-    measure,
-    missing_tools,
-)
+from identifier.export.processor import figures_text, measure
 from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
@@ -216,8 +210,7 @@ def shipped_text(shipped: Shipped) -> str:
         for check in shipped.checks
     ] or [f"  {NOT_BUILT}"]
     lines += [
-        f"  {cost.processor}, {_precision(cost)}: {cost.replay.instructions} instructions a step, "
-        f"{cost.flash} B flash, {cost.replay.stack} B stack"
+        f"  {cost.processor}, {cost.precision}: {cost.words}"
         for cost in shipped.costs
         if cost.single
     ]
@@ -270,10 +263,10 @@ def package_section(shipped: Shipped) -> Section:
                 rows=[
                     [
                         cost.processor,
-                        _precision(cost),
+                        cost.precision,
                         f"{cost.replay.instructions}",
                         f"{cost.flash}",
-                        f"{cost.replay.state + cost.replay.params}",
+                        f"{cost.ram}",
                         f"{cost.replay.stack}",
                     ]
                     for cost in shipped.costs
@@ -284,7 +277,3 @@ def package_section(shipped: Shipped) -> Section:
         missing = ", ".join(missing_tools())
         blocks.append(Paragraph(text=f"Costs on Arm are not measured, missing: {missing}."))
     return Section(heading="What was learnt becomes C for a controller", blocks=blocks)
-
-
-def _precision(cost: Cost) -> str:
-    return "float" if cost.single else "double"
