@@ -67,6 +67,7 @@ def export(
     source: Run | TireModel | Method,
     folder: str | PathLike[str],
     *,
+    start: TireModel | None = None,
     vehicle: Vehicle | None = None,
     name: str = "tireid",
     single: bool = False,
@@ -85,6 +86,7 @@ def export(
     source : a run, whose method goes on from its end; a tire model, from which the method that
         made it goes on; or a method, which begins afresh. From a fit the axle identifier goes on.
     folder : to write.
+    start : model that a method begins with; None begins afresh.
     vehicle : the car; None takes that of the run or the model, for a method the sedan.
     name : prefix of every symbol.
     single : float unless the build says double.
@@ -107,9 +109,6 @@ def export(
         Where it cannot be written.
     """
     target = Path(folder)
-    if not overwrite and target.is_dir() and any(target.iterdir()):
-        raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
-    start: TireModel | None = None
     if isinstance(source, Run):
         method, car = source.method, vehicle or source.vehicle
         try:
@@ -123,69 +122,18 @@ def export(
         method = continuing(source, car)
     else:
         method, car = source, vehicle or sedan()
-    return export_method(
-        method,
-        car,
-        start,
-        target,
-        name=name,
-        single=single,
-        with_a_y=with_a_y,
-        band=band,
-        fmu=fmu,
-        onnx=onnx,
-        mpc=mpc,
-        caution=caution,
-        overwrite=overwrite,
-    )
-
-
-def export_method(
-    method: Method,
-    vehicle: Vehicle,
-    start: TireModel | None,
-    folder: Path,
-    *,
-    name: str,
-    single: bool,
-    with_a_y: bool,
-    band: bool,
-    fmu: bool,
-    onnx: bool,
-    mpc: bool,
-    caution: float,
-    overwrite: bool,
-) -> Exported:
-    """Write a method as C.
-
-    Parameters
-    ----------
-    start : model to begin with; None begins afresh.
-    single : float unless the build says double.
-    with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
-    band : half the width of the band around each force is an output too, calibrated as `start` is.
-    fmu : also FMUs 2.0 and 3.0.
-    caution : of that tracker, from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where what is asked for cannot be made of the method.
-    OSError
-        Where the folder cannot be written.
-    """
     parts = [word for word, on in (("mpc", mpc), ("fmu", fmu), ("onnx", onnx)) if on]
     lasts = {title: seconds for title, seconds, wanted in PARTS if wanted in ("", *parts)}
     with (
         Progress("export", lasts, long=True) as progress,
-        output_folder(folder, force=overwrite) as scratch,
+        output_folder(target, force=overwrite) as scratch,
     ):
         package = build_package(
-            method, vehicle, start, name=name, single=single, with_a_y=with_a_y, with_band=band
+            method, car, start, name=name, single=single, with_a_y=with_a_y, with_band=band
         )
         if onnx:  # what cannot be made is refused before costs are measured
             progress.begin(NETWORK)
-            _write_onnx(scratch, method, vehicle, package, start, band=band)
+            _write_onnx(scratch, method, car, package, start, band=band)
         if mpc:
             frozen_start(package)  # likewise
         costs = measure(package, progress.begin(COSTS))
@@ -206,7 +154,7 @@ def export_method(
                     version,
                 )
                 progress.step(2)
-    return Exported(folder=folder, package=package, costs=tuple(costs), told=tuple(told))
+    return Exported(folder=target, package=package, costs=tuple(costs), told=tuple(told))
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:

@@ -37,6 +37,10 @@ class OutputError(TireidError, ValueError):
     """The output folder cannot be used; the message says why and what to do."""
 
 
+class NotEmptyError(TireidError, FileExistsError):
+    """The output folder holds what an earlier run wrote, and is not to be replaced."""
+
+
 class Written(NamedTuple):
     """What a marker lists: size and SHA-256 of files, and folders, by path."""
 
@@ -132,8 +136,9 @@ def _require_replaceable(target: Path, final: Path, force: bool) -> None:
             "choose another folder"
         )
     if any(final.iterdir()) and not force:
-        raise OutputError(
-            f"{target} is not empty: choose another folder, or add --force to replace"
+        raise NotEmptyError(
+            f"{target} is not empty: choose another folder, or add --force to replace (in Python, "
+            "overwrite=True replaces it)"
         )
 
 
@@ -227,7 +232,7 @@ def _put_in_place(new: Path, target: Path, final: Path, *, force: bool, aside: P
             return
         _require_replaceable(target, final, force)
         _swap(new, target, final, aside=aside)
-    except OutputError as error:
+    except (OutputError, NotEmptyError) as error:
         kept = _kept_elsewhere(new, final)
         raise OutputError(f"{error}; what this run computed is in {kept}") from None
     _discard(aside)

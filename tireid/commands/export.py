@@ -19,7 +19,7 @@ from tireid.commands.options import (
     read_vehicle,
     say_estimates,
 )
-from tireid.exporting import export_method
+from tireid.exporting import export
 from tireid.progress import say
 from tireid.verdicts import warn_of_stored
 
@@ -75,11 +75,11 @@ def run(options: argparse.Namespace) -> None:
         warn_of_stored(options.weights)
     vehicle = _vehicle(options, start)
     method = _method(options, vehicle, start)
-    exported = export_method(
+    exported = export(
         method,
-        vehicle,
-        start,
         options.out,
+        start=start,
+        vehicle=vehicle,
         name=options.name,
         single=options.single,
         with_a_y=options.with_a_y,
