@@ -37,7 +37,7 @@ class OutputError(TireidError, ValueError):
     """The output folder cannot be used; the message says why and what to do."""
 
 
-class NotEmptyError(TireidError, FileExistsError):
+class NotEmptyError(OutputError, FileExistsError):
     """The output folder holds what an earlier run wrote, and is not to be replaced."""
 
 
@@ -232,7 +232,7 @@ def _put_in_place(new: Path, target: Path, final: Path, *, force: bool, aside: P
             return
         _require_replaceable(target, final, force)
         _swap(new, target, final, aside=aside)
-    except (OutputError, NotEmptyError) as error:
+    except OutputError as error:
         kept = _kept_elsewhere(new, final)
         raise OutputError(f"{error}; what this run computed is in {kept}") from None
     _discard(aside)
