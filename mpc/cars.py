@@ -82,11 +82,6 @@ class Car(Protocol):
         ----------
         command : angle asked of the front road wheels [rad].
         v_ref : wanted speed [m/s].
-
-        Raises
-        ------
-        ArithmeticError
-            When the car left the range of its equations.
         """
 
 
@@ -131,13 +126,7 @@ class DoubleTrackCar:
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
-        """Return the car one period later.
-
-        Raises
-        ------
-        PlantError
-            When a state stops being a finite number.
-        """
+        """Return the car one period later."""
         return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
     def _state(self, plant: PlantState) -> CarState:

@@ -97,12 +97,7 @@ def size_text(finding: Finding) -> str:
 
 
 def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
-    """Return a diagnosis as lines of text.
-
-    Parameters
-    ----------
-    unseen : whether what the log cannot tell stands below.
-    """
+    """Return a diagnosis as lines of text."""
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
@@ -164,10 +159,6 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
     """Return a verdict that does not pass over what the doctor is sure of.
 
     A unit, a sign or a ratio that is surely wrong refuses the answer; a sure size is noted.
-
-    Parameters
-    ----------
-    repair : that was taken out of it before: nothing of that speaks against the answer.
     """
     left = [] if repair else [one for one in diagnosis.findings if one.sure]
     said = [Objection("doctor", None, f"doctor: {one.text}", one.code in GROSS) for one in left]

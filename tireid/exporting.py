@@ -158,14 +158,7 @@ def export(
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:
-    """Write a package.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    figures : what it costs, as Markdown.
-    costs : what it costs, for the JSON file.
-    """
+    """Write a package."""
     manifest = f"{package.specialized.name}.json"
     texts = {**package.files, "README.md": readme(package, figures)}
     _write_texts(folder, {**texts, manifest: with_figures(texts[manifest], costs)})
@@ -205,14 +198,8 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
 
     Parameters
     ----------
-    folder : where the identifier lies in a folder of that name.
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where what the method learns cannot be handed over, or there is no C compiler.
     """
     try:
         pair = build_pair(package, single=single, caution=caution)
@@ -250,17 +237,7 @@ class Verdict(NamedTuple):
 
 
 def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
-    """Compile and run the self-test of a package; None where there is no C compiler.
-
-    Parameters
-    ----------
-    single : whether to compute in float.
-
-    Raises
-    ------
-    SelfTestError
-        Where it does not compile or does not pass.
-    """
+    """Compile and run the self-test of a package; None where there is no C compiler."""
     compiler = find_compiler()
     if compiler is None:
         return None

@@ -49,17 +49,7 @@ class Written(NamedTuple):
 
 
 def require_free(path: Path, *, force: bool) -> None:
-    """Refuse to replace a file that is there.
-
-    Parameters
-    ----------
-    force : whether what is there may be replaced.
-
-    Raises
-    ------
-    OutputError
-        Where there is something and it may not.
-    """
+    """Refuse to replace a file that is there."""
     if path.exists() and not force:
         raise OutputError(f"{path} exists: choose another, or add --force to replace it")
 
@@ -68,17 +58,12 @@ def require_free(path: Path, *, force: bool) -> None:
 def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
     """Yield an empty folder that becomes `target` when all went well; else `target` is as before.
 
+    What may not be replaced is refused before anything is computed. Where `target` comes to hold
+    something else meanwhile, it is left alone, and the message says where the results are.
+
     Parameters
     ----------
-    target : the folder that the user asked for; a link is followed.
     force : replace a folder that an earlier run wrote; never one that holds anything else.
-
-    Raises
-    ------
-    OutputError
-        Before anything is computed, where `target` is not a folder that may be replaced, or
-        another run is about to write it; at the end, where it has become such a folder meanwhile:
-        then it is left alone, and the message says where the results are.
     """
     final = resolved(target)
     _require_replaceable(target, final, force)
@@ -189,13 +174,7 @@ def _read_marker(folder: Path) -> Written | None:
 
 
 def foreign(folder: Path) -> str | None:
-    """Return the first thing below a folder that is not as a run of tireid wrote it, or None.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be read.
-    """
+    """Return the first thing below a folder that is not as a run of tireid wrote it, or None."""
     written = _read_marker(folder) or Written({}, frozenset())
 
     def first(inside: Path) -> str | None:
@@ -369,17 +348,7 @@ def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def require_curves(kind: str) -> None:
-    """Refuse a kind of file for curves that cannot be written here.
-
-    Parameters
-    ----------
-    kind : "csv" or "parquet".
-
-    Raises
-    ------
-    ValueError
-        Where it is Parquet, and pyarrow is not installed.
-    """
+    """Refuse a kind of file for curves that cannot be written here."""
     if kind == "parquet":
         _parquet()
 
@@ -393,13 +362,7 @@ def _parquet() -> tuple[Any, Any]:
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:
-    """Return rows of cells as lines of text, each column as wide as its widest cell.
-
-    Parameters
-    ----------
-    rows : cells; a row may be shorter than others.
-    align : of each column, `<` left or `>` right; columns without are left.
-    """
+    """Return rows of cells as lines of text, each column as wide as its widest cell."""
     count = max((len(row) for row in rows), default=0)
     sides = align.ljust(count, "<")
     widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(count)]

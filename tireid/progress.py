@@ -172,12 +172,7 @@ class Progress:
             _print(_wiped())
 
     def begin(self, part: str) -> "Progress":
-        """Go on with a part; return what takes its share.
-
-        Parameters
-        ----------
-        part : one of the parts; what comes before it is done.
-        """
+        """Go on with a part; return what takes its share."""
         names = list(self._parts)
         self._before = sum(self._parts[name] for name in names[: names.index(part)]) / self._whole
         self._weight, self._name = self._parts[part] / self._whole, part
@@ -188,12 +183,7 @@ class Progress:
         return self
 
     def step(self, of: int, text: str = "") -> None:
-        """Count one of several equal steps of the part.
-
-        Parameters
-        ----------
-        of : steps of the part.
-        """
+        """Count one of several equal steps of the part."""
         self._done += 1
         self(min(self._done / max(of, 1), 1.0), text)
 

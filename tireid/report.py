@@ -136,12 +136,7 @@ RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def printed(text: str) -> str:
-    """Return a text of our own with Greek letters and raised exponents in place of ASCII.
-
-    Parameters
-    ----------
-    text : plain text; never a name from a file, which stays as it is.
-    """
+    """Return a text of our own with Greek letters and raised exponents in place of ASCII."""
     words = re.compile(rf"\b({'|'.join(LETTERS)})(?=\d?\b)")
     greek = words.sub(lambda found: LETTERS[found[1]], text)
     raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(RAISED), greek)
@@ -314,12 +309,7 @@ def report_html(report: Report) -> str:
 
 
 def write_report(path: Path, report: Report) -> None:
-    """Write a report; the file is complete or as it was before.
-
-    Parameters
-    ----------
-    path : the HTML file.
-    """
+    """Write a report; the file is complete or as it was before."""
     write_atomically(path, report_html(report))
 
 

@@ -43,12 +43,7 @@ def marked_number(verdict: Verdict, number: Number | None) -> Marked:
 
 
 def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
-    """Return a verdict as lines of text.
-
-    Parameters
-    ----------
-    numbers : whether the table of what was learnt stands above it.
-    """
+    """Return a verdict as lines of text."""
     rows = [
         [title, *(cell for axle in AXLES for cell in _cells(by_axle.get(axle)))]
         for title, by_axle in numbers_by_title(verdict).items()
@@ -186,25 +181,13 @@ def verdict_section(verdict: Verdict) -> Section:
 
 
 def warn_of_stored(path: Path | str) -> None:
-    """Say on standard error where a stored model was found not valid when it was learnt.
-
-    Raises
-    ------
-    FrozenModelError
-        Where the file is no such model; one line that names it.
-    """
+    """Say on standard error where a stored model was found not valid when it was learnt."""
     for said in stored_warning(path):
         complain(f"warning: {said.text}")
 
 
 def stored_warning(path: Path | str) -> list[Marked]:
-    """Return what speaks against a stored model that was found not valid when it was learnt.
-
-    Raises
-    ------
-    FrozenModelError
-        Where the file is no such model; one line that names it.
-    """
+    """Return what speaks against a stored model that was found not valid when it was learnt."""
     if stored_verdict(path) is not False:
         return []
     text = f"{path} was found not valid when it was learnt: see its summary.json"

@@ -40,12 +40,7 @@ MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
 
 
 def initializers(params: Params) -> str:
-    """Return the members of the C structure, one a line with its name.
-
-    Parameters
-    ----------
-    params : of `mpc.realtime.instance.params_type`, in double.
-    """
+    """Return the members of the C structure, one a line with its name."""
     return "".join(
         f"    /* {name} */ {MACROS.get(name) or _initializer(params[name])},\n"
         for name in params.dtype.names or ()
@@ -53,12 +48,7 @@ def initializers(params: Params) -> str:
 
 
 def plain_params(params: Params) -> dict[str, Any]:
-    """Return the numbers by name, ready for JSON.
-
-    Parameters
-    ----------
-    params : of `mpc.realtime.instance.params_type`, in double.
-    """
+    """Return the numbers by name, ready for JSON."""
     return {name: params[name].tolist() for name in params.dtype.names or ()}
 
 
@@ -102,13 +92,7 @@ class Vectors(NamedTuple):
     stride: int
 
     def measurement(self, k: int, horizon: int) -> Measurement:
-        """Return what the tracker is told at a step.
-
-        Parameters
-        ----------
-        k : number of the step.
-        horizon : number of stages.
-        """
+        """Return what the tracker is told at a step."""
         rows = np.append(k, k + self.offset + self.stride * np.arange(horizon))
         e_y, e_psi, v_y, r = map(float, self.measured[k])
         kappa, v_x = self.road[rows].T
@@ -244,13 +228,6 @@ def build_mpc_package(
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.
-
-    Raises
-    ------
-    PackageNameError
-        Where the name is not one of C in lower case.
-    NoCompilerError
-        Where there is no C compiler, which the self-test is computed with.
     """
     check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
@@ -272,12 +249,7 @@ def build_mpc_package(
 
 
 def mpc_readme(package: MpcPackage, about_figures: str) -> str:
-    """Return the README of a package.
-
-    Parameters
-    ----------
-    about_figures : what it costs, as Markdown.
-    """
+    """Return the README of a package."""
     p = plain_params(package.params)
     rows = "".join(
         f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD

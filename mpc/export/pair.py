@@ -35,13 +35,7 @@ class NoHandoverError(TireidError, ValueError):
 
 
 def frozen_start(package: Package) -> TireModel:
-    """Return the model that an exported identifier begins with.
-
-    Raises
-    ------
-    NoHandoverError
-        Where the method learns neither a network nor axle curves, or the car has downforce.
-    """
+    """Return the model that an exported identifier begins with."""
     specialized = package.specialized
     if specialized.vehicle.has_downforce:
         raise NoHandoverError(
@@ -64,11 +58,6 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
     Parameters
     ----------
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
-
-    Raises
-    ------
-    NoHandoverError
-        Where the method learns neither a network nor axle curves.
     """
     specialized, model = identifier.specialized, frozen_start(identifier)
     name = specialized.name
@@ -158,13 +147,6 @@ def build_pair(
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.
     caution : of the tracker, from 0 to 1; a number of the parameters.
-
-    Raises
-    ------
-    NoHandoverError
-        Where the method learns neither a network nor axle curves.
-    NoCompilerError
-        Where there is no C compiler.
     """
     specialized = identifier.specialized
     tracker = build_mpc_package(

@@ -54,12 +54,7 @@ class Window:
         self._kept = 0
 
     def add(self, sample: Sequence[float]) -> None:
-        """Take a sample.
-
-        Parameters
-        ----------
-        sample : in the order of `COLUMNS`.
-        """
+        """Take a sample."""
         if self._end == len(self._rows):
             self._rows[: self._n] = self._rows[-self._n :]
             self._end = self._n
@@ -123,12 +118,7 @@ def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float)
 
 @cache
 def axle_scan(structure: Any, k: int) -> Scan:
-    """Return the compiled loop: slip, its lag held exactly over a sample, force of k tires.
-
-    Parameters
-    ----------
-    k : number of tires.
-    """
+    """Return the compiled loop: slip, its lag held exactly over a sample, force of k tires."""
     lagged, begun = ca.SX.sym("lagged", 2, k), ca.SX.sym("begun")
     sample, dt = ca.SX.sym("sample", len(COLUMNS)), ca.SX.sym("dt")
     car, w = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights, k)
@@ -236,23 +226,12 @@ class Judge:
         Parameters
         ----------
         samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
-
-        Raises
-        ------
-        ValueError
-            Where there are too few samples.
         """
         e, force = self._errors(tire, tire.weights[None], samples)
         return e[0], force[0]
 
     def chi_square(self, tire: PredictionTire, samples: Array) -> ChiSquare:
-        """Return how badly a tire explains samples.
-
-        Raises
-        ------
-        ValueError
-            Where there are too few samples.
-        """
+        """Return how badly a tire explains samples."""
         return self.chi_squares(tire, tire.weights[None], samples)[0]
 
     def chi_squares(self, tire: PredictionTire, weights: Array, samples: Array) -> list[ChiSquare]:
@@ -262,11 +241,6 @@ class Judge:
         ----------
         tire : structure and car; its weights are not read.
         weights : of k tires (k, n_weights).
-
-        Raises
-        ------
-        ValueError
-            Where there are too few samples.
         """
         e, force = self._errors(tire, weights, samples)
         expected = self.expected

@@ -48,11 +48,6 @@ def blended(
     share : of the way that is left, to go at most [-], in (0, 1].
     planned : first steering rate of the plan that a tire leads to, in one situation [rad/s].
     most : change of it that is allowed [rad/s].
-
-    Raises
-    ------
-    ValueError
-        Where the structures differ.
     """
     if now.structure != target.structure:
         raise ValueError(f"weights of {now.structure} cannot move to those of {target.structure}")

@@ -40,11 +40,6 @@ def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     Parameters
     ----------
     ratio : friction over the one that the tire has [-].
-
-    Raises
-    ------
-    ValueError
-        Where the tire's structure has no such weights, or the ratio is not positive.
     """
     if not 0.0 < ratio < math.inf:
         raise ValueError(f"ratio must be positive, it is {ratio}")
@@ -76,11 +71,6 @@ def fit_friction(
     known : friction over that of the tire that was taken so far [-].
     between : least and largest friction over that of the tire that is looked for [-].
     scale : of chi-squares: they are that many times as large as expected even of a good tire [-].
-
-    Raises
-    ------
-    ValueError
-        Where the tire cannot be told for another friction.
     """
     center, (least, most) = math.log(known), np.log(between)
 

@@ -102,12 +102,6 @@ def drive(
         goes on by dead reckoning, then the drive ends.
     plan_every : periods between two plans that are kept; 0 keeps none.
     name : of the drive; None takes that of the path.
-    progress : called with the share of the way at every period.
-
-    Raises
-    ------
-    ValueError
-        Where the tracker's period is not the car's, a delay is negative, or blind is not positive.
     """
     if abs(car.period - tracker.period) > 1e-9:
         raise ValueError(f"the car steps {car.period} s, the tracker {tracker.period} s")

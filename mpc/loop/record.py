@@ -99,11 +99,6 @@ class Drive:
         """Return what an identifier would read of it: measured signals, axle forces as truth.
 
         Where nothing measures v_y, it is what was told, and marked as that: no method is shown it.
-
-        Raises
-        ------
-        RecordingError
-            Where the drive is too short to be one.
         """
         return Recording(
             name=self.name,
@@ -180,7 +175,6 @@ class Recorder:
         Parameters
         ----------
         v_ref : wanted speed [m/s].
-        told : of v_y, where nothing measures it.
         """
         if told is not None:
             self._told.append(told)
@@ -304,12 +298,7 @@ class ToldScores(NamedTuple):
 
 
 def told_scores(drive: Drive) -> ToldScores | None:
-    """Return how right the v_y was that was told over a drive; None where sensors showed it.
-
-    Parameters
-    ----------
-    drive : where nothing was told at a sample, it does not count.
-    """
+    """Return how right the v_y was that was told over a drive; None where sensors showed it."""
     if not drive.told:
         return None
 

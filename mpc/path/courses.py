@@ -113,11 +113,6 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
     Parameters
     ----------
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing is not positive or there is no section.
     """
     if not (spacing > 0.0 and sections):
         raise PathError(f"{len(sections)} sections cannot be sampled every {spacing} m")
@@ -141,11 +136,6 @@ def close(sections: Sequence[Section], free: tuple[int, int]) -> list[Section]:
     ----------
     sections : in driving order; they must turn by a multiple of 2 pi altogether.
     free : which two sections are straights of free length; they must not be parallel.
-
-    Raises
-    ------
-    PathError
-        Where a rule is broken or a straight would need a negative length.
     """
     turned = sum(section.angle for section in sections)
     if abs(math.remainder(turned, 2.0 * math.pi)) > 1e-9 or turned == 0.0:

@@ -85,18 +85,12 @@ def line_through_gates(
 
     Parameters
     ----------
-    gates : what the line must pass.
     start : x, y of the first point [m].
     end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
     spacing : longest step of the samples [m].
     knots : about the distance of the knots of the spline [m].
-
-    Raises
-    ------
-    PathError
-        Where a gate is too narrow for the clearance, a number is out of range, or no line is found.
     """
     numbers = {"easing": easing, "spacing": spacing, "knots": knots, "length": end[0] - start[0]}
     for name, value in {**numbers, "clearance": clearance}.items():

@@ -35,11 +35,6 @@ def uniform_grid(length: float, spacing: float) -> Array:
     ----------
     length : of the curve [m].
     spacing : longest step [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing is not positive or leaves fewer than four steps, or too many.
     """
     if not 0.0 < spacing <= length / 4.0:
         raise PathError(
@@ -64,11 +59,6 @@ def line_from_heading(
     kappa : dψ/ds at the same places [1/m], (4 n + 1,).
     spacing : step of the line [m].
     start : X, Y of the first sample [m].
-
-    Raises
-    ------
-    PathError
-        Where the number of samples is not 4 n + 1.
     """
     if psi.shape != kappa.shape or psi.size % 4 != 1 or psi.size < 5:
         raise PathError(f"psi and kappa must have 4 n + 1 samples, they have {psi.size}")
@@ -88,19 +78,7 @@ DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that t
 
 
 def check_line(line: Line, name: str, closed: bool) -> None:
-    """Refuse samples that do not fit one another.
-
-    Parameters
-    ----------
-    line : finite samples of equal shape.
-    closed : whether the last sample must be the first one again.
-
-    Raises
-    ------
-    PathError
-        Where s is not uniform from 0, samples are too few, too coarse or disagree, or the ends of a
-        closed path differ.
-    """
+    """Refuse samples that do not fit one another."""
     s, X, Y, psi, kappa = line
     if s.size < 5:
         raise PathError(f"{name}: a path needs at least 5 samples, it has {s.size}")
@@ -180,9 +158,7 @@ def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
     Parameters
     ----------
     u : place in the step, 0 to 1 [-].
-    h : length of the step.
     p : values at u = 0 and 1.
-    d : slopes there, per unit of h.
     """
     chord = p[1] - p[0]
     bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]
@@ -195,10 +171,7 @@ def quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
     Parameters
     ----------
     u : place in the step, 0 to 1 [-].
-    h : length of the step.
     p : values at u = 0 and 1.
-    d : slopes there, per unit of h.
-    dd : second derivatives there, per unit of h².
     """
     chord = p[1] - p[0]
     bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]

@@ -35,7 +35,6 @@ def smooth(points: Array, *, closed: bool, distance: float) -> Array:
     Parameters
     ----------
     points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
-    closed : whether they form a ring.
     distance : root mean square of how far they may move [m].
     """
     if len(points) < 4 + closed:
@@ -110,15 +109,9 @@ def line_through(
     ----------
     X : of the way-points [m], (k,).
     Y : of the way-points [m], (k,).
-    closed : whether the last leads back to the first.
     spacing : longest step of the samples [m].
     smoothing : root mean square distance that the line may keep from the way-points [m].
     minimum_radius : tightest turn allowed [m].
-
-    Raises
-    ------
-    PathError
-        Where a rule is broken.
     """
     if not minimum_radius > 0.0:
         raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
@@ -150,11 +143,6 @@ def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     spline : t -> (X, Y) with `.derivative(order)`, C2, polynomial between its knots.
     knots : rising t, (k,).
     spacing : longest step [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing does not suit the length.
     """
     velocity, acceleration = spline.derivative(1), spline.derivative(2)
     # Quadrature needs pieces over which the speed changes little, even between far way-points.

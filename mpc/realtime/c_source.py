@@ -79,7 +79,6 @@ def c_sources(
 
     Parameters
     ----------
-    horizon : number of stages.
     single : whether float is the default precision.
     """
     return {
@@ -97,13 +96,7 @@ def c_sources(
 
 
 def python_file(files: Mapping[str, str], *, name: str, single: bool) -> str:
-    """Return C files as one, with what Python asks of it.
-
-    Parameters
-    ----------
-    files : of `c_sources`.
-    single : whether to compute in float.
-    """
+    """Return C files as one, with what Python asks of it."""
     (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: name}).values()
     texts = [*(files[path.format(name)] for path in ORDER), glue]
     return one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})

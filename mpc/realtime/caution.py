@@ -38,13 +38,7 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
 
     Parameters
     ----------
-    params : of `mpc.realtime.instance.params_type`, written in place.
     caution : from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        For a caution of a car with downforce: what is not known is told under static loads.
     """
     if caution > 0.0 and tire.vehicle.has_downforce:
         raise ValueError(

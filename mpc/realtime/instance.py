@@ -94,12 +94,7 @@ GUARDS = (
 
 
 def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of the parameters.
-
-    Parameters
-    ----------
-    single : whether numbers are float.
-    """
+    """Return the type of the parameters."""
     real = _real(single)
     names = [*TIMES, *LIMITS, *CAUTION, *GUARDS, "tolerance"]
     of_grips = dict.fromkeys(("grips", "prior"), (N_GRIPS,))
@@ -121,14 +116,7 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
 
 
 def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of the state.
-
-    Parameters
-    ----------
-    horizon : number of stages.
-    n_x : states of the car.
-    single : whether numbers are float.
-    """
+    """Return the type of the state."""
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
     watch = ("gentle", "placed", "watched", "doubted")
     counts = (*solution, "age", "planned", "guessed", "started", *watch)
@@ -158,13 +146,7 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
 
 
 def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of a measurement.
-
-    Parameters
-    ----------
-    horizon : number of stages.
-    single : whether numbers are float.
-    """
+    """Return the type of a measurement."""
     real = _real(single)
     numbers = [(name, real) for name in ("e_y", "e_psi", "v_y", "r")]
     ahead = [(name, real, (horizon + 1,)) for name in ("kappa", "v_x")]
@@ -172,12 +154,7 @@ def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
 
 
 def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
-    """Write what is to be solved and guarded; tire, timing, solver and gains of the fall-back stay.
-
-    Parameters
-    ----------
-    params : of `params_type`, written in place.
-    """
+    """Write what is to be solved and guarded; tire, timing, solver and fall-back stay."""
     cost, limits = problem.cost, problem.limits
     params["cost"], params["cost_end"] = cost.numbers(), cost.terminal_numbers()
     params["cost_rate"], params["stage_time"] = cost.R, problem.dt
@@ -201,13 +178,7 @@ PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the te
 
 
 def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> str:
-    """Return the C of a tracker, generated or found again by everything that it depends on.
-
-    Parameters
-    ----------
-    horizon : number of stages.
-    single : whether to compute in float.
-    """
+    """Return the C of a tracker, generated or found again by everything that it depends on."""
     if not is_dataclass(structure):
         return _generated(structure, horizon, single)
     kind = type(structure)

@@ -138,13 +138,7 @@ class Tracker:
         return self.instance.params.copy()
 
     def set_tire(self, tire: PredictionTire) -> None:
-        """Go on with other weights, the car that they are of and the slip that is of use to it.
-
-        Raises
-        ------
-        ValueError
-            Where the structure is another, or a number not finite.
-        """
+        """Go on with other weights, the car that they are of and the slip that is of use to it."""
         self._write_tire(self.instance, tire)
         self.tire = tire
 
@@ -153,11 +147,6 @@ class Tracker:
 
         An instance of its own is asked, on the plan and the road of the last step; the one that
         steers is read and not written.
-
-        Raises
-        ------
-        ValueError
-            Where the structure is another, or a number not finite.
         """
         now = self.instance
         if self._preview is None:
@@ -194,11 +183,6 @@ class Tracker:
         Parameters
         ----------
         steering : angle of the wheels now [rad].
-
-        Raises
-        ------
-        ValueError
-            Where the angle is not finite, or beyond `Limits.steering`.
         """
         if self.instance.reset(steering) != Status.OK:
             most = self.problem.limits.steering

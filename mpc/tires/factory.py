@@ -28,13 +28,6 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
         static load; or a vehicle, for the linear tire that it states. A prediction tire is
         returned as it is.
     vehicle : the car of the prediction; None takes that of the model.
-
-    Raises
-    ------
-    ValueError
-        Where a tire comes without a vehicle, or is one that cannot be fitted.
-    TypeError
-        Where the source is none of these.
     """
     if isinstance(source, PredictionTire):
         return source if vehicle is None else source._replace(vehicle=vehicle)

@@ -161,10 +161,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     The sway of its body takes k ρ'/(ω² v_x) off the slip, ρ in steady cornering the force of the
     axle over its load times g: the body gives way in series with the carcass, and k g/ω² adds to
     the compliance. That is without the inertia of the roll: ω is above what steering asks for.
-
-    Parameters
-    ----------
-    model : frozen force curves, their compliance, sway and offsets.
     """
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
@@ -242,11 +238,6 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     ----------
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
-
-    Raises
-    ------
-    CurveFitError
-        Where the largest error is above 2 % of the largest force.
     """
     first = min(int(np.searchsorted(alpha, SMALL)), alpha.size - 1)
     stiffness, peak = force[:, first] / alpha[first], np.abs(force).max(axis=1)
@@ -299,15 +290,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     ----------
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
-
-    Raises
-    ------
-    VehicleError
-        Where the vehicle has no chassis, or names no tire and none is given.
-    TirError
-        Where the file that the chassis names is no tire of this car.
-    CurveFitError
-        Where a curve is not fitted to 2 %.
     """
     chassis = vehicle.require_chassis()
     tire = tire_of(vehicle) if tire is None else tire
@@ -325,11 +307,6 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     Parameters
     ----------
     vehicle : the car; it needs no chassis.
-
-    Raises
-    ------
-    CurveFitError
-        Where a curve is not fitted to 2 %.
     """
     alpha = slip_grid(LARGEST_SLIP)
     x = ca.SX.sym("alpha")

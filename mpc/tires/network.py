@@ -77,12 +77,7 @@ class NetworkAxles:
 
 
 def network_tire(model: NetworkModel) -> PredictionTire:
-    """Return the prediction tire of a frozen network.
-
-    Parameters
-    ----------
-    model : frozen weights, with the car whose linear tire they correct.
-    """
+    """Return the prediction tire of a frozen network."""
     network, scale = model.network, np.array(model.network.scale)
     weights = np.concatenate(
         [

@@ -51,13 +51,7 @@ def reel(duration: float) -> Reel:
 
 
 def require_ffmpeg() -> str:
-    """Return the path of ffmpeg.
-
-    Raises
-    ------
-    ValueError
-        Where there is none.
-    """
+    """Return the path of ffmpeg."""
     found = shutil.which("ffmpeg")
     if found is None:
         raise ValueError("an MP4 needs ffmpeg, and none was found: install it, or ask for a GIF")
@@ -82,14 +76,8 @@ def write_film(
     Parameters
     ----------
     file : ends in .webp, .gif or .mp4.
-    drives : by the name in the legend, along one path; the camera follows the first.
     drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.
-
-    Raises
-    ------
-    ValueError
-        For an MP4 where there is no ffmpeg, or it fails.
     """
     first = next(iter(drives.values()))
     instants, pace = reel(float(first.t[-1] - first.t[0]))

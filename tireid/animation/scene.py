@@ -237,7 +237,6 @@ class Scene:
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.
-
     Attributes: figure.
     """
 

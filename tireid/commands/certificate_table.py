@@ -143,7 +143,6 @@ def unit_text(unit: str, force_unit: float) -> str:
 
     Parameters
     ----------
-    unit : with U for the force unit.
     force_unit : U [N].
     """
     name = force_unit_name(force_unit)
@@ -206,7 +205,6 @@ def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit:
 
     Parameters
     ----------
-    rows : from `bound_rows`.
     force_unit : the unit U of the design [N].
     """
     unit = unit_text("U s", force_unit)
@@ -226,12 +224,7 @@ def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit:
 
 
 def monte_carlo_numbers(rows: list[Row], observed: Observed, seed: int) -> dict[str, Any]:
-    """Return the comparison for JSON.
-
-    Parameters
-    ----------
-    rows : from `bound_rows`.
-    """
+    """Return the comparison for JSON."""
     return {
         "drives": observed.xi_tilde.size,
         "left_out": observed.outside,

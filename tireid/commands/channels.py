@@ -211,12 +211,7 @@ def _meaning(
 
 
 def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
-    """Return which signals have cells without a value; nothing where none has.
-
-    Parameters
-    ----------
-    seen : channels that were read, by name.
-    """
+    """Return which signals have cells without a value; nothing where none has."""
     said = []
     for name, signal in signals.items():
         for channel in (seen[one] for one in signal.channel if one in seen):

@@ -84,13 +84,7 @@ def draw_check(
     operation: Operation,
     certificate: Certificate,
 ) -> list[Path]:
-    """Draw locus.png and bounds.png; return their paths.
-
-    Parameters
-    ----------
-    folder : where to, made if missing.
-    recording : a drive, for the error to compare the bounds with.
-    """
+    """Draw locus.png and bounds.png; return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     chosen = LAWS[design.law]
     law = chosen.error(design.gains.lead)

@@ -44,12 +44,7 @@ from tireid.reports.compare import HINDSIGHT
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
-    """Return the means over recordings of every method, best on other recordings first.
-
-    Parameters
-    ----------
-    comparison : the methods; the first row is the header.
-    """
+    """Return the means over recordings of every method, best on other recordings first."""
     lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
@@ -210,7 +205,6 @@ def write_comparison(
 
     Parameters
     ----------
-    folder : an empty folder.
     verdicts : on what the default learns, by recording.
     """
     numbers = comparison_numbers(comparison)

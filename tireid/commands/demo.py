@@ -93,12 +93,7 @@ def demo_report(
     folder: Path,
     command: str,
 ) -> Report:
-    """Return the report: the product first, the paper's study folded.
-
-    Parameters
-    ----------
-    shipped : what was learnt, as a C package.
-    """
+    """Return the report: the product first, the paper's study folded."""
     learnt = story.axle.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
     return Report(

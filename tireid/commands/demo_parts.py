@@ -171,17 +171,7 @@ class Shipped(NamedTuple):
 
 
 def ship(story: Story, folder: Path) -> Shipped:
-    """Export what the axle identifier learnt, compile it and test it.
-
-    Parameters
-    ----------
-    folder : an empty folder for the package.
-
-    Raises
-    ------
-    SelfTestError
-        Where the package does not compile or does not pass.
-    """
+    """Export what the axle identifier learnt, compile it and test it."""
     learnt = story.axle.learnt
     model = learnt.freeze(FREEZE)
     package = build_package(learnt.design, story.car, model)

@@ -62,12 +62,7 @@ class Learning:
     frozen: Mapping[float, Mapping[str, Replay]]
 
     def errors(self, drive: History) -> tuple[float, float, float]:
-        """Return online and frozen error of both axles [kN], and the frozen share of the rms [-].
-
-        Parameters
-        ----------
-        drive : `learnt`, or one of `others`.
-        """
+        """Return online and frozen error of both axles [kN], and its share of the rms [-]."""
         frozen = self.frozen[FREEZE][drive.recording.name].against_truth
         online, size = online_error(drive), force_rms(drive)
         assert size is not None and frozen is not None and online is not None
@@ -135,12 +130,7 @@ def drive_to_learn() -> Recording:
 
 
 def run_story(progress: Callable[[], None] = lambda: None) -> Story:
-    """Drive, learn, freeze and predict, with both methods.
-
-    Parameters
-    ----------
-    progress : called after each method has learnt on a drive, six times.
-    """
+    """Drive, learn, freeze and predict, with both methods."""
     car = sedan()
     recordings = drives({"slalom": LEARN, **PREDICT})
     design = PaperIdentifier.for_vehicle(car)
@@ -216,11 +206,6 @@ def plant_recordings(
     Parameters
     ----------
     rng : of the noise of `SENSORS`; None measures exactly.
-
-    Raises
-    ------
-    VehicleError
-        Where the vehicle has no chassis or no tire file.
     """
     plant = Plant(vehicle)
     sensors = None if rng is None else SENSORS

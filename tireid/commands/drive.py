@@ -68,12 +68,7 @@ def headline(conditions: Conditions) -> str:
 def inputs_of(
     conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
 ) -> dict[str, Any]:
-    """Return all that goes into drives, ready for JSON.
-
-    Parameters
-    ----------
-    source : where the frozen tires come from.
-    """
+    """Return all that goes into drives, ready for JSON."""
     setup = conditions.setup
     v = setup.speeds()
     return {

@@ -45,11 +45,6 @@ def parse_speed(text: str) -> SpeedWish:
     Parameters
     ----------
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
-
-    Raises
-    ------
-    ValueError
-        Where it is none of these, or not a speed for a car.
     """
     found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text)
     try:
@@ -78,11 +73,6 @@ def parse_drop(text: str) -> tuple[float, float]:
     Parameters
     ----------
     text : such as 60:0.5.
-
-    Raises
-    ------
-    ValueError
-        Where it is not such a pair, or the numbers are not those of a road.
     """
     place, colon, friction = text.partition(":")
     try:
@@ -103,11 +93,6 @@ def parse_fault(text: str, kind: str = FULL) -> SensorFault:
     ----------
     text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
     kind : of the sensors, of `SENSORS`.
-
-    Raises
-    ------
-    ValueError
-        Where it is not of that form, or not a fault that a sensor of the loop can have.
     """
     words = text.split(":")
     try:
@@ -142,13 +127,7 @@ def labels_of(words: Sequence[str]) -> list[str]:
 
 
 def conditions_of(options: argparse.Namespace) -> Conditions:
-    """Return what is to be driven.
-
-    Raises
-    ------
-    ValueError
-        Where a word or a file is not right.
-    """
+    """Return what is to be driven."""
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
     require_dither("--dither", options.dither)
@@ -199,13 +178,7 @@ def _require_one_source(options: argparse.Namespace) -> None:
 
 
 def named_path(name: str) -> Path:
-    """Return a built-in path, or one from way-points in a file.
-
-    Raises
-    ------
-    ValueError
-        Where it is neither, or the file is no path.
-    """
+    """Return a built-in path, or one from way-points in a file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:
@@ -228,11 +201,6 @@ def make_setup(
     vehicle : the car; None takes the built-in sedan.
     mu : friction before the first drop [-].
     drops : arc length [m] and friction from there on.
-
-    Raises
-    ------
-    ValueError
-        Where a drop is beyond the path, or the car has no chassis.
     """
     ordered = tuple(sorted(drops))
     for s, _ in ordered:
@@ -246,13 +214,7 @@ def make_setup(
 def frozen_tires(
     options: argparse.Namespace, labels: Sequence[str], conditions: Conditions
 ) -> tuple[str, TireModel | None]:
-    """Return where frozen tires come from, and the model where one is needed.
-
-    Raises
-    ------
-    ValueError
-        Where a file cannot be used, or a law runs away.
-    """
+    """Return where frozen tires come from, and the model where one is needed."""
     setup = conditions.setup
     if not {FROZEN, LEARNING} & set(labels):
         return "nothing was learnt", None

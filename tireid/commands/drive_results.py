@@ -51,8 +51,6 @@ def write_drives(
 
     Parameters
     ----------
-    folder : an empty folder.
-    inputs : all that went in, ready for JSON.
     drops : arc length [m] and friction from there on.
     film : webp, gif, mp4 or none.
     """
@@ -95,12 +93,7 @@ def write_drives(
 
 
 def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds: scores of the first drive and of each, and what went in.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    """
+    """Return what summary.json holds: scores of the first drive and of each, and what went in."""
     by_label = {run.label: _scores(run) for run in runs}
     return {
         **by_label[runs[0].label],

@@ -94,7 +94,6 @@ def summarize(
     Parameters
     ----------
     frozen : freeze time [s] to recording name to replay.
-    parts : of the online run, over each of several logs that were learnt on.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
     return summarize_replays(law, [learnt, *parts, *others], by_key, verdict, asked)
@@ -149,11 +148,6 @@ class AskedBound(NamedTuple):
         Parameters
         ----------
         numbers : error [static axle loads] and lateness [s], or the first of them, or none.
-
-        Raises
-        ------
-        ValueError
-            Where there are more, or a number is impossible.
         """
         if len(numbers) > 2:
             raise ValueError(
@@ -203,18 +197,9 @@ def write_results(
 
     Parameters
     ----------
-    folder : an empty folder.
-    others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
-    parts : of the online run, over each of several logs that were learnt on.
-    curves : "csv" or "parquet", as what curves over time are written.
     bound : of the guaranteed band of the last freeze; None asks for none.
     progress : told how far it is; None tells nobody.
-
-    Raises
-    ------
-    BoundViolatedError
-        Where no curve keeps a bound that was told.
     """
     tire = calibrated(learnt, max(frozen))
     if bound is not None:
@@ -348,7 +333,6 @@ def write_forces(
 
     Parameters
     ----------
-    replays : replays of the same recording by the name of their columns.
     progress : called now and then with the share that is done, 0 to 1.
     """
     n = len(history.recording)
@@ -477,13 +461,7 @@ def write_network_results(
     asked: Mapping[str, Verdict],
     curves: str = "csv",
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
-    """Write everything that is known of a network into a folder; return replays and figures.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    curves : "csv" or "parquet", as what curves over time are written.
-    """
+    """Write everything that is known of a network into a folder; return replays and figures."""
     replays = {history.recording.name: replay(model, history) for history in histories}
     about = {
         "file": file.name,

@@ -45,13 +45,7 @@ RENAMED = {  # options that had another word in some command
 def add_vehicle(
     parser: argparse.ArgumentParser, *, required: bool = False, default: str = "the sedan"
 ) -> None:
-    """Add --vehicle.
-
-    Parameters
-    ----------
-    required : whether it cannot be left out.
-    default : what it is where it is left out.
-    """
+    """Add --vehicle."""
     text = f"car as TOML, tireid init writes one ({'needed' if required else default})"
     parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
 
@@ -114,12 +108,7 @@ def add_accept(parser: argparse.ArgumentParser) -> None:
 
 
 def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
-    """Return the exit code that a verdict makes.
-
-    Parameters
-    ----------
-    options : with `accept`.
-    """
+    """Return the exit code that a verdict makes."""
     return DONE if verdict.valid or options.accept else NOT_VALID
 
 
@@ -150,13 +139,7 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
 
 
 def jobs_of(options: argparse.Namespace) -> int:
-    """Return --jobs.
-
-    Raises
-    ------
-    ValueError
-        Where there are none, or more than `Limits` allows.
-    """
+    """Return --jobs."""
     jobs = int(options.jobs)
     if jobs < 1:
         raise ValueError(f"--jobs must be at least 1, it is {jobs}")
@@ -196,13 +179,7 @@ class Chosen(NamedTuple):
 
 
 def method_is_given(options: argparse.Namespace) -> bool:
-    """Return whether a command is told what learns.
-
-    Raises
-    ------
-    ValueError
-        Where it is told so twice.
-    """
+    """Return whether a command is told what learns."""
     given = [word for word in ("method", "paper", "design") if getattr(options, word)]
     if len(given) > 1:
         raise ValueError(f"give only one of {', '.join('--' + word for word in given)}")
@@ -224,11 +201,6 @@ def chosen_method(
     seed : of initial weights; None where nobody asks for one.
     without_v_y : whether a log has no lateral velocity, which changes the default.
     online : whether the default is the one that learns sample by sample.
-
-    Raises
-    ------
-    ValueError
-        Where there are several, a seed would change nothing, or the file is no design.
     """
     method_is_given(options)
     if options.design is not None:
@@ -302,13 +274,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 
 def told_map(options: argparse.Namespace) -> LogMap:
-    """Return how logs are read by --log, and by the other options, which come first.
-
-    Raises
-    ------
-    RecordingError
-        Where the file or a word is not right.
-    """
+    """Return how logs are read by --log, and by the other options, which come first."""
     told = with_columns(map_of(_map_path(options)), column_words(options.columns))
     if options.cut_holes:
         told = replace(told, holes=CUT)
@@ -330,14 +296,7 @@ def read_log(
 
     Parameters
     ----------
-    run_name : run of the file, if `log` does not name it.
-    check : whether a log that contradicts physics or the vehicle is refused.
     dt : sampling interval that it is brought to [s].
-
-    Raises
-    ------
-    ValueError
-        One line, where the words or the file are not right.
     """
     path, named = split_log_argument(log)
     if named is not None and run_name is not None and named != run_name:
@@ -352,17 +311,7 @@ def read_log(
 
 
 def column_words(pairs: Sequence[str]) -> dict[str, str]:
-    """Return what is told of columns by the name that they are read as.
-
-    Parameters
-    ----------
-    pairs : NAME=COLUMN, with what may stand behind it.
-
-    Raises
-    ------
-    ValueError
-        Where a word is not such a pair.
-    """
+    """Return what is told of columns by the name that they are read as."""
     columns = {}
     for pair in pairs:
         name, equals, column = pair.partition("=")
@@ -411,11 +360,6 @@ def network_model(
     Parameters
     ----------
     min_speed : below this speed [m/s] the forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where the file cannot be used, or options belong to a network that is not given.
     """
     if options.network is None:
         if options.network_inputs or options.network_iso:

@@ -90,12 +90,7 @@ MEANING = (
 
 
 def row_labels(maneuver: str) -> dict[str, str]:
-    """Return the label of every row of a table, by its column in the study.
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    """
+    """Return the label of every row of a table, by its column in the study."""
     labels = {ONLINE: "online, against truth"}
     for t in FREEZES[maneuver]:
         for measure, words in MEASURES.items():
@@ -104,12 +99,7 @@ def row_labels(maneuver: str) -> dict[str, str]:
 
 
 def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
-    """Return what the paper prints by law and column, beside the measure that it defines [kN].
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    """
+    """Return what the paper prints by law and column, beside the measure that it defines [kN]."""
     beside = {ONLINE: ONLINE}
     beside |= {freeze_key(t): frozen_column(PAST_ONLINE, t) for t in FREEZES[maneuver]}
     return {
@@ -123,11 +113,6 @@ def rows(maneuver: str, study: Study) -> list[list[str]]:
 
     Medians and quartiles are those of the seeds that did not diverge; the last row counts those
     that did.
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    study : its errors over all seeds.
     """
     table, paper = study.tables()[maneuver], printed_values(maneuver)
     cells = []
@@ -156,13 +141,7 @@ def header() -> list[str]:
 
 
 def table_text(maneuver: str, study: Study) -> str:
-    """Return a table as lines of text, with the number of seeds.
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    study : its errors over all seeds.
-    """
+    """Return a table as lines of text, with the number of seeds."""
     lines = [header(), *rows(maneuver, study)]
     seeds = len(study.errors[maneuver]["integral"])
     title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
@@ -170,12 +149,7 @@ def table_text(maneuver: str, study: Study) -> str:
 
 
 def settings(gains: Gains, network: Network) -> str:
-    """Return every gain in one paragraph, what the measures ask, and what the third column means.
-
-    Parameters
-    ----------
-    gains : of both laws; the third column divides the learning rates by the forgetting factor.
-    """
+    """Return every gain, what the measures ask, and what the third column means."""
     a = -gains.A_d[0][0]
     scaled = gains.scaled_by_forgetting()
     return (
@@ -200,12 +174,7 @@ FIGURES = {  # number of the paper's figure, by maneuver and law
 
 
 def study_text(study: Study) -> str:
-    """Return the tables, every gain, and the verdict of each law's certificate as lines of text.
-
-    Parameters
-    ----------
-    study : its errors over all seeds.
-    """
+    """Return the tables, every gain, and the verdict of each law's certificate as lines of text."""
     tables = [table_text(maneuver, study) for maneuver in study.errors]
     return "\n".join([*tables, settings(GAINS, NETWORK), *verdicts()])
 
@@ -219,12 +188,7 @@ def verdicts() -> list[str]:
 
 
 def write_study(folder: Path, study: Study) -> dict[str, Figure]:
-    """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures.
-
-    Parameters
-    ----------
-    study : its errors over all seeds.
-    """
+    """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures."""
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
     write_file(folder / "tables.txt", study_text(study) + "\n")

@@ -208,11 +208,6 @@ def parse_area(text: str) -> tuple[float, float]:
     Parameters
     ----------
     text : such as 40x40 or 60x20.5m.
-
-    Raises
-    ------
-    ValueError
-        Where it is no area, or none that a car fits in and somebody has.
     """
     found = re.fullmatch(r"\s*([\d.]+)\s*m?\s*[xX×*]\s*([\d.]+)\s*m?\s*", text, re.ASCII)
     try:
@@ -232,11 +227,6 @@ def parse_speed(text: str) -> float:
     Parameters
     ----------
     text : 15, 15m/s or 54km/h.
-
-    Raises
-    ------
-    ValueError
-        Where it is no speed of a car.
     """
     found = re.fullmatch(r"\s*([\d.]+)\s*(m/s|km/h)?\s*", text, re.ASCII)
     try:
@@ -316,13 +306,7 @@ def path_columns(found: Plan, k: int) -> dict[str, Array]:
 
 
 def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
-    """Write steering.csv, a path for each pass and summary.json.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    inputs : all that went in, ready for JSON.
-    """
+    """Write steering.csv, a path for each pass and summary.json."""
     write_csv(folder / "steering.csv", steering_columns(found, ratio))
     for k in range(len(found.passes)):
         name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
@@ -331,12 +315,7 @@ def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float |
 
 
 def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    """
+    """Return what summary.json holds."""
     slips, before, after = found.deviations()
     hold = hold_of(found.tires, found.space.speed)
     return {

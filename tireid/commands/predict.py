@@ -298,12 +298,7 @@ def prediction_text(
 
 
 def contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
-    """Return whether a drive contradicts what is guaranteed, in words.
-
-    Parameters
-    ----------
-    t, broken : from `contradictions`.
-    """
+    """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
         return "no moment of the drive contradicts the forces that are guaranteed"
     front, rear = 100.0 * broken.mean(axis=0)

@@ -43,7 +43,6 @@ def learning_drive(
     grip : largest lateral acceleration [m/s²], which sizes the steering.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
         they show.
-    progress : called with the share of the time.
     """
     # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
     amplitude = car.vehicle.wheelbase * grip / SPEED**2 + SLIP

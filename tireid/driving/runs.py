@@ -95,12 +95,7 @@ def friction_now(friction: Friction, measured: Measured) -> float:
 
 
 def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
-    """Return what tells v_y where no sensor shows it, and learns the tires for it.
-
-    Parameters
-    ----------
-    learnt : what it begins with, where these are curves of axles; else it begins afresh.
-    """
+    """Return what tells v_y where no sensor shows it, and learns the tires for it."""
     method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
     start = learnt if learnt is not None and method.resumes(learnt) else None
     return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
@@ -110,11 +105,6 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
     v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
-
-    Raises
-    ------
-    ValueError
-        Where no method can go on from there, or its law has no certificate.
     """
     learnt = learnt.beside_v_y()
     try:
@@ -232,24 +222,13 @@ def require_dither(name: str, dither: float) -> None:
     Parameters
     ----------
     dither : deviation that it may make [m].
-
-    Raises
-    ------
-    ValueError
-        Where it is not 0 to 0.5 m.
     """
     if not 0.0 <= dither <= WIDEST_WEAVE:
         raise ValueError(f"{name} must be 0 to {WIDEST_WEAVE:g} m, it is {dither:g}")
 
 
 def require_compiler() -> None:
-    """Say that there is no C compiler for the tracker before anything is learnt or driven.
-
-    Raises
-    ------
-    ValueError
-        Where there is none.
-    """
+    """Say that there is no C compiler for the tracker before anything is learnt or driven."""
     if find_compiler() is None:
         raise ValueError(
             "no C compiler found: the tracker cannot be built; install gcc or clang, or name one "
@@ -258,13 +237,7 @@ def require_compiler() -> None:
 
 
 def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
-    """Return the tire that a tracker is told at the start.
-
-    Parameters
-    ----------
-    label : of `TIRES`.
-    learnt : what was learnt before the drive, for `frozen` and, where there is any, `learning`.
-    """
+    """Return the tire that a tracker is told at the start."""
     if label == LINEAR:
         return prediction_tire(setup.vehicle)
     if label == ORACLE:
@@ -280,17 +253,7 @@ def run_drive(
     *,
     linearizations: int = 1,
 ) -> Run:
-    """Drive the path once with the tracker told of a tire.
-
-    Parameters
-    ----------
-    label : of `TIRES`.
-
-    Raises
-    ------
-    ValueError
-        Where there is no C compiler for the tracker.
-    """
+    """Drive the path once with the tracker told of a tire."""
     setup, problem = conditions.setup, Problem()
     model = told_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag

@@ -141,11 +141,6 @@ def require_friction(word: str, mu: float) -> float:
     Parameters
     ----------
     mu : the friction [-].
-
-    Raises
-    ------
-    ValueError
-        Where no road has it.
     """
     if not 0.05 <= mu <= 1.5:
         raise ValueError(f"{word}: friction must be 0.05 to 1.5, it is {mu:g}")

@@ -52,7 +52,6 @@ def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
 
     Parameters
     ----------
-    which : "x" or "y".
     low : smallest value shown [%].
     high : largest value shown [%].
     """
@@ -81,12 +80,7 @@ ROW = 0.3  # height of a method [in]
 
 @styled
 def methods_figure(comparison: Comparison) -> Figure:
-    """Draw a row for each method: means over recordings, lines from the best to the worst.
-
-    Parameters
-    ----------
-    comparison : the methods; floors are rows at the end.
-    """
+    """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
     floors = {f"floor, {name}": floor_errors(comparison, name) for name in comparison.floors}
@@ -168,17 +162,7 @@ LONGEST = 17  # letters of a recording's name beside a map
 
 @styled
 def matrix_figure(comparison: Comparison) -> Figure:
-    """Draw the frozen error of each method, rows learnt on, columns replayed on.
-
-    Parameters
-    ----------
-    comparison : the methods; signal estimators have no map.
-
-    Raises
-    ------
-    ValueError
-        Where no method can be frozen.
-    """
+    """Draw the frozen error of each method, rows learnt on, columns replayed on."""
     maps = {
         method_label(name): frozen
         for name in ranking(comparison)
@@ -256,17 +240,7 @@ Point = tuple[float, float]
 
 @styled
 def pareto_figure(comparison: Comparison) -> Figure:
-    """Draw a panel for each method: its designs, its front before those of all others.
-
-    Parameters
-    ----------
-    comparison : with a sweep; designs that diverged are counted in the panel's title.
-
-    Raises
-    ------
-    ValueError
-        Where there was no sweep.
-    """
+    """Draw a panel for each method: its designs, its front before those of all others."""
     names = [name for name in ranking(comparison) if name in comparison.sweeps]
     if not names:
         raise ValueError("a Pareto front needs a sweep")

@@ -142,7 +142,6 @@ def drive_errors_figure(
 
     Parameters
     ----------
-    drives : by the name in the legend; the first is drawn on top.
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
@@ -195,12 +194,7 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
 
 
 def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[SensorFault]) -> None:
-    """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors.
-
-    Parameters
-    ----------
-    drives : by the name in the legend; faults are placed by the time of the first.
-    """
+    """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors."""
     from mpc.handover.rules import Verdict
 
     first = next(iter(drives.values()))
@@ -283,7 +277,6 @@ def drive_steering_figure(
 
     Parameters
     ----------
-    drives : by the name in the legend; the first is drawn on top, with its wheels.
     angle_limit : that the tracker keeps [rad].
     rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
@@ -421,10 +414,6 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
 
     A path too large for cars to be seen is drawn as a whole with its deviations magnified, as the
     legend says, and beside it the place of the largest deviation at its true scale.
-
-    Parameters
-    ----------
-    drives : by the name in the legend, along one path; the first is drawn on top.
     """
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)

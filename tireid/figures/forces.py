@@ -70,11 +70,6 @@ def force_figure(
     window : first and last time to show [s]; None shows all.
     since : time from which the error of the online run counts [s], as in the replays; None counts
         all.
-
-    Raises
-    ------
-    ValueError
-        Where a replay is of another recording, or the window holds no sample.
     """
     replays = dict(sorted((replays or {}).items()))
     recording, truth = history.recording, history.recording.axle_force
@@ -195,13 +190,7 @@ def prediction_figure(
 
     Parameters
     ----------
-    online : an online run over the same recording, drawn where there is no truth.
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the online run is of another recording, or the window holds no sample.
     """
     recording, truth = replay.recording, replay.recording.axle_force
     if online is not None and online.axle_force.shape != replay.axle_force.shape:
@@ -257,13 +246,7 @@ COLORS = (ORANGE, BLUE, GREEN, PURPLE)
 
 @styled
 def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
-    """Draw the forces of several frozen models over one drive, and what each misses.
-
-    Raises
-    ------
-    ValueError
-        Where the recordings differ, or there is no truth.
-    """
+    """Draw the forces of several frozen models over one drive, and what each misses."""
     recordings = [replay.recording for replay in replays.values()]
     recording, truth = recordings[0], recordings[0].axle_force
     if truth is None or any(other.name != recording.name for other in recordings):
@@ -302,13 +285,7 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
 
     Parameters
     ----------
-    recording : what to draw.
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the window holds no sample.
     """
     ends = time_window(recording.t, window)
     logged = [recording.v_x, recording.delta_f, recording.delta_r, recording.r]
@@ -356,12 +333,7 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
 def draw_diagnosis(
     recording: Recording, vehicle: Vehicle, repaired: Recording, car: Vehicle
 ) -> Figure:
-    """Draw force over slip angle of both axles before and after a repair.
-
-    Parameters
-    ----------
-    repaired, car : with the repair; the same where there is none.
-    """
+    """Draw force over slip angle of both axles before and after a repair."""
     figure = new_figure(PAGE, 2.9)
     panels = figure.subplots(1, 2)
     shown = [("as logged", GREY, recording, vehicle)]

@@ -59,11 +59,6 @@ def error_figure(
     bounds : by name, bounds on the norm [U s]; one that is not finite is left out.
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the window holds no sample.
     """
     recording = history.recording
     ends = time_window(recording.t, window)
@@ -126,11 +121,6 @@ def weights_figure(
     ----------
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the window holds no sample.
     """
     recording, design = history.recording, paper_design(history)
     ends = time_window(recording.t, window)
@@ -190,11 +180,6 @@ def comparison_figure(
     results : by law, by column as it is to be labeled: median, lower, upper quartile [kN]; a law
         that diverged has no column or values that are not finite, which are left out.
     paper : by law, by column: the value that the paper prints [kN].
-
-    Raises
-    ------
-    ValueError
-        Where there is nothing to draw.
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
     if not columns:

@@ -51,15 +51,6 @@ def side_slip_figure(
 
     Without a recorded v_y there is an estimate with its band, and nothing is missed. A band is
     drawn of the inertial identifier, of the first method with one where it is not there.
-
-    Parameters
-    ----------
-    recordings : that the methods ran over; the first few are drawn.
-
-    Raises
-    ------
-    ValueError
-        Where no method told a lateral velocity.
     """
     drawn = list(recordings)[:MOST]
     told = {name: by_name for name, by_name in told.items() if by_name}

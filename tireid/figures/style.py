@@ -251,11 +251,6 @@ def time_window(t: Array, window: Window) -> tuple[float, float]:
     ----------
     t : times of the samples (n,) [s].
     window : first and last time to show [s], or None for all.
-
-    Raises
-    ------
-    ValueError
-        Where the window is empty or holds no sample.
     """
     if window is None:
         return float(t[0]), float(t[-1])
@@ -275,7 +270,6 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
     Parameters
     ----------
     t_freeze : time of the freeze [s].
-    prediction : whether the panel shows a replay.
     """
     first, last = axes.get_xlim()
     if prediction and t_freeze < last:
@@ -304,7 +298,6 @@ def legend_above(
     Parameters
     ----------
     columns : entries in a row; None puts all in one.
-    order : labels that come after all others, in this order.
     """
     entries: dict[str, Any] = {}
     for axes in figure.axes:
@@ -394,13 +387,7 @@ def impulse_unit(force_unit: float) -> str:
 
 
 def paper_design(history: History) -> PaperIdentifier:
-    """Return the design of a run of the paper's identifier, whose weights and error have units.
-
-    Raises
-    ------
-    TypeError
-        Where another method ran.
-    """
+    """Return the design of a run of the paper's identifier, whose weights and error have units."""
     if not isinstance(history.design, PaperIdentifier):
         raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
     return history.design
@@ -410,11 +397,6 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
     """Return the ends of an axis that shows all curves, but no more than thrice the reference.
 
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
-
-    Parameters
-    ----------
-    reference : curves that are seen in full as long as they are finite (of any shape).
-    others : curves that may be cut (of any shape).
     """
     largest = _finite(reference)
     bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
@@ -427,12 +409,7 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
 
 
 def drawable(curve: Array, limits: tuple[float, float]) -> Array:
-    """Return a curve whose values far outside the axis are brought close to it, NaN left out.
-
-    Parameters
-    ----------
-    curve : in the unit of the axis (of any shape).
-    """
+    """Return a curve whose values far outside the axis are brought close to it, NaN left out."""
     low, high = limits
     reach = 10.0 * (high - low)
     return np.clip(curve, low - reach, high + reach)

@@ -29,7 +29,6 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
     ----------
     t : times of the samples (n,) [s].
     ends : first and last time [s].
-    signals : that are drawn; where samples are many, those that reach farthest in one of them.
     """
     if len(t) <= LONG:
         within: Samples = (t >= ends[0]) & (t <= ends[1])
@@ -98,12 +97,7 @@ class DrawnRun:
         self._values: list[list[Array]] = []
 
     def take(self, block: Block) -> None:
-        """Gather what is drawn of a block.
-
-        Parameters
-        ----------
-        block : of the run; one after the other, all of them.
-        """
+        """Gather what is drawn of a block."""
         told, here = self._tell(block), self._recording.t[block.part]
         part: Samples = (here >= self._ends[0]) & (here <= self._ends[1])
         if self._width > 1 and part.any():

@@ -59,16 +59,6 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
 
     The slip angle has the paper's sign, α = δ - atan2(v_y ± l r, v_x), the negative of ISO 8855, so
     that the curves rise. Samples below the model's minimum speed are left out.
-
-    Parameters
-    ----------
-    model : the frozen model; its vehicle gives the axle positions and the linear tire.
-    online : an online run over the recording, drawn where there is no truth.
-
-    Raises
-    ------
-    ValueError
-        Where the online run is of another recording, or the car never reaches the minimum speed.
     """
     if online is not None and online.axle_force.shape != (recording.t.size, 2):
         raise ValueError(
@@ -304,14 +294,8 @@ def learnt_axles_figure(
 
     Parameters
     ----------
-    history : a run of a method that has `tracks`.
     freeze_times : times at which weights were taken [s].
     drawn : `drawn_tracks` that has taken all blocks; None looks at the run.
-
-    Raises
-    ------
-    TypeError
-        Where the method has none.
     """
     if drawn is None:
         drawn = drawn_tracks(history)

@@ -25,13 +25,7 @@ def write_drive_report(
     film: Path | None,
     command: str,
 ) -> None:
-    """Write the report of drives along one path.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    film : its file, where there is one that a page shows.
-    """
+    """Write the report of drives along one path."""
     first = runs[0]
     report = Report(
         title=f"{first.drive.path.name} on {first.label} tires",
@@ -139,12 +133,7 @@ def drive_table(runs: Sequence[Run], caption: str) -> Table:
 def drive_blocks(
     runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
-    """Return film, table and figures of drives.
-
-    Parameters
-    ----------
-    film : its file, where there is one that a page shows.
-    """
+    """Return film, table and figures of drives."""
     blocks: list[Block] = [drive_table(runs, "Scores of the drives.")]
     if film is not None:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."

@@ -64,14 +64,7 @@ def write_identify_report(
     command: str,
     asked: Mapping[str, Verdict],
 ) -> None:
-    """Write the report of what was learnt, or of a network that was judged.
-
-    Parameters
-    ----------
-    frozen : by when it was frozen, replays by recording; the last is of the model.
-    parts : of the first run, over each of several logs that were learnt on.
-    asked : verdicts on the model over the drives that it was not learnt on, by recording.
-    """
+    """Write the report of what was learnt, or of a network that was judged."""
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
         verdict_section(verdict),
@@ -185,12 +178,7 @@ def asked_headlines(asked: Mapping[str, Verdict]) -> list[Headline]:
 
 
 def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> Picture:
-    """Return the learnt curve with its band, the first figure of a report.
-
-    Parameters
-    ----------
-    verdict : on the model; of a refused one the caption says so.
-    """
+    """Return the learnt curve with its band, the first figure of a report."""
     refused = "" if verdict.valid else "NOT VALID. "
     caption = f"{refused}Axle force over slip angle: drive, curve and its band."
     return drawing(figures["slip"], caption, READ["slip"])
@@ -285,12 +273,7 @@ def band_sentence(model: TireModel) -> str:
 
 
 def guaranteed_sentence(model: TireModel) -> str:
-    """Return which forces are guaranteed where slip is known, in words; empty where none are.
-
-    Parameters
-    ----------
-    model : frozen, with a guaranteed band or without.
-    """
+    """Return which forces are guaranteed where slip is known, in words; empty where none are."""
     known, given = model.known_slip, getattr(model, "guarantee", None)
     limits = None if known is None else model.guaranteed_band(known)
     if known is None or not isinstance(given, Guarantee) or limits is None:

@@ -16,12 +16,7 @@ PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
 
 
 def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
-    """Return what to expect and what is safe, as sentences.
-
-    Parameters
-    ----------
-    driven : how the car of the vehicle file drives it, if it can be simulated.
-    """
+    """Return what to expect and what is safe, as sentences."""
     space, count = found.space, len(found.passes)
     each = found.time / count
     times = f"one pass of {each:.1f} s" if count == 1 else f"{count} passes of {each:.1f} s"
@@ -76,12 +71,7 @@ def write_plan_report(
     command: str,
     driven: Sequence[Rehearsal],
 ) -> None:
-    """Write the report of a plan.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    """
+    """Write the report of a plan."""
     words = plan_words(found, driven)
     report = Report(
         title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",

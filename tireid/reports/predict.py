@@ -50,12 +50,7 @@ def write_predict_report(
     source: Path,
     command: str,
 ) -> None:
-    """Write the report of a prediction.
-
-    Parameters
-    ----------
-    told : what the command prints, lines of text without a table.
-    """
+    """Write the report of a prediction."""
     model, recording = prediction.model, prediction.recording
     notes: list[str | Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
     found: list[Block] = [*_errors(prediction)]
