@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpc.handover.consistency import Consistency, FullSample
+from mpc.handover.consistency import Consistency
 from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
+from mpc.loop.sensing import Measured
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
 
@@ -100,7 +101,7 @@ class Learner:
         self._left = 0.0  # time in which to arrive [s]
         self._quick = False
 
-    def observe(self, measured: FullSample, tracker: Tracker) -> str | None:
+    def observe(self, measured: Measured, tracker: Tracker) -> str | None:
         """Take a sample before the tracker steps; return what was decided, where that matters.
 
         Parameters

@@ -294,6 +294,12 @@ class Instance:
         """Take one iteration from the plan as it is; return the status."""
         return int(self._library.mpc_solve(*self.solve_arguments))
 
+    def command(self, steering: float, status: int, elapsed: float) -> Command:
+        """Return what to steer [rad] with the plan as it is, after a time of solving [s]."""
+        state = self.state
+        x, u = state["x"].astype(np.float64), state["u"].astype(np.float64)
+        return Command(steering, status, x, u, elapsed, int(state["iterations"]))
+
     def shift(self) -> None:
         """Move the plan ahead by a period."""
         self._library.mpc_shift(*self._step[:2])

@@ -14,7 +14,6 @@ from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, St
 from mpc.tires.tire import PredictionTire, valid_slip
 
 TOLERANCE = {False: 1e-8, True: 1e-5}  # of the solver, by `single`
-STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged
 
 
 class Tracker:
@@ -218,63 +217,7 @@ class Tracker:
         if self._budget is not None and elapsed > self._budget:
             instance.late(instead)
             status, steering = int(Status.LATE), instead
-        return self._command(steering, status, elapsed)
-
-    def solve(self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> Command:
-        """Take one iteration from the plan as it is; the steering is that behind the first stage.
-
-        Parameters
-        ----------
-        x0 : state at the beginning of the first stage (n_x,).
-        kappa : curvature of the stages [1/m], (N,) or a number.
-        v_x : speed of the stages [m/s], (N,) or a number.
-        """
-        instance = self.instance
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-        instance.start[:] = x0
-        start = self._clock()
-        status = instance.solve()
-        elapsed = self._clock() - start
-        return self._command(float(instance.state["x"][1, 4]), status, elapsed)
-
-    def prepare_solution(self, kappa: ArrayLike, v_x: ArrayLike) -> float:
-        """Do ahead of `solve` what does not ask for its state, along the plan as it is; return [s].
-
-        Parameters
-        ----------
-        kappa : curvature of the stages [1/m], (N,) or a number.
-        v_x : speed of the stages [m/s], (N,) or a number.
-        """
-        instance = self.instance
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-        start = self._clock()
-        instance.prepare_from(instance.state["x"][0])
-        return self._clock() - start
-
-    def solve_converged(
-        self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike, *, most: int = 100
-    ) -> Command:
-        """Iterate from a guess until the plan stays; its status is that of the last iteration.
-
-        Parameters
-        ----------
-        x0 : state at the beginning of the first stage (n_x,).
-        kappa : curvature of the stages [1/m], (N,) or a number.
-        v_x : speed of the stages [m/s], (N,) or a number.
-        """
-        instance = self.instance
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-        instance.guess(x0)
-        for _ in range(most):
-            before = instance.state["u"].copy()
-            command = self.solve(x0, kappa, v_x)
-            if np.abs(instance.state["u"] - before).max() <= STAYS:
-                return command
-        return command._replace(status=int(Status.ITERATION_LIMIT))
-
-    def shift(self) -> None:
-        """Move the plan ahead by a period, as `step` does."""
-        self.instance.shift()
+        return instance.command(steering, status, elapsed)
 
     def _planned_steering(self) -> float:
         """Return the steering that the plan says for the next step [rad]."""
@@ -282,8 +225,3 @@ class Tracker:
         share, (u, u_next) = self.period / self.problem.dt, state["u"][:2]
         planned = float(state["commands"][0] + self.period * (u + share * (u_next - u)))
         return min(max(planned, -limit), limit)
-
-    def _command(self, steering: float, status: int, elapsed: float) -> Command:
-        state = self.instance.state
-        x, u = state["x"].astype(np.float64), state["u"].astype(np.float64)
-        return Command(steering, status, x, u, elapsed, int(state["iterations"]))

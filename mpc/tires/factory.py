@@ -13,7 +13,7 @@ from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
-from mpc.tires.curves import DugoffAxles, FialaAxles, LaggedAxles, MagicAxles, linear_tire
+from mpc.tires.curves import LaggedAxles, LimitedAxles, MagicAxles, linear_tire
 from mpc.tires.ladder import axle_tire, fit_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
 from mpc.tires.tire import PredictionTire
@@ -61,7 +61,7 @@ def _plain_curve(model: CurveModel) -> PredictionTire:
     if model.curve == "magic_formula":
         return PredictionTire(MagicAxles(), q.ravel(), model.vehicle)
     limit = q[:, 1] * np.array(model.vehicle.axle_loads)
-    return PredictionTire(DugoffAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
+    return PredictionTire(LimitedAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
 
 
 def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
@@ -69,7 +69,7 @@ def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
 
 
 def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
-    structure = DugoffAxles() if isinstance(tire, DugoffTire) else FialaAxles()
+    structure = LimitedAxles(fiala=isinstance(tire, FialaTire))
     pairs = [[2.0 * tire.C_alpha, tire.friction * load] for load in vehicle.axle_loads]
     return PredictionTire(structure, np.array(pairs).ravel(), vehicle)
 

@@ -19,15 +19,7 @@ from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, load_ratio
-from mpc.tires.tire import (
-    DOUBT_STEP,
-    N_DOUBTS,
-    Pair,
-    Point,
-    PredictionTire,
-    as_it_is,
-    wheel_slip,
-)
+from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
 N_COMMON = 3
 N_AXLE = 2  # beside the w_j
@@ -42,7 +34,7 @@ class Axle(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LadderAxles:
+class LadderAxles(TireStructure):
     """Weights: [δ_0, b, σ_0], 1/α_j (n,), `Axle` in front and at the rear; where pressed, κ (2,);
     where mounted, [β, g].
 
@@ -58,7 +50,6 @@ class LadderAxles:
     """
 
     saturates = True
-    similar = as_it_is
 
     units: int
     lagged: bool = True
@@ -80,7 +71,7 @@ class LadderAxles:
         if self.mounted:
             angle, gain = at.w[self.n_weights - 2], at.w[self.n_weights - 1]
             v_y, delta = v_y - angle * at.v_x, (1 + gain) * delta
-        front, rear = wheel_slip(self, at._replace(v_y=v_y, delta=delta))
+        front, rear = TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
         return front + at.w[0], rear
 
     def force(self, slip: Pair, at: Point) -> Pair:
@@ -110,6 +101,11 @@ class LadderAxles:
         axles = w[N_COMMON + n : self._static].reshape(2, -1)  # a view
         axles[:, N_AXLE:] *= ratio
         return w
+
+    def similar(self, at: Point, ratio: Any) -> Point:
+        """Return `at`: nothing but slip makes the force."""
+        del ratio
+        return at
 
     def _loads(self, at: Point) -> Pair:
         """Return λ of the axles [-]; CasADi makes nothing of a factor of 1."""
