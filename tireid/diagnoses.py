@@ -16,18 +16,8 @@ from identifier.verdict.verdict import Objection
 from models.recordings import LogMap, Recording, Repair
 from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
+from tireid import report as page
 from tireid.output import text_table
-from tireid.report import (
-    Block,
-    Headline,
-    Paragraph,
-    Report,
-    Section,
-    Table,
-    Tone,
-    printed,
-    write_report,
-)
 from tireid.reports.common import READ, REPORT, drawing, origin
 
 HEADER = ("found", "size", "confidence", "repair")
@@ -106,7 +96,7 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
 
 
-def tone_of(diagnosis: Diagnosis) -> Tone:
+def tone_of(diagnosis: Diagnosis) -> page.Tone:
     """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
     if not diagnosis.healthy:
         return "bad"
@@ -115,25 +105,29 @@ def tone_of(diagnosis: Diagnosis) -> Tone:
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
     """Return what was found as warnings of a report."""
-    return [printed(f"the log: {one.text}") for one in diagnosis.findings]
+    return [page.printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
 def diagnosis_section(
-    diagnosis: Diagnosis, more: Sequence[Block] = (), heading: str = "Is the log right?"
-) -> Section:
+    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Is the log right?"
+) -> page.Section:
     """Return the section of a report that holds a diagnosis."""
     rows = finding_rows(diagnosis)
-    blocks: list[Block] = [
-        Paragraph(text="What is wrong with the log, or with what is told of its car, asked of the "
-                  "log alone. ± is one standard deviation.")
-    ]  # fmt: skip
+    blocks: list[page.Block] = [
+        page.Paragraph(
+            text="What is wrong with the log, or with what is declared of its car, by the log "
+            "alone. ± is one standard deviation."
+        )
+    ]
     if rows:
-        blocks.append(Table(caption="What was found.", header=list(HEADER), rows=rows))
-        blocks += [Paragraph(text=printed(one.text)) for one in diagnosis.findings]
+        blocks.append(page.Table(caption="What was found.", header=list(HEADER), rows=rows))
+        blocks += [page.Paragraph(text=page.printed(one.text)) for one in diagnosis.findings]
     else:
-        blocks.append(Paragraph(text="Nothing was found."))
-    blocks += [Paragraph(text=printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen]
-    return Section(heading=heading, blocks=[*blocks, *more])
+        blocks.append(page.Paragraph(text="Nothing was found."))
+    blocks += [
+        page.Paragraph(text=page.printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen
+    ]
+    return page.Section(heading=heading, blocks=[*blocks, *more])
 
 
 def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
@@ -185,30 +179,32 @@ def write_doctor_report(
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
     sections = [
         diagnosis_section(diagnosis),
-        Section(heading="What the tires say", blocks=[drawn]),
+        page.Section(heading="What the tires say", blocks=[drawn]),
     ]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))
     count = len(diagnosis.findings)
     numbers = [
-        Headline(
+        page.Headline(
             str(count),
             f"finding{'s' * (count != 1)} in the log or the car's file",
             tone_of(diagnosis),
         ),
-        Headline(str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"),
+        page.Headline(
+            str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"
+        ),
     ]
     if after is not None:
         left = str(len(after.findings))
-        numbers.append(Headline(left, "left after the repair", tone_of(after)))
-    report = Report(
+        numbers.append(page.Headline(left, "left after the repair", tone_of(after)))
+    report = page.Report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",
         numbers=numbers,
         warnings=diagnosis_warnings(diagnosis),
         sections=[*sections, origin(command, vehicle, [recording])],
     )
-    write_report(folder / REPORT, report)
+    page.write_report(folder / REPORT, report)
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:

@@ -17,16 +17,14 @@ from tireid.animation import write_film
 from tireid.animation.ground import Camera
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
-from tireid.figures import (
-    TireCurve,
-    axle_slip,
+from tireid.figures.drive import (
+    car_shape,
     drive_errors_figure,
     drive_path_figure,
     drive_solve_figure,
     drive_steering_figure,
-    drive_tires_figure,
 )
-from tireid.figures.drive import car_shape
+from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 
 CAR = sedan()
 SPEED, PERIOD = 16.0, 0.02

@@ -30,7 +30,7 @@ from tests.pages import faults_of, outline
 from tireid.cli import main
 from tireid.commands.certificate_table import certificate_of
 from tireid.commands.paper import PAPER, table_text, write_study
-from tireid.figures import force_figure
+from tireid.figures.forces import force_figure
 
 EXPECTED = Path(__file__).parent / "expected_tables.json"
 

@@ -38,6 +38,7 @@ from models.recordings import Recording
 from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import options as shared
 from tireid.commands.certificate_table import (
     bound_rows,
     certificate_of,
@@ -47,21 +48,8 @@ from tireid.commands.certificate_table import (
     monte_carlo_text,
     unit_text,
 )
-from tireid.commands.options import (
-    Chosen,
-    add_log_map,
-    add_method,
-    add_output,
-    add_seed,
-    add_vehicle,
-    chosen_method,
-    method_is_given,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
-)
-from tireid.figures import error_figure, locus_figure, save_figure
+from tireid.figures.paper import error_figure, locus_figure
+from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 
@@ -141,8 +129,8 @@ def add_parser(commands: Any) -> None:
         "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
         "--tune, find gains and write them.",
     )
-    add_vehicle(parser)
-    add_method(parser, LIVE)
+    shared.add_vehicle(parser)
+    shared.add_method(parser, LIVE)
     parser.add_argument(
         "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
     )
@@ -154,14 +142,14 @@ def add_parser(commands: Any) -> None:
             f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
         )
     parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
-    add_log_map(parser)
+    shared.add_log_map(parser)
     parser.add_argument(
         "--monte-carlo",
         type=int,
         metavar="N",
         help="run N random drives within what is judged: is a proven bound ever passed?",
     )
-    add_seed(parser, "--monte-carlo")
+    shared.add_seed(parser, "--monte-carlo")
     parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
     parser.add_argument(
         "--tune", type=Path, metavar="FILE", help="find gains and write them, for --design FILE"
@@ -176,7 +164,7 @@ def add_parser(commands: Any) -> None:
         "them), a leakage with a dead zone, or a projection in its place "
         f"({DEFAULT_KEEPING})",
     )
-    add_output(parser, None)
+    shared.add_output(parser, None)
     parser.set_defaults(run=run)
 
 
@@ -184,7 +172,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 0, or 1 where the design fails."""
     _require_sense(options)
     _require_drive(options)
-    vehicle = read_vehicle(options)
+    vehicle = shared.read_vehicle(options)
     name, method = _method(options, vehicle)
     if isinstance(method, PaperIdentifier):
         return _judge_gains(options, vehicle, method)
@@ -192,7 +180,7 @@ def run(options: argparse.Namespace) -> int:
     driving = replace(natural_driving(vehicle), **_overrides(options))
     certificate = certify(method, vehicle, driving)
     if options.along is not None:
-        drive = read_log(options.along, vehicle, told_map(options), dt=method.dt)
+        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
         along = method.certify_along(identify(drive, vehicle, method))
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
@@ -225,10 +213,10 @@ def _require_drive(options: argparse.Namespace) -> None:
             raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
 
 
-def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
+def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
-        return chosen_method(options, vehicle, online=True)
+        return shared.chosen_method(options, vehicle, online=True)
     if options.design is not None:
         raise ValueError("--tune finds gains: give no --design FILE to judge with it")
     law = options.method or REFERENCE
@@ -240,7 +228,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
     margin = options.phase_margin or PHASE_MARGIN
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
     known = found.operation(vehicle, driving)
-    return Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
+    return shared.Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
 
 
 def _refuse_gains(options: argparse.Namespace, name: str) -> None:
@@ -260,7 +248,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     certificate = certificate_of(design, vehicle, driving)
     drive = None
     if options.along is not None:
-        drive = read_log(options.along, vehicle, told_map(options), dt=design.dt)
+        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=design.dt)
     _require_free(options)
     observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)
@@ -278,8 +266,8 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     if drive is not None:
         texts.append(_along(drive, vehicle, design))
     if observed is not None:
-        numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed_of(options))
-        texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
+        numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, shared.seed_of(options))
+        texts.append(monte_carlo_text(rows, observed, shared.seed_of(options), design.force_unit))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
     text = "\n".join(texts)
@@ -307,7 +295,7 @@ def _say_written(options: argparse.Namespace) -> None:
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    method_is_given(options)
+    shared.method_is_given(options)
     if options.tune is None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
@@ -322,7 +310,7 @@ def _require_sense(options: argparse.Namespace) -> None:
             raise ValueError(f"--{name.replace('_', '-')} must not be negative, it is {value:g}")
     if options.seed is not None and options.monte_carlo is None:
         raise ValueError("--seed goes with --monte-carlo")
-    seed_of(options)
+    shared.seed_of(options)
     if options.monte_carlo is not None and options.monte_carlo < 1:
         raise ValueError(f"--monte-carlo must be at least 1, it is {options.monte_carlo}")
     require_few(ValueError, "--monte-carlo", options.monte_carlo or 0, "runs", "runs")
@@ -376,7 +364,7 @@ def _drive(
                 W=kept if math.isfinite(kept) else 0.0,
                 V=min(design.operation(vehicle, driving).V_start, design.gains.V_max),
             ),
-            rng=np.random.default_rng(seed_of(options)),
+            rng=np.random.default_rng(shared.seed_of(options)),
             progress=lambda done: progress(done / count),
         )
 

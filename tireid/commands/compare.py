@@ -18,6 +18,7 @@ from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE
+from tireid.commands import options as shared
 from tireid.commands.compare_results import (
     comparison_text,
     pair_tables,
@@ -26,22 +27,6 @@ from tireid.commands.compare_results import (
     write_comparison,
 )
 from tireid.commands.demo_story import plant_recordings
-from tireid.commands.options import (
-    add_accept,
-    add_jobs,
-    add_log_reading,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    exit_code,
-    jobs_of,
-    network_model,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
-)
 from tireid.learning import identify
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
@@ -65,7 +50,7 @@ def add_parser(commands: Any) -> None:
         epilog=f"methods: {', '.join(METHODS)}",
     )
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
-    add_vehicle(parser)
+    shared.add_vehicle(parser)
     parser.add_argument(
         "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
     )
@@ -82,17 +67,17 @@ def add_parser(commands: Any) -> None:
         metavar="N",
         help="starts of each fit to the true forces (%(default)s; 0: none)",
     )
-    add_seed(parser, "sensor noise, sweep, floors, and the weights of networks")
-    add_jobs(parser)
+    shared.add_seed(parser, "sensor noise, sweep, floors, and the weights of networks")
+    shared.add_jobs(parser)
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="do the sweep on the Dask cluster of this scheduler, as in tcp://host:8786",
     )
-    add_log_reading(parser)
-    add_network_arguments(parser, "compare with this network, which learns nothing")
-    add_accept(parser)
-    add_output(parser, "compare")
+    shared.add_log_reading(parser)
+    shared.add_network_arguments(parser, "compare with this network, which learns nothing")
+    shared.add_accept(parser)
+    shared.add_output(parser, "compare")
     parser.set_defaults(run=run)
 
 
@@ -102,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
         if getattr(options, name) < least:
             raise ValueError(f"--{name} must be at least {least}, it is {getattr(options, name)}")
         require_few(ValueError, f"--{name}", getattr(options, name), "runs", "runs")
-    seed, jobs = seed_of(options), jobs_of(options)
+    seed, jobs = shared.seed_of(options), shared.jobs_of(options)
     names = list(dict.fromkeys(options.method or METHODS))
     unknown = [name for name in names if name not in METHODS]
     if unknown:
@@ -113,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
     there = cluster(options.scheduler) if options.scheduler else nullcontext()
-    vehicle = read_vehicle(options)
+    vehicle = shared.read_vehicle(options)
     others = _network(options, vehicle)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with (
@@ -177,7 +162,7 @@ def run(options: argparse.Namespace) -> int:
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
-    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
+    return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
@@ -187,13 +172,15 @@ def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
     """Return the network of --network as a method by the name of its file."""
-    model = network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
+    model = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
     return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    told = told_map(options)
-    recordings = [read_log(log, vehicle, told, check=not options.no_check) for log in options.logs]
+    told = shared.told_map(options)
+    recordings = [
+        shared.read_log(log, vehicle, told, check=not options.no_check) for log in options.logs
+    ]
     if options.simulate or not options.logs:
         say(f"driving the plant of {vehicle.name} with noisy sensors")
         recordings += plant_recordings(vehicle, np.random.default_rng(seed))

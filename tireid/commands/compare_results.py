@@ -29,13 +29,9 @@ from identifier.methods import METHODS, make_method
 from identifier.reproducibility import AxleRmse
 from identifier.verdict import Verdict
 from tireid import __version__
-from tireid.figures import (
-    matrix_figure,
-    methods_figure,
-    pareto_figure,
-    save_figure,
-    side_slip_figure,
-)
+from tireid.figures.compare import matrix_figure, methods_figure, pareto_figure
+from tireid.figures.side_slip import side_slip_figure
+from tireid.figures.style import save_figure
 from tireid.output import text_table, write_json
 from tireid.progress import say
 from tireid.reports.compare import HINDSIGHT

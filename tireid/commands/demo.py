@@ -11,7 +11,9 @@ from matplotlib.figure import Figure
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict, judge, judge_prediction
+from tireid import report as page
 from tireid.commands import COMMANDS
+from tireid.commands import options as shared
 from tireid.commands.certificate_table import (
     HEADER,
     advised,
@@ -35,7 +37,6 @@ from tireid.commands.demo_parts import (
 )
 from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
 from tireid.commands.identify_results import write_results
-from tireid.commands.options import add_output
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -46,20 +47,9 @@ from tireid.commands.paper import (
     table_text,
     write_study,
 )
-from tireid.figures import side_by_side_figure
+from tireid.figures.forces import side_by_side_figure
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
-from tireid.report import (
-    Block,
-    Paragraph,
-    Picture,
-    Report,
-    Section,
-    Subheading,
-    Table,
-    printed,
-    write_report,
-)
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.reports.identify import (
     curve_drawing,
@@ -92,11 +82,11 @@ def demo_report(
     figures: Mapping[str, Mapping[str, Figure]],
     folder: Path,
     command: str,
-) -> Report:
+) -> page.Report:
     """Return the report: the product first, the paper's study folded."""
     learnt = story.axle.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
-    return Report(
+    return page.Report(
         title=TITLE,
         summary=SUMMARY,
         numbers=[
@@ -113,7 +103,7 @@ def demo_report(
             _learn(figures["identify"], model, verdict),
             _predict(story),
             package_section(shipped),
-            Section(
+            page.Section(
                 heading="The paper's study",
                 blocks=[
                     *_certify(story, folder / "paper_network"),
@@ -128,18 +118,18 @@ def demo_report(
     )
 
 
-def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> Section:
-    return Section(
+def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> page.Section:
+    return page.Section(
         heading="What was learnt",
         blocks=[
-            Paragraph(
+            page.Paragraph(
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
                 f"drives a slalom at {SPEED:g} m/s. The identifier sees what any log has, speed, "
                 "lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it never "
                 "sees a force."
             ),
-            Paragraph(
+            page.Paragraph(
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
@@ -159,14 +149,14 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
     )
 
 
-def _predict(story: Story) -> Section:
-    blocks: list[Block] = [
-        Paragraph(
+def _predict(story: Story) -> page.Section:
+    blocks: list[page.Block] = [
+        page.Paragraph(
             text="Reproducing the drive that was learnt is the easier half. The same frozen "
             "weights predict two other maneuvers, beside them the paper's network and law, learnt "
             "on the same slalom with gains from the phase margin of their loop."
         ),
-        Table(
+        page.Table(
             caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
             header=[
@@ -187,33 +177,33 @@ def _predict(story: Story) -> Section:
         figure = side_by_side_figure(story.side_by_side(name))
         caption = f"Both methods, frozen after the slalom, asked about the {said}."
         blocks.append(drawing(figure, caption, READ["replay"]))
-    return Section(heading="Drives that were not learnt are predicted", blocks=blocks)
+    return page.Section(heading="Drives that were not learnt are predicted", blocks=blocks)
 
 
-def _certify(story: Story, learning: Path) -> list[Block]:
+def _certify(story: Story, learning: Path) -> list[page.Block]:
     certificate, unit = story.certificate, story.design.force_unit
     said = [f"{e.title}: {e.status}; {e.advice}." for e in advised(certificate)]
     said += [f"Note: {remark}." for remark in notes(certificate)]
     return [
-        Subheading(text="The gains of the paper's law are judged before it learns"),
-        Paragraph(
+        page.Subheading(text="The gains of the paper's law are judged before it learns"),
+        page.Paragraph(
             text="The certificate follows from the gains, the network and how hard the car is "
-            f"driven, not from a run. {printed(verdict_line(certificate)).capitalize()}."
+            f"driven, not from a run. {page.printed(verdict_line(certificate)).capitalize()}."
         ),
-        Table(
+        page.Table(
             caption="Properties of the learning loop at the worst regressor; those without a "
             "limit are stated, not judged.",
             header=list(HEADER),
-            rows=[[printed(c) if isinstance(c, str) else c for c in row]
+            rows=[[page.printed(c) if isinstance(c, str) else c for c in row]
                   for row in certificate_rows(certificate, unit)],
         ),
-        *(Paragraph(text=printed(one)) for one in said),
-        Picture(
+        *(page.Paragraph(text=page.printed(one)) for one in said),
+        page.Picture(
             image=learning / "locus.png",
             caption="Poles of the sampled loop at any gain, and at the gain of the design.",
             read="All poles inside the circle: it is stable; far inside: it is damped.",
         ),
-        Picture(
+        page.Picture(
             image=learning / "bounds.png",
             caption="Proven bounds on the error norm, and the error that happened.",
             read="The error stays below each bound; the gap is what the proof gives away.",
@@ -221,11 +211,11 @@ def _certify(story: Story, learning: Path) -> list[Block]:
     ]  # fmt: skip
 
 
-def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
+def _network(story: Story, paper: Mapping[str, Figure]) -> list[page.Block]:
     design, gains = story.design, story.design.gains
     return [
-        Subheading(text="The paper's network on the same slalom"),
-        Paragraph(
+        page.Subheading(text="The paper's network on the same slalom"),
+        page.Paragraph(
             text="At every sample an observer predicts the motion; its error drives the weights of "
             f"a network of {design.network.hidden} hidden units, which corrects the linear tire. "
             "The law is the integral law of the paper: A_d is "
@@ -242,21 +232,21 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
     ]
 
 
-def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
-    blocks: list[Block] = [
-        Subheading(text="The frozen-weight reproducibility test: slalom"),
-        Paragraph(
+def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
+    blocks: list[page.Block] = [
+        page.Subheading(text="The frozen-weight reproducibility test: slalom"),
+        page.Paragraph(
             text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets what it learnt before. "
-            f"{printed(MEASURES_MEAN)}"
+            f"{page.printed(MEASURES_MEAN)}"
         ),
-        Table(
+        page.Table(
             caption="Table II of the paper beside ours, RMSE of the axle force [kN]: median "
             f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
-            header=[printed(word) for word in header()],
+            header=[page.printed(word) for word in header()],
             rows=rows("slalom", study),
         ),
-        Paragraph(text=printed(MEANING)),
+        page.Paragraph(text=page.printed(MEANING)),
     ]
     return [
         *blocks,
@@ -270,23 +260,23 @@ def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
                 "error).",
             },
         ),
-        Paragraph(text=printed(settings(GAINS, NETWORK).splitlines()[0])),
+        page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),
     ]
 
 
-def _step(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
+def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
     return [
-        Subheading(text="The frozen-weight reproducibility test: step steer"),
-        Paragraph(
+        page.Subheading(text="The frozen-weight reproducibility test: step steer"),
+        page.Paragraph(
             text="The step is held from 29 s on and goes back to half its angle at 36 s. By "
             "the paper's measure the order of the laws is the reverse of the slalom's; against "
             "truth it is not: what the integral law said online on the ramp was further from "
             "the truth than what its frozen weights say of it. After 36 s, at "
             "an angle that was not learnt, all of them miss more than the linear tire."
         ),
-        Table(
+        page.Table(
             caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
-            header=[printed(word) for word in header()],
+            header=[page.printed(word) for word in header()],
             rows=rows("step_steer", study),
         ),
         *_drawn(
@@ -299,7 +289,7 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
     ]
 
 
-def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[Block]:
+def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[page.Block]:
     """Return the figures that there are: a law that diverged on every seed has none."""
     return [
         drawing(figures[name], caption) for name, caption in captions.items() if name in figures
@@ -328,7 +318,7 @@ def add_parser(commands: Any) -> None:
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
         "tables, and steer the car along a path on what it learnt; leaves one report.html to read.",
     )
-    add_output(parser, "demo")
+    shared.add_output(parser, "demo")
     parser.set_defaults(run=run)
 
 
@@ -371,7 +361,7 @@ def run(options: argparse.Namespace) -> None:
         report = demo_report(
             story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
         )
-        write_report(folder / REPORT, report)
+        page.write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_text(story.certificate, story.design.force_unit)}\n",

@@ -8,15 +8,7 @@ from models.recordings import Repair
 from models.recordings.reader import repair_text
 from tireid import __version__
 from tireid.commands import COMMANDS, DONE, NOT_VALID
-from tireid.commands.options import (
-    add_accept,
-    add_log_map,
-    add_output,
-    add_vehicle,
-    read_log,
-    read_vehicle,
-    told_map,
-)
+from tireid.commands import options as shared
 from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
 from tireid.figures.forces import draw_diagnosis
 from tireid.figures.style import save_figure
@@ -36,12 +28,12 @@ def add_parser(commands: Any) -> None:
         "be (--log FILE).",
     )
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
-    add_vehicle(parser, required=True)
+    shared.add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    add_log_map(parser)
+    shared.add_log_map(parser)
     add_repair(parser, "and write it to")
-    add_accept(parser)
-    add_output(parser, None)
+    shared.add_accept(parser)
+    shared.add_output(parser, None)
     parser.set_defaults(run=run)
 
 
@@ -51,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
         if options.repair.suffix.lower() != ".toml":
             raise ValueError(f"{options.repair}: the name must end in .toml")
         require_free(options.repair, force=options.force)
-    vehicle, told = read_vehicle(options), told_map(options)
-    recording = read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
+    vehicle, told = shared.read_vehicle(options), shared.told_map(options)
+    recording = shared.read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()

@@ -17,16 +17,9 @@ from models.vehicle import Vehicle
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
+from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.commands.drive_results import NO_FILM, drive_table, known_curves, write_drives
-from tireid.commands.options import (
-    add_method,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    add_weights,
-)
 from tireid.driving.learn import DURATION
 from tireid.driving.runs import (
     FROZEN,
@@ -165,9 +158,9 @@ def add_parser(commands: Any) -> None:
         metavar="NAME",
         help=f"what the tracker is told: {', '.join(TIRES)}, or {ALL}; the first leads ({FROZEN})",
     )
-    add_weights(parser, "the frozen tires, as identified")
-    add_method(parser)
-    add_vehicle(parser)
+    shared.add_weights(parser, "the frozen tires, as identified")
+    shared.add_method(parser)
+    shared.add_vehicle(parser)
     parser.add_argument(
         "--delay",
         type=float,
@@ -215,7 +208,7 @@ def add_parser(commands: Any) -> None:
         help="of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
         "plans with the least grip that its motion leaves possible (%(default)g)",
     )
-    add_seed(parser, "noise and learning")
+    shared.add_seed(parser, "noise and learning")
     parser.add_argument(
         "--laps", type=float, default=1.0, metavar="N", help="of a closed path (%(default)g)"
     )
@@ -226,8 +219,8 @@ def add_parser(commands: Any) -> None:
         metavar="NAME",
         help=f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)",
     )
-    add_network_arguments(parser, "steer on this frozen network")
-    add_output(parser, "drive")
+    shared.add_network_arguments(parser, "steer on this frozen network")
+    shared.add_output(parser, "drive")
     parser.set_defaults(run=run)
 
 

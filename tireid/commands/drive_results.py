@@ -19,18 +19,16 @@ from tireid.animation import write_film
 from tireid.animation.known import known_over_time, steady_curve
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run
 from tireid.driving.setup import Setup
-from tireid.figures import (
-    axle_slip,
+from tireid.figures.drive import (
+    AT_THE_END,
     drive_errors_figure,
-    drive_lateral_figure,
     drive_path_figure,
     drive_solve_figure,
     drive_steering_figure,
-    drive_tires_figure,
-    save_figure,
 )
-from tireid.figures.drive import AT_THE_END
-from tireid.figures.tires import TireCurve
+from tireid.figures.side_slip import drive_lateral_figure
+from tireid.figures.style import save_figure
+from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import text_table, write_csv, write_json
 from tireid.progress import say
 

@@ -9,16 +9,7 @@ from identifier.tire_model import TireModel, load_model
 from models.vehicle import Vehicle
 from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS
-from tireid.commands.options import (
-    add_method,
-    add_output,
-    add_vehicle,
-    add_weights,
-    chosen_method,
-    method_is_given,
-    read_vehicle,
-    say_estimates,
-)
+from tireid.commands import options as shared
 from tireid.exporting import export
 from tireid.progress import say
 from tireid.verdicts import warn_of_stored
@@ -33,9 +24,9 @@ def add_parser(commands: Any) -> None:
         "README with its cost on Arm processors where the tools are there, and a JSON file of all "
         "that went in.",
     )
-    add_vehicle(parser)
-    add_method(parser, LIVE)
-    add_weights(parser, "begin with it, as identified")
+    shared.add_vehicle(parser)
+    shared.add_method(parser, LIVE)
+    shared.add_weights(parser, "begin with it, as identified")
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
     parser.add_argument("--single", action="store_true", help="float unless the build says double")
     parser.add_argument(
@@ -61,7 +52,7 @@ def add_parser(commands: Any) -> None:
         help="of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
         "number of its parameters (%(default)g)",
     )
-    add_output(parser, "export")
+    shared.add_output(parser, "export")
     parser.set_defaults(run=run)
 
 
@@ -96,13 +87,13 @@ def run(options: argparse.Namespace) -> None:
 
 def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
     if start is None or options.vehicle is not None:
-        return read_vehicle(options)
-    say_estimates(start.vehicle, options.weights)
+        return shared.read_vehicle(options)
+    shared.say_estimates(start.vehicle, options.weights)
     return start.vehicle
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     """Return the method that is asked for; else the one that goes on from the model."""
-    if start is None or method_is_given(options):
-        return chosen_method(options, vehicle, online=True).method
+    if start is None or shared.method_is_given(options):
+        return shared.chosen_method(options, vehicle, online=True).method
     return continuing(start, vehicle)

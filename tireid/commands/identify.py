@@ -31,6 +31,7 @@ from models.recordings import (
 )
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
+from tireid.commands import options as shared
 from tireid.commands.certificate_table import resumed_line, verdict_line
 from tireid.commands.identify_results import (
     NETWORK,
@@ -42,23 +43,6 @@ from tireid.commands.identify_results import (
     no_truth,
     write_network_results,
     write_results,
-)
-from tireid.commands.options import (
-    add_accept,
-    add_log_reading,
-    add_method,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    add_weights,
-    chosen_method,
-    exit_code,
-    network_model,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
 )
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
@@ -95,9 +79,9 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
     )
-    add_vehicle(parser, required=True)
+    shared.add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    add_method(parser)
+    shared.add_method(parser)
     parser.add_argument(
         "--freeze",
         nargs="+",
@@ -122,12 +106,12 @@ def add_parser(commands: Any) -> None:
         help="state forces that are guaranteed where no force differs from the best curve by more "
         "than E static axle loads, or, with a second number, is late by more [s] (estimated)",
     )
-    add_log_reading(parser)
+    shared.add_log_reading(parser)
     add_repair(parser, "learn on what is left, and write it to")
-    add_weights(parser, "begin learning with it")
-    add_seed(parser, "the initial weights of the paper's network")
-    add_network_arguments(parser, "freeze nothing, judge this network instead")
-    add_accept(parser)
+    shared.add_weights(parser, "begin learning with it")
+    shared.add_seed(parser, "the initial weights of the paper's network")
+    shared.add_network_arguments(parser, "freeze nothing, judge this network instead")
+    shared.add_accept(parser)
     parser.add_argument(
         "--curves",
         choices=("csv", "parquet"),
@@ -135,16 +119,16 @@ def add_parser(commands: Any) -> None:
         help="as what curves over time are written (csv); parquet is smaller, sooner written and "
         "has all digits",
     )
-    add_output(parser, "identify")
+    shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
-    vehicle = read_vehicle(options)
-    seed = None if options.seed is None else seed_of(options)
+    vehicle = shared.read_vehicle(options)
+    seed = None if options.seed is None else shared.seed_of(options)
     beside = options.network is not None  # of which something learns online
-    law, design = chosen_method(options, vehicle, seed, online=beside)
+    law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     bound = None if options.bound is None else AskedBound.of(options.bound)
@@ -163,7 +147,7 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        law, design = chosen_method(options, vehicle, seed, without_v_y=True)
+        law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):
         check_recording(one, design)
@@ -173,13 +157,15 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
-        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y, online=beside)
+        law, design = shared.chosen_method(
+            options, vehicle, seed, without_v_y=without_v_y, online=beside
+        )
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
             check_against_vehicle(one, vehicle)
     recording = joined(logs)
-    network = network_model(options, vehicle, design.min_speed)
+    network = shared.network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
     if network is None:
@@ -259,11 +245,11 @@ def run(options: argparse.Namespace) -> int:
             asked=asked,
         )
     if repair:
-        write_repair(options.repair, told_map(options), diagnosis)
+        write_repair(options.repair, shared.told_map(options), diagnosis)
         say(f"wrote {options.repair}")
     tell(told)
     say(f"wrote {options.out}/")
-    return max(exit_code(one, options) for one in (verdict, *asked.values()))
+    return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
 
 
 def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
@@ -314,10 +300,10 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
 def _read(
     log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
 ) -> Recording:
-    recording = read_log(
+    recording = shared.read_log(
         log,
         vehicle,
-        told_map(options),
+        shared.told_map(options),
         run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,

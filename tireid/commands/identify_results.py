@@ -31,19 +31,12 @@ from identifier.verdict import Verdict, calibrated, guaranteed
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
-from tireid.figures import (
-    error_figure,
-    force_figure,
-    inputs_figure,
-    learnt_axles_figure,
-    prediction_figure,
-    save_figure,
-    side_slip_figure,
-    slip_figure,
-    weights_figure,
-)
+from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
+from tireid.figures.paper import error_figure, weights_figure
+from tireid.figures.side_slip import side_slip_figure
+from tireid.figures.style import save_figure
 from tireid.figures.thinned import DrawnRun
-from tireid.figures.tires import drawn_tracks
+from tireid.figures.tires import drawn_tracks, learnt_axles_figure, slip_figure
 from tireid.output import text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 from tireid.reports.identify import guaranteed_sentence

@@ -36,7 +36,10 @@ from models.vehicle import sedan
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import certificate_of, verdict_line
 from tireid.commands.options import add_output
-from tireid.figures import comparison_figure, force_figure, save_figure, scheme_figure
+from tireid.figures.forces import force_figure
+from tireid.figures.paper import comparison_figure
+from tireid.figures.scheme import scheme_figure
+from tireid.figures.style import save_figure
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, say, tell
 

@@ -18,15 +18,9 @@ from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 from tireid import __version__
 from tireid.commands import COMMANDS
-from tireid.commands.options import (
-    add_output,
-    add_seed,
-    add_vehicle,
-    read_vehicle,
-    say_estimates,
-    seed_of,
-)
-from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
+from tireid.commands import options as shared
+from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
+from tireid.figures.style import save_figure
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.planning import (
     FRICTION,
@@ -58,7 +52,7 @@ def add_parser(commands: Any) -> None:
         "30 %, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
         "and report.html, which compares it with a slalom and with random steering.",
     )
-    add_vehicle(parser, default="the sedan; with --after that of the model")
+    shared.add_vehicle(parser, default="the sedan; with --after that of the model")
     parser.add_argument(
         "--area", required=True, metavar="LxW", help="length and width [m], as 40x40"
     )
@@ -125,8 +119,8 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="nobody holds the course, steering alone is played: takes more room",
     )
-    add_seed(parser, "the search")
-    add_output(parser, "plan")
+    shared.add_seed(parser, "the search")
+    shared.add_output(parser, "plan")
     parser.set_defaults(run=run)
 
 
@@ -137,15 +131,15 @@ def run(options: argparse.Namespace) -> int:
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
     _require_ranges(options)
-    seed, model = seed_of(options), None
+    seed, model = shared.seed_of(options), None
     if options.after is not None:
         model = load_model(options.after)
         warn_of_stored(options.after)
     if model is not None and options.vehicle is None:
         vehicle = model.vehicle
-        say_estimates(vehicle, options.after)
+        shared.say_estimates(vehicle, options.after)
     else:
-        vehicle = read_vehicle(options)
+        vehicle = shared.read_vehicle(options)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
             found = plan(
@@ -264,7 +258,7 @@ def inputs_of(
         "steering_angle_deg": options.steering_angle,
         "steering_lag_s": options.steering_lag,
         "blind": options.blind,
-        "seed": seed_of(options),
+        "seed": shared.seed_of(options),
     }
 
 

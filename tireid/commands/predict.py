@@ -19,26 +19,12 @@ from identifier.verdict import RoadFriction, Verdict, contradictions, within_ban
 from models.recordings.record import ALL
 from tireid import __version__
 from tireid.commands import COMMANDS
+from tireid.commands import options as shared
 from tireid.commands.identify_results import error_cells
-from tireid.commands.options import (
-    add_accept,
-    add_log_reading,
-    add_output,
-    add_vehicle,
-    exit_code,
-    read_log,
-    read_vehicle,
-    repaired_vehicle,
-    say_estimates,
-    told_map,
-)
-from tireid.figures import (
-    friction_figure,
-    motion_figure,
-    prediction_figure,
-    save_figure,
-    slip_figure,
-)
+from tireid.figures.forces import prediction_figure
+from tireid.figures.predict import friction_figure, motion_figure
+from tireid.figures.style import save_figure
+from tireid.figures.tires import slip_figure
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_csv, write_json, write_long_csv
 from tireid.progress import say, tell
@@ -59,21 +45,21 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
-    add_vehicle(parser, default="that of the model")
+    shared.add_vehicle(parser, default="that of the model")
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    add_log_reading(parser)
-    add_accept(parser)
-    add_output(parser, "predict")
+    shared.add_log_reading(parser)
+    shared.add_accept(parser)
+    shared.add_output(parser, "predict")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where the model does not give back the drive's motion."""
     model = _model(options)
-    recording = read_log(
+    recording = shared.read_log(
         options.log,
         model.vehicle,
-        told_map(options),
+        shared.told_map(options),
         run_name=options.run_name,
         check=not options.no_check,
     )
@@ -108,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
     table = error_table(prediction)
     tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
     say(f"wrote {options.out}/")
-    return exit_code(verdict, options)
+    return shared.exit_code(verdict, options)
 
 
 def _model(options: argparse.Namespace) -> TireModel:
@@ -116,10 +102,10 @@ def _model(options: argparse.Namespace) -> TireModel:
     model = load_model(options.model)
     warn_of_stored(options.model)
     if options.vehicle is None:
-        say_estimates(model.vehicle, options.model)
-        vehicle = repaired_vehicle(model.vehicle, options)
+        shared.say_estimates(model.vehicle, options.model)
+        vehicle = shared.repaired_vehicle(model.vehicle, options)
     else:
-        vehicle = read_vehicle(options)
+        vehicle = shared.read_vehicle(options)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:

@@ -15,17 +15,7 @@ from identifier.compare.course import Shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, frozen_share, pareto_front
 from identifier.reproducibility import AxleRmse
-from tireid.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PAGE,
-    legend_above,
-    new_figure,
-    note,
-    styled,
-)
+from tireid.figures import style
 
 # Labels and scales that the figures of a comparison share.
 
@@ -74,17 +64,21 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 ONLINE, OWN, OTHER = "online", "frozen, where learnt", "frozen, other recordings"
-KINDS = {ONLINE: (BLUE, "o", -0.22), OWN: (GREEN, "D", 0.0), OTHER: (ORANGE, "s", 0.22)}
+KINDS = {
+    ONLINE: (style.BLUE, "o", -0.22),
+    OWN: (style.GREEN, "D", 0.0),
+    OTHER: (style.ORANGE, "s", 0.22),
+}
 ROW = 0.3  # height of a method [in]
 
 
-@styled
+@style.styled
 def methods_figure(comparison: Comparison) -> Figure:
     """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
     floors = {f"floor, {name}": floor_errors(comparison, name) for name in comparison.floors}
-    figure = new_figure(PAGE, 0.9 + ROW * (len(rows) + len(floors)))
+    figure = style.new_figure(style.PAGE, 0.9 + ROW * (len(rows) + len(floors)))
     axes = figure.subplots()
     every = [v for row in (*rows.values(), *floors.values()) for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
@@ -96,19 +90,19 @@ def methods_figure(comparison: Comparison) -> Figure:
                 0.995,
                 position,
                 "diverged",
-                color=GREY,
+                color=style.GREY,
                 ha="right",
                 va="center",
                 transform=axes.get_yaxis_transform(),
             )
         axes.axhline(position + 0.5, color="#DDDDDD", linewidth=0.5)
-    axes.axhline(len(rows) - 0.5, color=GREY, linewidth=0.8)
+    axes.axhline(len(rows) - 0.5, color=style.GREY, linewidth=0.8)
     axes.set_yticks(range(len(rows) + len(floors)), [*rows, *floors])
     axes.tick_params(axis="y", length=0.0)
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(rows) + len(floors) - 0.5, -0.5)
     axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
@@ -160,7 +154,7 @@ DARK = 0.55  # share of the color scale from which text is white
 LONGEST = 17  # letters of a recording's name beside a map
 
 
-@styled
+@style.styled
 def matrix_figure(comparison: Comparison) -> Figure:
     """Draw the frozen error of each method, rows learnt on, columns replayed on."""
     maps = {
@@ -174,8 +168,8 @@ def matrix_figure(comparison: Comparison) -> Figure:
     size = len(comparison.names)
     columns = min(len(maps), 4 if size <= 4 else 2)
     rows = math.ceil(len(maps) / columns)
-    cell = (PAGE - 1.6) / columns / size
-    figure = new_figure(PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
+    cell = (style.PAGE - 1.6) / columns / size
+    figure = style.new_figure(style.PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
     grid = figure.subplots(rows, columns, squeeze=False)
     norm, colors = LogNorm(BEST, WORST), colormaps["viridis_r"]
     for axes, (label, frozen) in zip(grid.flat, maps.items(), strict=False):
@@ -238,7 +232,7 @@ OTHERS, SIGNAL = "fronts of the other methods", "online error of a signal estima
 Point = tuple[float, float]
 
 
-@styled
+@style.styled
 def pareto_figure(comparison: Comparison) -> Figure:
     """Draw a panel for each method: its designs, its front before those of all others."""
     names = [name for name in ranking(comparison) if name in comparison.sweeps]
@@ -248,7 +242,7 @@ def pareto_figure(comparison: Comparison) -> Figure:
     fronts = {name: _points(pareto_front(comparison.sweeps[name])) for name in names}
     columns = min(4, len(names))
     rows = math.ceil(len(names) / columns)
-    figure = new_figure(PAGE, 0.9 + 1.55 * rows)
+    figure = style.new_figure(style.PAGE, 0.9 + 1.55 * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     limits = _limits(comparison, list(clouds.values()), list(fronts.values()))
     for axes, name in zip(grid.flat, names, strict=False):
@@ -260,7 +254,7 @@ def pareto_figure(comparison: Comparison) -> Figure:
         _draw_method(axes, comparison, name, clouds[name], fronts[name])
         axes.set_title(method_label(name))
         lost = sum(bool(candidate.diverged_on) for candidate in comparison.sweeps[name])
-        note(axes, f"{lost} diverged" if lost else "")
+        style.note(axes, f"{lost} diverged" if lost else "")
     for number, axes in enumerate(grid.flat):
         axes.set_visible(number < len(names))
         axes.tick_params(labelbottom=number + columns >= len(names))
@@ -268,7 +262,7 @@ def pareto_figure(comparison: Comparison) -> Figure:
     where = "elsewhere" if len(comparison.names) > 1 else "where learnt"
     figure.supylabel(f"frozen {where} [%]", fontsize=8.0)
     signals = any(frozen_share(comparison.shares(name)) is None for name in names)
-    legend_above(
+    style.legend_above(
         figure, columns=3 if signals else 4, order=(DESIGN, FRONT, DEFAULT, OTHERS, SIGNAL)
     )
     return figure
@@ -282,15 +276,15 @@ def _draw_method(
         ends = axes.get_xlim()[1], axes.get_ylim()[1]
         inside = np.minimum(cloud, ends)  # what is farther away is drawn at the edge
         axes.plot(
-            *inside.T, ".", color=BLUE, markersize=2.5, alpha=0.5, label=DESIGN, clip_on=False
+            *inside.T, ".", color=style.BLUE, markersize=2.5, alpha=0.5, label=DESIGN, clip_on=False
         )
-        axes.plot(*_stairs(front), color=BLUE, linewidth=1.4, label=FRONT)
+        axes.plot(*_stairs(front), color=style.BLUE, linewidth=1.4, label=FRONT)
     default = _point(own)
     if default is not None:
         axes.plot(
             *np.minimum(default, FARTHEST),
             "*",
-            color=ORANGE,
+            color=style.ORANGE,
             markersize=8.0,
             markeredgecolor="white",
             markeredgewidth=0.5,
@@ -298,10 +292,12 @@ def _draw_method(
         )
     sane = [c.shares.online for c in comparison.sweeps[name] if not c.diverged_on]
     if frozen_share(own) is None and sane:
-        axes.axvline(min(sane), color=BLUE, linewidth=1.2, linestyle=(0, (4, 2)), label=SIGNAL)
-        note(axes, "signal")
+        axes.axvline(
+            min(sane), color=style.BLUE, linewidth=1.2, linestyle=(0, (4, 2)), label=SIGNAL
+        )
+        style.note(axes, "signal")
     elif not cloud:
-        axes.text(0.5, 0.5, "all diverged", transform=axes.transAxes, ha="center", color=GREY)
+        axes.text(0.5, 0.5, "all diverged", transform=axes.transAxes, ha="center", color=style.GREY)
 
 
 def _point(found: Shares) -> Point | None:

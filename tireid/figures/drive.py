@@ -12,19 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
-from tireid.figures.style import (
-    AMBER,
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    PAGE,
-    PURPLE,
-    TIME,
-    legend_above,
-    new_figure,
-    styled,
-)
+from tireid.figures import style
 
 if TYPE_CHECKING:
     from mpc.loop import Drive
@@ -37,17 +25,17 @@ WIDE = 10.0  # times slower than the median: from there on the axis is logarithm
 MILLI = 1e3
 
 
-@styled
+@style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive as a histogram and over time."""
     times = MILLI * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
-    figure = new_figure(PAGE, 2.7)
+    figure = style.new_figure(style.PAGE, 2.7)
     left, right = figure.subplots(1, 2)
     wide = largest > WIDE * median
     low = float(times.min()) / 1.1 if wide else 0.0
     bins = np.geomspace(low, 1.1 * largest, BINS) if wide else np.linspace(low, 1.1 * largest, BINS)
-    left.hist(times, bins=list(bins), color=BLUE, alpha=0.8)
+    left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
     left.set(xlabel="solve time [ms]", ylabel="steps [-]", xlim=(low, 1.1 * largest))
     right.plot(
         drive.t,
@@ -56,7 +44,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         marker=".",
         markersize=2.2,
         markeredgewidth=0.0,
-        color=BLUE,
+        color=style.BLUE,
         rasterized=True,
         label="a step",
     )
@@ -68,13 +56,13 @@ def drive_solve_figure(drive: "Drive") -> Figure:
             linestyle="",
             marker="x",
             markersize=4.0,
-            color=ORANGE,
+            color=style.ORANGE,
             label=f"failed ({np.count_nonzero(failed)})",
         )
-    for value, name, color in ((median, "median", PURPLE), (p99, "99 %", ORANGE)):
+    for value, name, color in ((median, "median", style.PURPLE), (p99, "99 %", style.ORANGE)):
         text = f"{name} {value:.3g} ms"
         left.axvline(value, color=color, linewidth=1.1, linestyle=(0, (4, 1.5)), label=text)
-    right.set(xlabel=TIME, ylabel="solve time [ms]", ylim=(low, 1.3 * largest))
+    right.set(xlabel=style.TIME, ylabel="solve time [ms]", ylim=(low, 1.3 * largest))
     if wide:
         left.set_xscale("log")
         right.set_yscale("log")
@@ -86,7 +74,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         f"largest {largest:.3g} ms of a period of {MILLI * drive.period:g} ms", loc="right"
     )
     left.set_title(f"{times.size} steps")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
@@ -104,17 +92,17 @@ CONES: Mapping[str, Any] = {
     "markersize": 2.6,
     "markeredgewidth": 0.4,
     "markeredgecolor": "#7A4B00",
-    "markerfacecolor": AMBER,
+    "markerfacecolor": style.AMBER,
     "label": "cones",
 }
 ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
 LATER = (0, (2.5, 0.9))
 TIRES: Mapping[str, Mapping[str, Any]] = {
-    "linear": {"color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
-    "frozen": {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
-    ORACLE: {"color": BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
-    "learning": {"color": BLUE, "linestyle": "-", "linewidth": 1.2},
+    "linear": {"color": style.GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
+    "frozen": {"color": style.ORANGE, "linestyle": "-", "linewidth": 1.2},
+    ORACLE: {"color": style.BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
+    "learning": {"color": style.BLUE, "linestyle": "-", "linewidth": 1.2},
 }
 
 
@@ -130,7 +118,7 @@ REPLANNED, NOTICED = "plans with another tire or grip", "sensor fault noticed"
 ARC = "arc length of the path [m]"
 
 
-@styled
+@style.styled
 def drive_errors_figure(
     drives: Mapping[str, "Drive"],
     *,
@@ -145,7 +133,7 @@ def drive_errors_figure(
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = new_figure(PAGE, 5.2)
+    figure = style.new_figure(style.PAGE, 5.2)
     panels = figure.subplots(4, 1, sharex=True)
     labels = (
         "deviation $e_y$\n[m]",
@@ -176,7 +164,7 @@ def drive_errors_figure(
     for axes in panels:
         mark_faults(axes, drives, faults)
     figure.align_ylabels(panels)
-    legend_above(figure, order=(*drives, REPLANNED, *(friction_label(mu) for _, mu in drops)))
+    style.legend_above(figure, order=(*drives, REPLANNED, *(friction_label(mu) for _, mu in drops)))
     return figure
 
 
@@ -189,7 +177,7 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
     """
     for place, mu in drops:
         axes.axvline(
-            place, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=friction_label(mu)
+            place, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=friction_label(mu)
         )
 
 
@@ -264,7 +252,7 @@ def _roomy(axes: Axes, slowest: float) -> None:
 NEAR = 0.75  # a limit is drawn where a command comes this close to it
 
 
-@styled
+@style.styled
 def drive_steering_figure(
     drives: Mapping[str, "Drive"],
     *,
@@ -281,7 +269,7 @@ def drive_steering_figure(
     rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = new_figure(PAGE, 3.4)
+    figure = style.new_figure(style.PAGE, 3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
@@ -290,7 +278,7 @@ def drive_steering_figure(
     angle.plot(
         first.s,
         np.rad2deg(first.delta),
-        color=PURPLE,
+        color=style.PURPLE,
         linewidth=0.8,
         label=f"wheels of {name}",
     )
@@ -309,7 +297,7 @@ def drive_steering_figure(
         mark_faults(axes, drives, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
-    legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, order=tuple(drives))
     return figure
 
 
@@ -400,7 +388,7 @@ MOST_ROWS = 5
 NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
 MARGIN = 3.0  # around the path [m]
 RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
-INNER_WIDTH = PAGE - 0.75  # what labels leave of the page [in]
+INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
 HIGHEST = 5.0  # panel [in]
 CARS_EVERY = 2.6  # wheelbases between two outlines
 SMALL = 160.0  # in a picture of more than that [m] cars cannot be seen
@@ -408,7 +396,7 @@ ZOOM = 44.0  # a part of such a path that is drawn large, where a car was farthe
 SEEN = 0.05  # deviations are drawn larger until the largest is this share of the picture
 
 
-@styled
+@style.styled
 def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     """Draw the path, its cones and where every car drove; the first with its outlines.
 
@@ -425,7 +413,7 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         rows = min(MOST_ROWS, max(1, round(width / ROW_LENGTH)))
     step = width / rows
     inch = min(INNER_WIDTH / step, HIGHEST / height)  # of a meter
-    figure = new_figure(PAGE, rows * (height * inch + 0.3) + 0.6)
+    figure = style.new_figure(style.PAGE, rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
@@ -434,7 +422,7 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         axes.set_yticks(axes.get_yticks()[1:-1:1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
-    legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, order=tuple(drives))
     return figure
 
 
@@ -455,7 +443,7 @@ def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
 
 
 def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
-    figure = new_figure(PAGE, 3.6)
+    figure = style.new_figure(style.PAGE, 3.6)
     whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
     size = max(float(np.ptp(path.X)), float(np.ptp(path.Y)))
@@ -477,7 +465,7 @@ def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
     part.set_title(f"the largest deviation, {abs(worst.e_y[k]):.2f} m, to scale")
     for axes in (whole, part):
         axes.set(xlabel="X [m]", ylabel="Y [m]")
-    legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, order=tuple(drives))
     return figure
 
 
