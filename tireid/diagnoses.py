@@ -49,7 +49,6 @@ GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer i
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --repair."""
     parser.add_argument(
         "--repair",
         nargs="?",
@@ -87,7 +86,6 @@ def size_text(finding: Finding) -> str:
 
 
 def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
-    """Return a diagnosis as lines of text."""
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"

@@ -25,7 +25,6 @@ class ClaimedError(TireidError, OSError):
     """Another process holds the claim."""
 
     def refusal(self, doing: str) -> str:
-        """Return what to tell of it."""
         return (
             f"another run of tireid {doing}: wait for it, or choose another folder "
             f"(where there is none, delete {self})"

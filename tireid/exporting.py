@@ -158,7 +158,6 @@ def export(
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:
-    """Write a package."""
     manifest = f"{package.specialized.name}.json"
     texts = {**package.files, "README.md": readme(package, figures)}
     _write_texts(folder, {**texts, manifest: with_figures(texts[manifest], costs)})

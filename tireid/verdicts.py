@@ -43,7 +43,6 @@ def marked_number(verdict: Verdict, number: Number | None) -> Marked:
 
 
 def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
-    """Return a verdict as lines of text."""
     rows = [
         [title, *(cell for axle in AXLES for cell in _cells(by_axle.get(axle)))]
         for title, by_axle in numbers_by_title(verdict).items()
@@ -121,8 +120,7 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
     """Return stiffness, grip and relaxation length of both axles, as numbers of a report."""
     return [
         Headline(
-            [marked_number(verdict, by_axle[axle]) for axle in AXLES],
-            f"{title}, front / rear",
+            [marked_number(verdict, by_axle[axle]) for axle in AXLES], f"{title}, front / rear"
         )
         for title, by_axle in numbers_by_title(verdict).items()
         if len(by_axle) == len(AXLES)

@@ -160,7 +160,6 @@ def _road(n: int, period: float) -> Array:
 
 
 def vectors_header(name: str, found: Vectors) -> str:
-    """Return the vectors as a C header."""
     return header(
         f"{name}_vectors.h",
         "Generated. Measurements e_y, e_psi, v_y, r; steering [rad] and status that follow; "
@@ -249,7 +248,6 @@ def build_mpc_package(
 
 
 def mpc_readme(package: MpcPackage, about_figures: str) -> str:
-    """Return the README of a package."""
     p = plain_params(package.params)
     rows = "".join(
         f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD

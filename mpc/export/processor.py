@@ -54,7 +54,6 @@ def time_here(package: MpcPackage) -> Times:
 
 
 def mpc_figures_text(costs: Sequence[Cost], times: Times) -> str:
-    """Return costs and times as Markdown."""
     here = (
         f"A step took {times.median:.0f} us in double on the {times.machine} machine that exported "
         f"(median;\n99 of 100 took less than {times.p99:.0f} us)."

@@ -62,7 +62,6 @@ class Residual(NamedTuple):
     share: float
 
     def __str__(self) -> str:
-        """Return it in words."""
         return f"{self.relation} disagree by {self.value:.2g} {self.unit}"
 
 

@@ -54,7 +54,6 @@ class Window:
         self._kept = 0
 
     def add(self, sample: Sequence[float]) -> None:
-        """Take a sample."""
         if self._end == len(self._rows):
             self._rows[: self._n] = self._rows[-self._n :]
             self._end = self._n

@@ -121,7 +121,6 @@ class Change(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """In words."""
         return (
             f"{self.road.ratio:.2f} of the friction learnt on: chi-square {self.before:.0f} -> "
             f"{self.after:.0f}"

@@ -282,7 +282,6 @@ class Supervisor:
         return self._learnt(moments, now, v_x)
 
     def _learnt(self, moments: Array, now: ChiSquare, v_x: float) -> Decision:
-        """Return a decision on what the identifier has learnt."""
         rules, judge = self.rules, self.judge
         seconds = min(rules.seconds, self.t - self._road.changed_at)
         samples = self._window.last(judge.lookback(seconds))

@@ -258,7 +258,6 @@ class Scores(NamedTuple):
 
 
 def scores(drive: Drive) -> Scores:
-    """Return the scores of a drive."""
     values, counts = np.unique(drive.status, return_counts=True)
     failures = {
         Status(int(value)).name: int(count)

@@ -280,7 +280,6 @@ def _rows(file: Path) -> list[tuple[int, list[str]]]:
 
 
 def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> int:
-    """Return the column of an axis."""
     found = [k for k, name in enumerate(header) if name.lower() in names]
     if len(found) == 1:
         return found[0]
@@ -311,7 +310,6 @@ def _is_number(cell: str) -> bool:
 
 
 def _numbers(file: Path, name: str, column: int, points: list[tuple[int, list[str]]]) -> Array:
-    """Convert a column."""
     values = []
     for line, cells in points:
         cell = cells[column].strip() if column < len(cells) else ""

@@ -68,12 +68,7 @@ READ: Mapping[str, str] = {
 
 
 def c_sources(
-    structure: TireStructure,
-    *,
-    horizon: int,
-    name: str,
-    single: bool = False,
-    about: Values,
+    structure: TireStructure, *, horizon: int, name: str, single: bool = False, about: Values
 ) -> dict[str, str]:
     """Return the C files by their path in a package; they depend on nothing but these arguments.
 
@@ -96,7 +91,6 @@ def c_sources(
 
 
 def python_file(files: Mapping[str, str], *, name: str, single: bool) -> str:
-    """Return C files as one, with what Python asks of it."""
     (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: name}).values()
     texts = [*(files[path.format(name)] for path in ORDER), glue]
     return one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})

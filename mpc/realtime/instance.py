@@ -94,7 +94,6 @@ GUARDS = (
 
 
 def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of the parameters."""
     real = _real(single)
     names = [*TIMES, *LIMITS, *CAUTION, *GUARDS, "tolerance"]
     of_grips = dict.fromkeys(("grips", "prior"), (N_GRIPS,))
@@ -116,7 +115,6 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
 
 
 def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of the state."""
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
     watch = ("gentle", "placed", "watched", "doubted")
     counts = (*solution, "age", "planned", "guessed", "started", *watch)
@@ -146,7 +144,6 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
 
 
 def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of a measurement."""
     real = _real(single)
     numbers = [(name, real) for name in ("e_y", "e_psi", "v_y", "r")]
     ahead = [(name, real, (horizon + 1,)) for name in ("kappa", "v_x")]

@@ -44,7 +44,6 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
 
 
 def curve_tire(model: CurveModel) -> PredictionTire:
-    """Return the prediction tire of a frozen curve."""
     plain = _plain_curve(model)
     if not (model.lagged or model.offset.any()):
         return plain

@@ -63,7 +63,6 @@ class NetworkAxles(SmallSlip):
 
 
 def network_tire(model: NetworkModel) -> PredictionTire:
-    """Return the prediction tire of a frozen network."""
     network, scale = model.network, np.array(model.network.scale)
     weights = np.concatenate(
         [

@@ -51,7 +51,6 @@ def reel(duration: float) -> Reel:
 
 
 def require_ffmpeg() -> str:
-    """Return the path of ffmpeg."""
     found = shutil.which("ffmpeg")
     if found is None:
         raise ValueError("an MP4 needs ffmpeg, and none was found: install it, or ask for a GIF")

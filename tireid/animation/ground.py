@@ -125,10 +125,7 @@ class Ground:
         (self._line,) = axes.plot([], [], zorder=BELOW, **PATH)
         (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
         self._drops = [
-            (
-                _across(path, s),
-                axes.plot([], [], label=friction_label(mu), **DROP)[0],
-            )
+            (_across(path, s), axes.plot([], [], label=friction_label(mu), **DROP)[0])
             for s, mu in drops
         ]
         self._tracks, self._bodies, self._wheels = [], [], []

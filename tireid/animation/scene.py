@@ -197,12 +197,7 @@ class Overview:
         axes.margins(0.08)
         self._dots = [
             axes.plot(
-                [],
-                [],
-                marker="o",
-                markersize=4.0,
-                linestyle="",
-                color=tire_look(label)["color"],
+                [], [], marker="o", markersize=4.0, linestyle="", color=tire_look(label)["color"]
             )[0]
             for label in drives
         ]

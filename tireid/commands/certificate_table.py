@@ -107,7 +107,6 @@ def notes(certificate: Certificate) -> list[str]:
 
 
 def verdict_line(certificate: Certificate) -> str:
-    """Return the verdict and the margins in one line."""
     gain, phase = certificate["gain_sampled"], certificate["phase_margin"]
     worst = [e.title for e in certificate.properties if e.status == certificate.verdict]
     reason = "" if certificate.verdict == "pass" else f" ({'; '.join(worst)})"

@@ -48,7 +48,6 @@ LONGEST_NAME = 48  # letters of a channel in the table
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "channels",
         help=COMMANDS["channels"],
@@ -141,7 +140,6 @@ def _without_wheels(told: LogMap) -> LogMap:
 
 
 def _head(log: LogFile, run: str | None) -> list[str]:
-    """Return what the file is, how it was understood, and its runs."""
     runs = log.runs()
     lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in log.dialect)]
     lines += [f"  {note}" for note in log.notes]

@@ -117,7 +117,6 @@ TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],

@@ -37,7 +37,6 @@ FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
         help=COMMANDS["compare"],
@@ -123,11 +122,7 @@ def run(options: argparse.Namespace) -> int:
         if not names:
             raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
         lengths = step_lengths(
-            names,
-            len(recordings),
-            designs=options.sweep,
-            starts=starts,
-            others=len(others),
+            names, len(recordings), designs=options.sweep, starts=starts, others=len(others)
         )
         comparison = run_comparison(
             names,

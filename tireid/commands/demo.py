@@ -283,7 +283,7 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
             figures,
             {
                 "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
-                "The drives are Figs. 2 and 3 in the folder paper.",
+                "The drives are Figs. 2 and 3 in the folder paper."
             },
         ),
     ]
@@ -310,7 +310,6 @@ PARTS = {LEARNING: 15.0, EXPORTING: 20.0, TESTING: 20.0, DRIVING: 40.0, REPORTIN
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "demo",
         help=COMMANDS["demo"],
@@ -323,7 +322,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     watch = Stopwatch()
     with (
         output_folder(options.out, force=options.force) as folder,

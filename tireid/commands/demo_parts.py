@@ -64,7 +64,6 @@ def drive_text(driven: dict[str, Driven]) -> str:
 
 
 def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
-    """Return the section of the report."""
     heading = "The car drives on what it learnt"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
@@ -100,7 +99,6 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
 
 
 def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
-    """Return the headline numbers of the drives."""
     said = {
         LANE_CHANGE: "in the lane change at 90 % of the grip",
         SLIPPERY: "where friction drops to half",
@@ -116,11 +114,7 @@ def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
 
 def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, float], ...]) -> Setup:
     return Setup(
-        path=BUILT_IN[path](),
-        vehicle=story.car,
-        mu=1.0,
-        drops=drops,
-        wish=SpeedWish(share, None),
+        path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=SpeedWish(share, None)
     )
 
 
@@ -208,7 +202,6 @@ def shipped_text(shipped: Shipped) -> str:
 
 
 def package_section(shipped: Shipped) -> Section:
-    """Return the section of the report."""
     name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(

@@ -125,7 +125,6 @@ def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
 
 
 def drive_to_learn() -> Recording:
-    """Return the slalom of the demo."""
     return drives({"slalom": LEARN})["slalom"]
 
 

@@ -17,7 +17,6 @@ from tireid.progress import say, tell
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "doctor",
         help=COMMANDS["doctor"],
@@ -69,11 +68,7 @@ def run(options: argparse.Namespace) -> int:
     return DONE if left.healthy or options.accept else NOT_VALID
 
 
-def _tell_repair(
-    options: argparse.Namespace,
-    repair: Repair,
-    after: Diagnosis | None,
-) -> None:
+def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
     """Say what the repair is, and what is left after it."""
     if after is None:
         tell(f"nothing is sure enough to be repaired: with {options.repair} the log stays as it is")

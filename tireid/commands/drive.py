@@ -120,7 +120,6 @@ EPILOG = (
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "drive",
         help=COMMANDS["drive"],
@@ -169,10 +168,7 @@ def add_parser(commands: Any) -> None:
         help="from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
     )
     parser.add_argument(
-        "--noise",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="of the sensors (on)",
+        "--noise", action=argparse.BooleanOptionalAction, default=True, help="of the sensors (on)"
     )
     parser.add_argument(
         "--sensors",

@@ -127,7 +127,6 @@ def labels_of(words: Sequence[str]) -> list[str]:
 
 
 def conditions_of(options: argparse.Namespace) -> Conditions:
-    """Return what is to be driven."""
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
     require_dither("--dither", options.dither)

@@ -16,7 +16,6 @@ from tireid.verdicts import warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "export",
         help=COMMANDS["export"],
@@ -57,7 +56,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     caution = require_caution("--caution", options.caution)
     if caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")

@@ -22,13 +22,7 @@ from identifier.reproducibility import (
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict, judge, judge_prediction
-from models.recordings import (
-    Recording,
-    Repair,
-    check_against_vehicle,
-    check_physics,
-    joined,
-)
+from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
@@ -47,13 +41,7 @@ from tireid.commands.identify_results import (
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify, with_v_y
-from tireid.output import (
-    output_folder,
-    require_curves,
-    require_free,
-    text_table,
-    write_json,
-)
+from tireid.output import output_folder, require_curves, require_free, text_table, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import asked_text, verdict_text, warn_of_stored
@@ -63,7 +51,6 @@ OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
         help=COMMANDS["identify"],

@@ -99,7 +99,6 @@ def summarize_replays(
     verdict: Verdict | None,
     asked: Mapping[str, Verdict],
 ) -> dict[str, Any]:
-    """Return the same of any replays."""
     learnt = runs[0]
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
@@ -153,7 +152,6 @@ class AskedBound(NamedTuple):
 
 
 def guaranteed_text(model: TireModel) -> str:
-    """Return what is guaranteed of a model, in words."""
     sentence = guaranteed_sentence(model)
     return sentence or (
         "no guaranteed band: it takes --method axle, a lateral velocity that "
@@ -224,7 +222,6 @@ def write_results(
 
 
 def file_name(recording: Recording) -> str:
-    """Return the name of a recording as part of a file name."""
     return re.sub(r"[^\w.-]+", "_", recording.name)
 
 
@@ -456,11 +453,7 @@ def write_network_results(
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
     """Write everything that is known of a network into a folder; return replays and figures."""
     replays = {history.recording.name: replay(model, history) for history in histories}
-    about = {
-        "file": file.name,
-        "inputs": list(model.signals),
-        "slip_sign": model.slip_sign,
-    }
+    about = {"file": file.name, "inputs": list(model.signals), "slip_sign": model.slip_sign}
     summary = summarize_replays(law, histories, {NETWORK: replays}, verdict, asked)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json", valid=verdict.valid)

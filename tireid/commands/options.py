@@ -45,7 +45,6 @@ RENAMED = {  # options that had another word in some command
 def add_vehicle(
     parser: argparse.ArgumentParser, *, required: bool = False, default: str = "the sedan"
 ) -> None:
-    """Add --vehicle."""
     text = f"car as TOML, tireid init writes one ({'needed' if required else default})"
     parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
 
@@ -94,7 +93,6 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add --force."""
     parser.add_argument("--force", action="store_true", help="replace what is there")
 
 
@@ -108,12 +106,10 @@ def add_accept(parser: argparse.ArgumentParser) -> None:
 
 
 def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
-    """Return the exit code that a verdict makes."""
     return DONE if verdict.valid or options.accept else NOT_VALID
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --weights."""
     parser.add_argument("--weights", type=Path, metavar="FILE", help=f"stored model: {what}")
 
 
@@ -131,7 +127,6 @@ def seed_of(options: argparse.Namespace) -> int:
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Add --jobs."""
     count = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=int, default=count, metavar="N", help="processes (%(default)s)"
@@ -139,7 +134,6 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
 
 
 def jobs_of(options: argparse.Namespace) -> int:
-    """Return --jobs."""
     jobs = int(options.jobs)
     if jobs < 1:
         raise ValueError(f"--jobs must be at least 1, it is {jobs}")
@@ -245,9 +239,7 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
     parser.add_argument(
-        "--dbc",
-        metavar="FILE",
-        help="DBC that tells the signals in the frames of a CAN log",
+        "--dbc", metavar="FILE", help="DBC that tells the signals in the frames of a CAN log"
     )
     parser.add_argument(
         "--cut-holes",

@@ -43,7 +43,6 @@ METERS, KILOMETERS = "m/s", "km/h"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "plan",
         help=COMMANDS["plan"],

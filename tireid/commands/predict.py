@@ -33,7 +33,6 @@ from tireid.verdicts import verdict_text, warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "predict",
         help=COMMANDS["predict"],
@@ -145,11 +144,7 @@ def force_columns(
     recording, car = prediction.recording, model.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
     columns = {"t_s": recording.t[part], "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
-    forces = {
-        "predicted": prediction.axle_force,
-        "half_band": half,
-        "true": recording.axle_force,
-    }
+    forces = {"predicted": prediction.axle_force, "half_band": half, "true": recording.axle_force}
     for name, force in forces.items():
         if force is not None:
             columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
@@ -194,10 +189,7 @@ def summary(
         "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
         "friction": None
         if friction is None
-        else {
-            "as_taught": friction.as_taught,
-            "roads": [one._asdict() for one in friction.roads],
-        },
+        else {"as_taught": friction.as_taught, "roads": [one._asdict() for one in friction.roads]},
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
@@ -229,10 +221,7 @@ def error_table(prediction: Prediction) -> str:
 
 
 def prediction_text(
-    model: TireModel,
-    prediction: Prediction,
-    half: Array | None,
-    friction: RoadFriction | None,
+    model: TireModel, prediction: Prediction, half: Array | None, friction: RoadFriction | None
 ) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 

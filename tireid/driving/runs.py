@@ -247,11 +247,7 @@ def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionT
 
 
 def run_drive(
-    label: str,
-    conditions: Conditions,
-    learnt: TireModel | None,
-    *,
-    linearizations: int = 1,
+    label: str, conditions: Conditions, learnt: TireModel | None, *, linearizations: int = 1
 ) -> Run:
     """Drive the path once with the tracker told of a tire."""
     setup, problem = conditions.setup, Problem()

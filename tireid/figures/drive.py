@@ -351,10 +351,7 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     wheels = np.stack(
         [
             _wheel(long) @ _turn(angle).T + (x, 0.5 * side * track)
-            for x, track, angle in (
-                (vehicle.l_f, tracks[0], delta),
-                (-vehicle.l_r, tracks[1], 0.0),
-            )
+            for x, track, angle in ((vehicle.l_f, tracks[0], delta), (-vehicle.l_r, tracks[1], 0.0))
             for side in (1.0, -1.0)
         ]
     )

@@ -11,12 +11,7 @@ from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
 from tireid.figures import style
 
-POINTS: Mapping[str, Any] = {
-    "linestyle": "",
-    "marker": ".",
-    "markersize": 3.0,
-    "rasterized": True,
-}
+POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
 
 
 @style.styled

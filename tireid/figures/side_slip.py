@@ -62,11 +62,7 @@ def side_slip_figure(
 
 
 def _draw(
-    upper: Axes,
-    lower: Axes | None,
-    recording: Recording,
-    told: Mapping[str, SideSlip],
-    first: str,
+    upper: Axes, lower: Axes | None, recording: Recording, told: Mapping[str, SideSlip], first: str
 ) -> None:
     """Draw the side slip of a recording, and below it the errors of the estimates."""
     v_x, truth, ends = recording.v_x, recording.logged_v_y, (recording.t[0], recording.t[-1])

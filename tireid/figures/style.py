@@ -101,7 +101,6 @@ class PlainNumbers(ScalarFormatter):
     """
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return a number of the axis."""
         return MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
 
 
@@ -163,7 +162,6 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
-    """Return a figure as PNG, the same bytes for the same figure."""
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
@@ -173,10 +171,7 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
 # Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
 # opened, and the same figure has the same bytes.
 CLOUDS = 130  # dots per inch of what is pixels in a drawing
-VECTOR: dict[str, Any] = {
-    "svg.fonttype": "path",
-    "svg.hashsalt": "tireid",
-}
+VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
 
 
 def figure_svg(figure: Figure) -> bytes:

@@ -97,7 +97,6 @@ class DrawnRun:
         self._values: list[list[Array]] = []
 
     def take(self, block: Block) -> None:
-        """Gather what is drawn of a block."""
         told, here = self._tell(block), self._recording.t[block.part]
         part: Samples = (here >= self._ends[0]) & (here <= self._ends[1])
         if self._width > 1 and part.any():
@@ -169,6 +168,5 @@ def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> S
 
 
 def _cells(values: Array, low: Array, high: Array, count: int) -> NDArray[np.intp]:
-    """Return in which of `count` cells from low to high values lie."""
     share = (values - low) / np.maximum(high - low, 1e-300)
     return np.clip(np.nan_to_num(share) * count, 0, count - 1).astype(np.intp)

@@ -66,7 +66,6 @@ READ = {
 
 
 def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
-    """Return a figure as a picture of a report."""
     return Picture(image=style.figure_svg(figure), caption=caption, read=read)
 
 

@@ -59,10 +59,7 @@ def write_identify_report(
         page.Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
         page.Section(
             heading="How well it predicts",
-            blocks=[
-                *_asked(asked),
-                *_errors([runs[0], *parts, *runs[1:]], frozen, figures),
-            ],
+            blocks=[*_asked(asked), *_errors([runs[0], *parts, *runs[1:]], frozen, figures)],
         ),
         page.Section(
             heading="What went in",
@@ -110,7 +107,6 @@ def write_identify_report(
 
 
 def _how_learnt(learnt: History) -> str:
-    """Return what was learnt from, in words."""
     estimated = learnt.recording.logged_v_y is None
     lateral = "acceleration" if estimated else "velocity"
     told = side_slip_text(learnt)

@@ -71,7 +71,6 @@ def write_plan_report(
     command: str,
     driven: Sequence[Rehearsal],
 ) -> None:
-    """Write the report of a plan."""
     words = plan_words(found, driven)
     report = Report(
         title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",

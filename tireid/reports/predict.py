@@ -39,7 +39,6 @@ def write_predict_report(
     source: Path,
     command: str,
 ) -> None:
-    """Write the report of a prediction."""
     model, recording = prediction.model, prediction.recording
     notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
     found: list[page.Block] = [*_errors(prediction)]
@@ -70,8 +69,7 @@ def write_predict_report(
         sections=[
             verdict_section(verdict),
             page.Section(
-                heading="What it predicts",
-                blocks=[*found, *(one for one in tires if one.text)],
+                heading="What it predicts", blocks=[*found, *(one for one in tires if one.text)]
             ),
             origin(
                 command,
