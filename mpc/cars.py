@@ -68,20 +68,13 @@ class Car(Protocol):
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
         """Return the car rolling straight ahead.
 
-        Parameters
-        ----------
-        v_x : speed [m/s].
-        X, Y : position of the center of gravity [m].
-        psi : heading [rad].
+        v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
         """
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.
 
-        Parameters
-        ----------
-        command : angle asked of the front road wheels [rad].
-        v_ref : wanted speed [m/s].
+        command : angle asked of the front road wheels [rad].   v_ref : wanted speed [m/s].
         """
 
 

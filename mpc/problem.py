@@ -96,12 +96,8 @@ class Cost:
 def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
     """Return y (7,), SI.
 
-    Parameters
-    ----------
-    x : [e_y, e_psi, v_y, r, δ, ...], SX.
-    kappa : curvature of the path [1/m].
-    v_x : longitudinal speed [m/s].
-    s_dot : speed along the path [m/s].
+    x : [e_y, e_psi, v_y, r, δ, ...], SX.   kappa : curvature of the path [1/m].
+    v_x : longitudinal speed [m/s].   s_dot : speed along the path [m/s].
     """
     per_speed = 1 / v_x
     return ca.vertcat(
@@ -112,11 +108,7 @@ def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
 def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
     """Return H = C' diag(q) C (n_x, n_x) and h = C' diag(q) y (n_x,), C = ∂y/∂x.
 
-    Parameters
-    ----------
-    y : errors (7,), SX.
-    x : state (n_x,), SX symbol.
-    q : weights (7,).
+    y : errors (7,), SX.   x : state (n_x,), SX symbol.   q : weights (7,).
     """
     C = ca.jacobian(y, x)
     weighted = C.T @ ca.diag(q)

@@ -60,8 +60,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0, 1 where a check fails, 2 where its input was bad, 3 where its answer
     is not valid, 74 where only standard output could not be written.
 
-    Parameters
-    ----------
     arguments : words after `tireid`; None takes those of the process.
     """
     try:

@@ -30,8 +30,6 @@ class ClusterError(TireidError, OSError):
 def cluster(address: str) -> Iterator[Map]:
     """Yield a `map` whose work is done by the workers of a Dask scheduler; its order is any.
 
-    Parameters
-    ----------
     address : of the scheduler, as in "tcp://host:8786".
     """
     try:

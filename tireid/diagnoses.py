@@ -131,8 +131,6 @@ def diagnosis_section(
 def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     """Return what was found, and what of it was taken out, as lines of text.
 
-    Parameters
-    ----------
     path : of --repair, None where it was not asked for.
     """
     lines = [diagnosis_text(diagnosis, unseen=False)]
@@ -170,8 +168,6 @@ def write_doctor_report(
 ) -> None:
     """Write the report of a diagnosis.
 
-    Parameters
-    ----------
     after : that of the repaired log, None where nothing was repaired.
     """
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])

@@ -195,10 +195,7 @@ TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
 def write_tracker(folder: Path, package: Package, *, single: bool, caution: float) -> list[str]:
     """Write the tracker and what joins it with the identifier; return what to say about it.
 
-    Parameters
-    ----------
-    single : whether float is the default precision.
-    caution : of the tracker, from 0 to 1.
+    single : whether float is the default precision.   caution : of the tracker, from 0 to 1.
     """
     try:
         pair = build_pair(package, single=single, caution=caution)

@@ -61,8 +61,6 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
     What may not be replaced is refused before anything is computed. Where `target` comes to hold
     something else meanwhile, it is left alone, and the message says where the results are.
 
-    Parameters
-    ----------
     force : replace a folder that an earlier run wrote; never one that holds anything else.
     """
     final = resolved(target)
@@ -281,8 +279,6 @@ def _discard(folder: Path) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write data as indented JSON; a number that is not finite becomes null.
 
-    Parameters
-    ----------
     data : dictionaries, lists, numbers, strings and None.
     """
     write_file(path, json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
@@ -301,8 +297,6 @@ def _finite(data: Any) -> Any:
 def write_csv(path: Path, columns: Mapping[str, Array]) -> None:
     """Write columns of equal length as CSV with a header: time with 15 digits, others with nine.
 
-    Parameters
-    ----------
     columns : name with unit, to values (n,).
     """
     write_long_csv(path, [columns])

@@ -199,8 +199,6 @@ class Progress:
     def within(self, first: float, last: float) -> Callable[[float], None]:
         """Return who is told the share that is done of a piece of the part.
 
-        Parameters
-        ----------
         first, last : shares of the part at which the piece begins and ends, 0 to 1.
         """
         return lambda share: self(first + (last - first) * share)
@@ -208,8 +206,6 @@ class Progress:
     def __call__(self, share: float, text: str = "") -> None:
         """Tell it where it is time.
 
-        Parameters
-        ----------
         share : done of the part, 0 to 1.
         """
         now = time.perf_counter()

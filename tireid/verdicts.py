@@ -29,8 +29,6 @@ def marked_number(verdict: Verdict, number: Number | None) -> Marked:
 
     Grey are all numbers of an answer that is not valid, struck those of the axle that refuses it.
 
-    Parameters
-    ----------
     number : one of them; None leaves its place empty.
     """
     if number is None:
@@ -72,8 +70,6 @@ def _each(verdicts: Mapping[str, Verdict], what: str) -> str:
 def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
     """Return what is found on several recordings, as lines of text.
 
-    Parameters
-    ----------
     verdicts : on the default method, by the name of the recording that it learnt on.
     """
     return _each(verdicts, "default learnt on")
@@ -130,8 +126,6 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
 def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
     """Return on how many recordings the default is valid, as a number of a report, if any.
 
-    Parameters
-    ----------
     verdicts : on the default method, by the name of the recording that it learnt on.
     """
     if not verdicts:

@@ -105,8 +105,6 @@ def record(tracker: Tracker, steps: int = STEPS) -> Vectors:
     Numbers are rounded, and the car is computed without a function of a library: the record does
     not depend on the machine.
 
-    Parameters
-    ----------
     tracker : in double; it is reset before, and steers.
     """
     tracker.reset()
@@ -221,10 +219,7 @@ def build_mpc_package(
 ) -> MpcPackage:
     """Return the package of a tracker; the same input gives the same bytes.
 
-    Parameters
-    ----------
-    period : between two steps [s].
-    delay : from a measurement until its command acts [s].
+    period : between two steps [s].   delay : from a measurement until its command acts [s].
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.
     """

@@ -55,8 +55,6 @@ def frozen_start(package: Package) -> TireModel:
 def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
     """Return header and source by path.
 
-    Parameters
-    ----------
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
     """
     specialized, model = identifier.specialized, frozen_start(identifier)
@@ -141,8 +139,6 @@ def build_pair(
 ) -> Pair:
     """Return the tracker that goes with an identifier, one step a sample, and what joins them.
 
-    Parameters
-    ----------
     identifier : package of the identifier; its weights are the tire that is begun with.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.

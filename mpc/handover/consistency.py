@@ -95,10 +95,8 @@ class Consistency:
     def observe(self, measured: Measured, asked: float | None = None) -> bool:
         """Take a sample; return whether the sensors agree.
 
-        Parameters
-        ----------
         asked : angle asked of the wheels that should have been reached by now [rad]; None where it
-            is not known.
+        is not known.
         """
         self.worst = self._judged(measured, asked)
         calm, relapse = self._allowed.calm, self._allowed.relapse

@@ -73,8 +73,6 @@ class Window:
     def last(self, seconds: float) -> Array:
         """Return the last samples (n, 4), a view; all of them where there are fewer.
 
-        Parameters
-        ----------
         seconds : time to look back [s].
         """
         n = min(round(seconds / self.dt), self._kept)
@@ -93,12 +91,8 @@ SHORTEST_LAG = 1e-3  # m
 def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float) -> Array:
     """Return the axle forces (k, n, 2) [N] of k tires, frame of the body; a lag begins settled.
 
-    Parameters
-    ----------
-    tire : structure and car; its weights are not read.
-    weights : of k tires (k, n_weights).
-    samples : rows of `window.COLUMNS`, (n, 4).
-    dt : sampling interval [s].
+    tire : structure and car; its weights are not read.   weights : of k tires (k, n_weights).
+    samples : rows of `window.COLUMNS`, (n, 4).   dt : sampling interval [s].
     """
     k = len(weights)
     run = axle_scan(cast(Hashable, tire.structure), k)(
@@ -213,8 +207,6 @@ class Judge:
     def lookback(self, seconds: float) -> float:
         """Return how far back samples must go to judge the last seconds [s].
 
-        Parameters
-        ----------
         seconds : in which the judged stretches end [s].
         """
         return seconds + (self._settle + self._h + 1) * self.dt
@@ -222,8 +214,6 @@ class Judge:
     def errors(self, tire: PredictionTire, samples: Array) -> tuple[Array, Array]:
         """Return e (m, 2) and the forces that it is the error of (m, 2) [static axle loads].
 
-        Parameters
-        ----------
         samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
         """
         e, force = self._errors(tire, tire.weights[None], samples)
@@ -236,10 +226,7 @@ class Judge:
     def chi_squares(self, tire: PredictionTire, weights: Array, samples: Array) -> list[ChiSquare]:
         """Return how badly k tires explain samples.
 
-        Parameters
-        ----------
-        tire : structure and car; its weights are not read.
-        weights : of k tires (k, n_weights).
+        tire : structure and car; its weights are not read.   weights : of k tires (k, n_weights).
         """
         e, force = self._errors(tire, weights, samples)
         expected = self.expected

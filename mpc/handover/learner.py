@@ -44,8 +44,6 @@ def blended(
     The share is halved until the tracker, asked what it would plan with the weights in the same
     situation, answers within the bound; where no share of the way is small enough, weights stay.
 
-    Parameters
-    ----------
     share : of the way that is left, to go at most [-], in (0, 1].
     planned : first steering rate of the plan that a tire leads to, in one situation [rad/s].
     most : change of it that is allowed [rad/s].
@@ -104,8 +102,6 @@ class Learner:
     def observe(self, measured: Measured, tracker: Tracker) -> str | None:
         """Take a sample before the tracker steps; return what was decided, where that matters.
 
-        Parameters
-        ----------
         tracker : which steers; its tire is moved.
         """
         agree = self._sensors.observe(measured, self._asked(tracker))

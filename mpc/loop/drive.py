@@ -86,21 +86,16 @@ def drive(
 ) -> Drive:
     """Drive a car along a path.
 
-    Parameters
-    ----------
-    path : to follow, from s = 0.
-    tracker : which steers; it is reset.
+    path : to follow, from s = 0.   tracker : which steers; it is reset.
     speed : wanted along the path, [m/s] where it is a number.
-    sensors : of the car; None measures exactly.
-    lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-        they show.
+    sensors : of the car; None measures exactly.   lateral : tells v_y, and a_y in the plane of the
+    road, in place of the sensors; None takes what they show.
     dither : weaves along the path to teach; None keeps to it.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
-    widest : deviation at which the car has left the path [m].
-    blind : longest time without a number of a position, heading or speed [s]: until then the car
-        goes on by dead reckoning, then the drive ends.
-    plan_every : periods between two plans that are kept; 0 keeps none.
+    widest : deviation at which the car has left the path [m].   blind : longest time without a
+    number of a position, heading or speed [s]: until then the car goes on by dead reckoning, then
+    the drive ends.   plan_every : periods between two plans that are kept; 0 keeps none.
     name : of the drive; None takes that of the path.
     """
     if abs(car.period - tracker.period) > 1e-9:
@@ -185,8 +180,6 @@ class Place(NamedTuple):
     def just_lost(self, dt: float) -> tuple[str, ...]:
         """Return the guides that show no number since this sample.
 
-        Parameters
-        ----------
         dt : period [s].
         """
         pairs = zip(GUIDES, self.silent, strict=True)
@@ -195,8 +188,6 @@ class Place(NamedTuple):
     def complaint(self, blind: float) -> str:
         """Return which guide has been silent for too long, or nothing.
 
-        Parameters
-        ----------
         blind : longest time [s].
         """
         pairs = zip(GUIDES, self.silent, strict=True)

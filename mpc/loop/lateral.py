@@ -54,8 +54,6 @@ class TellsLateral(Protocol):
     def tell(self, measured: Measured) -> Told:
         """Take a sample; return what it tells.
 
-        Parameters
-        ----------
         measured : by the sensors; v_y is not read.
         """
 
@@ -131,8 +129,6 @@ class LateralVelocity:
     def tell(self, measured: Measured) -> Told:
         """Take a sample; return what it tells.
 
-        Parameters
-        ----------
         measured : by the sensors; v_y is not read.
         """
         m, identifier, dt = measured, self.identifier, self._dt

@@ -139,8 +139,6 @@ class Recorder:
     def note(self, t: float, text: str | None) -> None:
         """Keep what the learner said.
 
-        Parameters
-        ----------
         t : time [s].
         """
         if text:
@@ -154,8 +152,6 @@ class Recorder:
     def plan(self, command: Command, s: Array) -> None:
         """Keep the plan of this period.
 
-        Parameters
-        ----------
         s : where the states of the plan lie along the path [m], (N + 1,).
         """
         plan = Plan(len(self._cars), s, command.plan_x.copy(), command.plan_u.copy())
@@ -172,8 +168,6 @@ class Recorder:
     ) -> None:
         """Keep a period.
 
-        Parameters
-        ----------
         v_ref : wanted speed [m/s].
         """
         if told is not None:
@@ -200,8 +194,6 @@ class Recorder:
     ) -> Drive:
         """Return the drive.
 
-        Parameters
-        ----------
         period : control period [s].
         completed : whether the car reached the end on the path and without spinning.
         """

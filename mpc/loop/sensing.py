@@ -91,8 +91,6 @@ class CarSensors:
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
         """Return what is measured at one instant.
 
-        Parameters
-        ----------
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
         noise = rng.standard_normal(len(CHANNELS))
@@ -140,10 +138,8 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     yaw rate 0.003 rad/s, acceleration 0.1 m/s², steering 0.5 mrad, new at every sample. Yaw rate
     and acceleration are biased, and the accelerometer is fixed to the body and rolls with it.
 
-    Parameters
-    ----------
     rng : draws the biases, of 0.001 rad/s and 0.05 m/s² standard deviation; None takes sensors
-        without noise and bias.
+    without noise and bias.
     """
     if rng is None:
         return CarSensors(v_y=None, body_fixed=True)
@@ -181,8 +177,6 @@ class FaultySensors:
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
         """Return what is measured at one instant, calls in the order of time.
 
-        Parameters
-        ----------
         rng : source of the noise; of a fault's own noise too, so that it changes no other draw.
         """
         shown = self._sensors.measure(state, rng)
@@ -246,8 +240,6 @@ class SpeedProfile:
     def at(self, s: ArrayLike) -> Array:
         """Return the wanted speed [m/s] in the shape of s.
 
-        Parameters
-        ----------
         s : arc length [m].
         """
         return self.path.along(self.v, s)
@@ -255,8 +247,6 @@ class SpeedProfile:
     def reference(self, s: float, gain: float) -> float:
         """Return what to ask of a proportional driver, so that it does not lag behind [m/s].
 
-        Parameters
-        ----------
         s : arc length [m].
         gain : acceleration that the driver asks for, per error of the speed [1/s].
         """
@@ -267,11 +257,7 @@ class SpeedProfile:
     def ahead(self, s: float, v_x: float, t: Array, gain: float) -> Preview:
         """Return the road that the car will be on.
 
-        Parameters
-        ----------
-        s : arc length now [m].
-        v_x : speed now [m/s].
-        t : times from now [s], (k,).
+        s : arc length now [m].   v_x : speed now [m/s].   t : times from now [s], (k,).
         gain : of the driver [1/s].
         """
         error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
@@ -312,8 +298,6 @@ def cornering_limit(
 ) -> float:
     """Return the largest steady lateral acceleration [m/s^2].
 
-    Parameters
-    ----------
     tire : of all four wheels; None reads the file named by the chassis.
     mu : friction of the road over that of the tire's measurement [-].
     speed : at which the car is driven [m/s].

@@ -40,8 +40,6 @@ class Straight:
     def heading(self, s: Array) -> tuple[Array, Array]:
         """Return ψ [rad] since the start of the section and κ [1/m], (k,) each.
 
-        Parameters
-        ----------
         s : since the start of the section [m], (k,).
         """
         return np.zeros_like(s), np.zeros_like(s)
@@ -90,8 +88,6 @@ class Turn:
     def heading(self, s: Array) -> tuple[Array, Array]:
         """Return ψ [rad] since the start of the section and κ [1/m], (k,) each.
 
-        Parameters
-        ----------
         s : since the start of the section [m], (k,).
         """
         peak = math.copysign(1.0 / self.radius, self.angle)
@@ -110,8 +106,6 @@ Section: TypeAlias = Straight | Turn
 def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
     """Put sections one after another, from the origin along X.
 
-    Parameters
-    ----------
     spacing : longest step of the samples [m].
     """
     if not (spacing > 0.0 and sections):
@@ -132,8 +126,6 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
 def close(sections: Sequence[Section], free: tuple[int, int]) -> list[Section]:
     """Choose the lengths of two straights so that the course ends where it starts.
 
-    Parameters
-    ----------
     sections : in driving order; they must turn by a multiple of 2 pi altogether.
     free : which two sections are straights of free length; they must not be parallel.
     """
@@ -242,8 +234,6 @@ def handling_course(*, spacing: float = 0.25) -> Path:
 def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Array:
     """Return pairs of cones on both sides of a path, X and Y [m], (k, 2).
 
-    Parameters
-    ----------
     gap : about the distance from pair to pair along the path [m].
     half_width : from the path to a cone [m].
     """

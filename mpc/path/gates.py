@@ -83,10 +83,7 @@ def line_through_gates(
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
 
-    Parameters
-    ----------
-    start : x, y of the first point [m].
-    end : x, y of the last point [m].
+    start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
     spacing : longest step of the samples [m].

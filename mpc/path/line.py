@@ -31,10 +31,7 @@ class Line(NamedTuple):
 def uniform_grid(length: float, spacing: float) -> Array:
     """Return s from 0 to `length` [m] in equal steps of at most `spacing`.
 
-    Parameters
-    ----------
-    length : of the curve [m].
-    spacing : longest step [m].
+    length : of the curve [m].   spacing : longest step [m].
     """
     if not 0.0 < spacing <= length / 4.0:
         raise PathError(
@@ -53,11 +50,8 @@ def line_from_heading(
 
     X and Y by Boole's rule, whose error is of order spacing^6.
 
-    Parameters
-    ----------
     psi : heading [rad], (4 n + 1,), at steps of spacing/4.
-    kappa : dψ/ds at the same places [1/m], (4 n + 1,).
-    spacing : step of the line [m].
+    kappa : dψ/ds at the same places [1/m], (4 n + 1,).   spacing : step of the line [m].
     start : X, Y of the first sample [m].
     """
     if psi.shape != kappa.shape or psi.size % 4 != 1 or psi.size < 5:
@@ -137,10 +131,7 @@ class Ends(NamedTuple):
     ) -> tuple[Any, Any, Any, Any]:
         """Return X, Y [m], ψ [rad], κ [1/m] inside the step.
 
-        Parameters
-        ----------
-        u : place in the step, 0 to 1 [-].
-        h : length of the step [m].
+        u : place in the step, 0 to 1 [-].   h : length of the step [m].
         """
         (psi_0, psi_1), (kappa_0, kappa_1) = self.psi, self.kappa
         cos_0, cos_1, sin_0, sin_1 = cos(psi_0), cos(psi_1), sin(psi_0), sin(psi_1)
@@ -155,10 +146,7 @@ class Ends(NamedTuple):
 def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
     """Return the cubic that has values and slopes given at both ends of a step.
 
-    Parameters
-    ----------
-    u : place in the step, 0 to 1 [-].
-    p : values at u = 0 and 1.
+    u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.
     """
     chord = p[1] - p[0]
     bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]
@@ -168,10 +156,7 @@ def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
 def quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
     """Return the quintic that has values, slopes and second derivatives given at both ends.
 
-    Parameters
-    ----------
-    u : place in the step, 0 to 1 [-].
-    p : values at u = 0 and 1.
+    u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.
     """
     chord = p[1] - p[0]
     bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]

@@ -32,8 +32,6 @@ HALVINGS = 40
 def smooth(points: Array, *, closed: bool, distance: float) -> Array:
     """Move points so that their third differences get small.
 
-    Parameters
-    ----------
     points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
     distance : root mean square of how far they may move [m].
     """
@@ -105,10 +103,7 @@ def line_through(
 ) -> Line:
     """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
 
-    Parameters
-    ----------
-    X : of the way-points [m], (k,).
-    Y : of the way-points [m], (k,).
+    X : of the way-points [m], (k,).   Y : of the way-points [m], (k,).
     spacing : longest step of the samples [m].
     smoothing : root mean square distance that the line may keep from the way-points [m].
     minimum_radius : tightest turn allowed [m].
@@ -138,11 +133,8 @@ def line_through(
 def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     """Sample a plane curve at equal steps of its arc length.
 
-    Parameters
-    ----------
     spline : t -> (X, Y) with `.derivative(order)`, C2, polynomial between its knots.
-    knots : rising t, (k,).
-    spacing : longest step [m].
+    knots : rising t, (k,).   spacing : longest step [m].
     """
     velocity, acceleration = spline.derivative(1), spline.derivative(2)
     # Quadrature needs pieces over which the speed changes little, even between far way-points.
@@ -239,8 +231,6 @@ ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
 def read_waypoints(file: Path) -> Waypoints:
     """Read X and Y [m]; other columns, and lines that start with "#" below the header, are ignored.
 
-    Parameters
-    ----------
     file : the CSV; names in its header may be of either case, and the header may start with "#".
     """
     rows = _rows(file)

@@ -72,8 +72,6 @@ def c_sources(
 ) -> dict[str, str]:
     """Return the C files by their path in a package; they depend on nothing but these arguments.
 
-    Parameters
-    ----------
     single : whether float is the default precision.
     """
     return {

@@ -24,8 +24,6 @@ GRIPS: Array = LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 def require_caution(name: str, caution: float) -> float:
     """Return a caution, if it is a share.
 
-    Parameters
-    ----------
     caution : from 0 to 1.
     """
     if not 0.0 <= caution <= 1.0:
@@ -36,8 +34,6 @@ def require_caution(name: str, caution: float) -> float:
 def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> None:
     """Write what the tracker fears of a tire; `max_slip` must have been written.
 
-    Parameters
-    ----------
     caution : from 0 to 1.
     """
     if caution > 0.0 and tire.vehicle.has_downforce:

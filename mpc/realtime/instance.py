@@ -280,8 +280,6 @@ class Instance:
     def prepare_from(self, x0: ArrayLike) -> None:
         """Do ahead of `solve` what does not ask for its state, on the road in `input`.
 
-        Parameters
-        ----------
         x0 : state that is expected (n_x,).
         """
         self.start[:] = x0
@@ -304,8 +302,6 @@ class Instance:
     def guess(self, x0: ArrayLike) -> None:
         """Set the plan to one without a solution.
 
-        Parameters
-        ----------
         x0 : state at its beginning (n_x,).
         """
         self.start[:] = x0
@@ -314,8 +310,6 @@ class Instance:
     def late(self, steering: float) -> None:
         """Say that the last command came too late.
 
-        Parameters
-        ----------
         steering : what was steered instead [rad].
         """
         self._library.mpc_late(self._step[0], self._real(steering))
@@ -323,8 +317,6 @@ class Instance:
     def reset(self, steering: float) -> Status:
         """Begin anew, with the faults kept.
 
-        Parameters
-        ----------
         steering : angle of the wheels [rad].
         """
         return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))

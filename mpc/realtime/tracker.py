@@ -179,8 +179,6 @@ class Tracker:
     def reset(self, steering: float = 0.0) -> None:
         """Forget what was planned and steered; faults are kept.
 
-        Parameters
-        ----------
         steering : angle of the wheels now [rad].
         """
         if self.instance.reset(steering) != Status.OK:
@@ -193,8 +191,6 @@ class Tracker:
         The step is a sweep then: its `solve_time_s` is the latency from measurement to command. On
         another road than it is told with the measurement, or without a plan, it does all itself.
 
-        Parameters
-        ----------
         kappa : curvature [1/m] that the next measurement will tell, at `times`, (N + 1,).
         v_x : speed [m/s] that it will tell, (N + 1,).
         """

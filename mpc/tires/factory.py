@@ -22,12 +22,9 @@ from mpc.tires.tire import PredictionTire
 def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTire:
     """Return the prediction tire of a frozen model, of a tire of `models.tires`, or of a vehicle.
 
-    Parameters
-    ----------
     source : a frozen model; or a tire, two of which are mounted on each axle of `vehicle` at its
-        static load; or a vehicle, for the linear tire that it states. A prediction tire is
-        returned as it is.
-    vehicle : the car of the prediction; None takes that of the model.
+    static load; or a vehicle, for the linear tire that it states. A prediction tire is returned as
+    it is.   vehicle : the car of the prediction; None takes that of the model.
     """
     if isinstance(source, PredictionTire):
         return source if vehicle is None else source._replace(vehicle=vehicle)

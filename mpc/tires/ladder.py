@@ -136,14 +136,8 @@ def ladder_weights(
 ) -> Array:
     """Return w of `LadderAxles`.
 
-    Parameters
-    ----------
-    ladder : α_j [rad], (n,).
-    W : w_j [N], front and rear (2, n).
-    compliance : s [m/N], (2,).
-    least : least lag [m], (2,).
-    shortest : σ_0 [m].
-    offset : δ_0 [rad] and b [m/s].
+    ladder : α_j [rad], (n,).   W : w_j [N], front and rear (2, n).   compliance : s [m/N], (2,).
+    least : least lag [m], (2,).   shortest : σ_0 [m].   offset : δ_0 [rad] and b [m/s].
     downforce : κ of front and rear [s²/m²] where pressed, else nothing.
     """
     axles = np.column_stack([compliance, least, W])
@@ -179,8 +173,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
 def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
 
-    Parameters
-    ----------
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
     units = model.in_units()
@@ -219,8 +211,6 @@ class Fit(NamedTuple):
 def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
 
-    Parameters
-    ----------
     largest : end of the grid [rad].
     """
     grid: Array = largest * (np.arange(1, SAMPLES + 1) / SAMPLES) ** 2
@@ -230,8 +220,6 @@ def slip_grid(largest: float) -> Array:
 def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     """Return slip scales α_j (n,) for curves of both axles, and w_j [N] (2, n).
 
-    Parameters
-    ----------
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
     """
@@ -253,10 +241,7 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
 def fitted(alpha: Array, force: Array, ladder: Array) -> Fit:
     """Return the weights of one curve.
 
-    Parameters
-    ----------
-    alpha : slips [rad], (k,).
-    force : at these slips [N], (k,).
+    alpha : slips [rad], (k,).   force : at these slips [N], (k,).
     ladder : slip scales [rad], (n,).
     """
     T = np.tanh(alpha[:, None] / ladder)
@@ -282,8 +267,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     those of the static load, and forces in proportion with load. The sedan's Magic
     Formula is fitted to 0.2 % of its peak, a tire with a kink, as Dugoff's, to 1.2 %.
 
-    Parameters
-    ----------
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
     """
@@ -300,8 +283,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
 def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
 
-    Parameters
-    ----------
     vehicle : the car; it needs no chassis.
     """
     alpha = slip_grid(LARGEST_SLIP)
@@ -316,10 +297,7 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
 def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: float) -> Array:
     """Return the side force of an axle in steady cornering [N], (k,).
 
-    Parameters
-    ----------
-    axle : 0 in front, 1 at the rear.
-    alpha : slip angles [rad], not negative, (k,).
+    axle : 0 in front, 1 at the rear.   alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].
     """
     c, h = vehicle.require_chassis(), vehicle.roll_arm

@@ -72,8 +72,6 @@ class TireStructure:
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body.
 
-        Parameters
-        ----------
         slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
         """
         raise NotImplementedError
@@ -88,10 +86,7 @@ class TireStructure:
 
         Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and slip of the peak shrink.
 
-        Parameters
-        ----------
-        weights : (n_weights,).
-        ratio : friction over the one that the weights have [-].
+        weights : (n_weights,).   ratio : friction over the one that the weights have [-].
         """
         del weights, ratio
         return None
@@ -181,8 +176,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 
     They go on straight, but never with less than 4 % of their slope at zero.
 
-    Parameters
-    ----------
     most : slip beyond which no curve is believed [rad], front and rear.
     """
     slopes = curve_slopes(tire)
@@ -194,8 +187,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 def curves_at(tire: PredictionTire, slip: Array) -> Array:
     """Return the axle forces at slips, straight ahead, (2, k) [N].
 
-    Parameters
-    ----------
     slip : of both axles [rad], (k,).
     """
     x = ca.SX.sym("slip")
@@ -214,13 +205,10 @@ def believed_force(
 ) -> Any:
     """Return the axle forces that the tracker believes where friction may be another [N], (2,).
 
-    Parameters
-    ----------
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
-    rise : slope beyond [N/rad], (2,).
-    grip : friction over the one that the weights have [-]; not looked at where the structure
-        offers no other.
+    rise : slope beyond [N/rad], (2,).   grip : friction over the one that the weights have [-]; not
+    looked at where the structure offers no other.
     """
     there = structure.similar(at, grip)
     if there is None:
@@ -235,8 +223,6 @@ def extrapolated_force(
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).
 
-    Parameters
-    ----------
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).

@@ -39,8 +39,6 @@ class Reel(NamedTuple):
 def reel(duration: float) -> Reel:
     """Return what to show of a drive: at the slowest pace that is not too long.
 
-    Parameters
-    ----------
     duration : of the drive [s].
     """
     for pace in PACES:
@@ -72,10 +70,7 @@ def write_film(
 ) -> None:
     """Write the film of a drive; other drives ride along as ghosts.
 
-    Parameters
-    ----------
-    file : ends in .webp, .gif or .mp4.
-    drops : arc length [m] and friction from there on.
+    file : ends in .webp, .gif or .mp4.   drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.
     """
     first = next(iter(drives.values()))

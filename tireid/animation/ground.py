@@ -30,8 +30,6 @@ class View(NamedTuple):
     def see(self, places: Array) -> Array:
         """Return places on the ground in the picture's meters, the last axis being (X, Y).
 
-        Parameters
-        ----------
         places : on the ground [m], (..., 2).
         """
         c, s = np.cos(self.angle), np.sin(self.angle)
@@ -41,8 +39,6 @@ class View(NamedTuple):
     def turn(self, directions: Array) -> Array:
         """Return directions on the ground as directions in the picture.
 
-        Parameters
-        ----------
         directions : (..., 2).
         """
         return View(np.zeros(2), self.angle).see(directions)
@@ -70,8 +66,6 @@ class Camera:
     def at(self, s: float) -> View:
         """Return the view of a car.
 
-        Parameters
-        ----------
         s : arc length of the car along the path [m].
         """
         X, Y, _ = self._path.pose(s)
@@ -241,8 +235,6 @@ def _across(path: Path, s: float) -> Array:
 def sample_at(drive: Drive, t: float) -> int:
     """Return the sample of a drive at a time, or its last one.
 
-    Parameters
-    ----------
     t : time [s].
     """
     return min(int(np.searchsorted(drive.t, t)), drive.t.size - 1)

@@ -285,8 +285,6 @@ class Scene:
     def show(self, t: float) -> None:
         """Move the picture to an instant.
 
-        Parameters
-        ----------
         t : time [s].
         """
         drive = self._drive

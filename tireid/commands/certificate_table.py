@@ -25,8 +25,6 @@ def certificate_of(
 ) -> Certificate:
     """Return the certificate of a design.
 
-    Parameters
-    ----------
     driving : how hard it is driven; None takes `natural_driving`.
     """
     return certify(design, vehicle, driving)
@@ -35,8 +33,6 @@ def certificate_of(
 def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:
     """Return title with unit, value, limit, margin and status of every property.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     return [
@@ -54,8 +50,6 @@ def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[s
 def certificate_text(certificate: Certificate, force_unit: float) -> str:
     """Return the certificate as lines of text, ending with advice and the verdict.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
@@ -140,8 +134,6 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
 def unit_text(unit: str, force_unit: float) -> str:
     """Return a unit with the force unit written out, kN or N where it is one.
 
-    Parameters
-    ----------
     force_unit : U [N].
     """
     name = force_unit_name(force_unit)
@@ -202,8 +194,6 @@ def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
 def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit: float) -> str:
     """Return the comparison as lines of text.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     unit = unit_text("U s", force_unit)

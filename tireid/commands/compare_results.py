@@ -134,8 +134,6 @@ def sweep_table(comparison: Comparison) -> str:
 def percent(value: float | None) -> str:
     """Return a share as text.
 
-    Parameters
-    ----------
     value : [%], infinite where a run diverged, None where there is none.
     """
     if value is None:
@@ -146,8 +144,6 @@ def percent(value: float | None) -> str:
 def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
     """Return an error as percent of the rms force and in newtons, front / rear.
 
-    Parameters
-    ----------
     error : over it [N].
     """
     return _mean(comparison, [(name, error)])
@@ -156,8 +152,6 @@ def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
 def newton_text(value: float) -> str:
     """Return a force with three digits, more where it is above 1000 N.
 
-    Parameters
-    ----------
     value : [N].
     """
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
@@ -199,8 +193,6 @@ def write_comparison(
 ) -> dict[str, Figure]:
     """Write everything that was found out into a folder; return the figures by their file's name.
 
-    Parameters
-    ----------
     verdicts : on what the default learns, by recording.
     """
     numbers = comparison_numbers(comparison)

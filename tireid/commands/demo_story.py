@@ -202,8 +202,6 @@ def plant_recordings(
 ) -> tuple[Recording, ...]:
     """Drive the plant of a vehicle through every maneuver.
 
-    Parameters
-    ----------
     rng : of the noise of `SENSORS`; None measures exactly.
     """
     plant = Plant(vehicle)

@@ -80,8 +80,6 @@ def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis |
 def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> dict[str, Any]:
     """Return what summary.json holds.
 
-    Parameters
-    ----------
     after : diagnosis of the repaired log, None where nothing was repaired.
     """
     return {

@@ -42,8 +42,6 @@ PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 def parse_speed(text: str) -> SpeedWish:
     """Return what --speed says.
 
-    Parameters
-    ----------
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
     """
     found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text)
@@ -70,8 +68,6 @@ def parse_speed(text: str) -> SpeedWish:
 def parse_drop(text: str) -> tuple[float, float]:
     """Return the place [m] and the friction from there on [-] of --mu-drop S:MU.
 
-    Parameters
-    ----------
     text : such as 60:0.5.
     """
     place, colon, friction = text.partition(":")
@@ -89,8 +85,6 @@ def parse_drop(text: str) -> tuple[float, float]:
 def parse_fault(text: str, kind: str = FULL) -> SensorFault:
     """Return what --fault says of a sensor.
 
-    Parameters
-    ----------
     text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
     kind : of the sensors, of `SENSORS`.
     """
@@ -195,10 +189,7 @@ def make_setup(
 ) -> Setup:
     """Return a car at the start of a path.
 
-    Parameters
-    ----------
-    vehicle : the car; None takes the built-in sedan.
-    mu : friction before the first drop [-].
+    vehicle : the car; None takes the built-in sedan.   mu : friction before the first drop [-].
     drops : arc length [m] and friction from there on.
     """
     ordered = tuple(sorted(drops))

@@ -47,10 +47,7 @@ def write_drives(
 ) -> dict[str, Figure]:
     """Write everything about drives along one path; return the figures by the name of their file.
 
-    Parameters
-    ----------
-    drops : arc length [m] and friction from there on.
-    film : webp, gif, mp4 or none.
+    drops : arc length [m] and friction from there on.   film : webp, gif, mp4 or none.
     """
     first = runs[0]
     write_json(folder / "summary.json", summarize_drives(runs, inputs))

@@ -333,8 +333,6 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     Under the recording that was learnt stands the paper's measure: its past, t < T_freeze, against
     what was identified online.
 
-    Parameters
-    ----------
     frozen : freeze time [s] to recording name to replay.
     """
     sizes = {history.recording.name: force_rms(history) for history in histories}

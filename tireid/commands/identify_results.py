@@ -84,8 +84,6 @@ def summarize(
     the recording that was learnt at the freeze, and its `past_against_online` is the measure of the
     paper's section IV-A.
 
-    Parameters
-    ----------
     frozen : freeze time [s] to recording name to replay.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
@@ -137,8 +135,6 @@ class AskedBound(NamedTuple):
     def of(cls, numbers: Sequence[float]) -> "AskedBound":
         """Return what words of the command ask.
 
-        Parameters
-        ----------
         numbers : error [static axle loads] and lateness [s], or the first of them, or none.
         """
         if len(numbers) > 2:
@@ -186,8 +182,6 @@ def write_results(
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
-    Parameters
-    ----------
     frozen : freeze time [s] to recording name to replay.
     bound : of the guaranteed band of the last freeze; None asks for none.
     progress : told how far it is; None tells nobody.
@@ -228,10 +222,7 @@ def file_name(recording: Recording) -> str:
 def no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
     """Return the note beside an error: against what, where there is no true force.
 
-    Parameters
-    ----------
-    error : None where there is none.
-    size : rms of the true forces [N], None without truth.
+    error : None where there is none.   size : rms of the true forces [N], None without truth.
     """
     if size is not None:
         return ""
@@ -241,10 +232,7 @@ def no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
 def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str]:
     """Return front and rear error as text, with their share of the rms force where it is known.
 
-    Parameters
-    ----------
-    error : [N]; None leaves a dash.
-    size : rms of the true forces [N], None without truth.
+    error : [N]; None leaves a dash.   size : rms of the true forces [N], None without truth.
     """
     if error is None:
         return "-", "-"
@@ -321,8 +309,6 @@ def write_forces(
 ) -> None:
     """Write the curves of forces.csv: slip angles, true, online and frozen forces.
 
-    Parameters
-    ----------
     progress : called now and then with the share that is done, 0 to 1.
     """
     n = len(history.recording)

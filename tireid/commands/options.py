@@ -82,8 +82,6 @@ def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
 def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
     """Add --out and --force: the folder of results.
 
-    Parameters
-    ----------
     command : its name, which the folder bears by default; None writes a folder only where asked.
     """
     folder = None if command is None else Path(f"tireid-{command}")
@@ -147,8 +145,6 @@ def jobs_of(options: argparse.Namespace) -> int:
 def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
-    Parameters
-    ----------
     usual : the default.
     """
     parser.add_argument(
@@ -190,8 +186,6 @@ def chosen_method(
 ) -> Chosen:
     """Return what --method, --paper or --design say, the default where none is given.
 
-    Parameters
-    ----------
     seed : of initial weights; None where nobody asks for one.
     without_v_y : whether a log has no lateral velocity, which changes the default.
     online : whether the default is the one that learns sample by sample.
@@ -286,8 +280,6 @@ def read_log(
 ) -> Recording:
     """Read a recording, repair it where the map says so, and say what was read and done.
 
-    Parameters
-    ----------
     dt : sampling interval that it is brought to [s].
     """
     path, named = split_log_argument(log)
@@ -349,8 +341,6 @@ def network_model(
 ) -> OnnxModel | None:
     """Return the network as a frozen model, None where there is none.
 
-    Parameters
-    ----------
     min_speed : below this speed [m/s] the forces read zero.
     """
     if options.network is None:

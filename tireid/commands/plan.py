@@ -198,8 +198,6 @@ def _radians(degrees: float | None) -> float | None:
 def parse_area(text: str) -> tuple[float, float]:
     """Return length and width [m] of --area.
 
-    Parameters
-    ----------
     text : such as 40x40 or 60x20.5m.
     """
     found = re.fullmatch(r"\s*([\d.]+)\s*m?\s*[xX×*]\s*([\d.]+)\s*m?\s*", text, re.ASCII)
@@ -217,8 +215,6 @@ def parse_area(text: str) -> tuple[float, float]:
 def parse_speed(text: str) -> float:
     """Return the speed [m/s] of --speed.
 
-    Parameters
-    ----------
     text : 15, 15m/s or 54km/h.
     """
     found = re.fullmatch(r"\s*([\d.]+)\s*(m/s|km/h)?\s*", text, re.ASCII)
@@ -239,10 +235,7 @@ def inputs_of(
 ) -> dict[str, Any]:
     """Return all that went into a plan, ready for JSON.
 
-    Parameters
-    ----------
-    area : length and width [m].
-    speed : [m/s].
+    area : length and width [m].   speed : [m/s].
     """
     return {
         "vehicle": vehicle_numbers(vehicle),
@@ -264,8 +257,6 @@ def inputs_of(
 def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """Return the columns of steering.csv: pass by pass from its entry on, with the course.
 
-    Parameters
-    ----------
     ratio : hand wheel over front wheels; None tells no hand wheel.
     """
     rows = []
@@ -285,8 +276,6 @@ def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
 def path_columns(found: Plan, k: int) -> dict[str, Array]:
     """Return way-points of a pass for `tireid drive --path`, with its straight run-up.
 
-    Parameters
-    ----------
     k : which pass, from 0.
     """
     one, car = found.passes[k], found.tires.vehicle

@@ -120,8 +120,6 @@ def _model(options: argparse.Namespace) -> TireModel:
 def truth_within_band(prediction: Prediction, half: Array | None) -> Array | None:
     """Return in which share of samples the true force lies in the band, (2,); None: nobody knows.
 
-    Parameters
-    ----------
     half : width of its band (n, 2) [N]; samples without one do not count.
     """
     truth = prediction.recording.axle_force
@@ -137,8 +135,6 @@ def force_columns(
 ) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
 
-    Parameters
-    ----------
     half : width of its band (n, 2) [N]; None where the model has none.
     """
     recording, car = prediction.recording, model.vehicle
@@ -156,8 +152,6 @@ def summary(
 ) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known.
 
-    Parameters
-    ----------
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
@@ -225,8 +219,6 @@ def prediction_text(
 ) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
-    Parameters
-    ----------
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     friction : of the drive's road; None where nobody can tell.
     """

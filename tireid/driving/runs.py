@@ -219,8 +219,6 @@ class Run:
 def require_dither(name: str, dither: float) -> None:
     """Refuse a weave that is none, or wider than a car drives for the sake of knowing.
 
-    Parameters
-    ----------
     dither : deviation that it may make [m].
     """
     if not 0.0 <= dither <= WIDEST_WEAVE:

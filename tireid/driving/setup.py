@@ -57,8 +57,6 @@ class Setup:
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
 
-        Parameters
-        ----------
         mu : its friction; None is that of the start.
         """
         tire = cast(Hashable, self._tire())
@@ -115,8 +113,6 @@ class Setup:
     def time_at(self, s: float) -> float:
         """Return when the car is expected at a place, at the wanted speed [s].
 
-        Parameters
-        ----------
         s : arc length [m]; a closed course counts laps.
         """
         v = self.speeds()
@@ -138,8 +134,6 @@ def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
 def require_friction(word: str, mu: float) -> float:
     """Return a friction over that of the tire's measurement, if a road can have it.
 
-    Parameters
-    ----------
     mu : the friction [-].
     """
     if not 0.05 <= mu <= 1.5:

@@ -40,10 +40,7 @@ def method_label(name: str) -> str:
 def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from low to high, at most to FARTHEST, with ticks in percent.
 
-    Parameters
-    ----------
-    low : smallest value shown [%].
-    high : largest value shown [%].
+    low : smallest value shown [%].   high : largest value shown [%].
     """
     axis = axes.xaxis if which == "x" else axes.yaxis
     limits = low / 1.2, min(high, FARTHEST) * 1.2

@@ -128,8 +128,6 @@ def drive_errors_figure(
 ) -> Figure:
     """Draw lateral deviation, heading error, lateral acceleration and speed over arc length.
 
-    Parameters
-    ----------
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
@@ -171,8 +169,6 @@ def drive_errors_figure(
 def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
     """Mark where the friction of the road changes.
 
-    Parameters
-    ----------
     drops : arc length [m] and friction from there on.
     """
     for place, mu in drops:
@@ -212,8 +208,6 @@ def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[Sens
 def friction_label(mu: float) -> str:
     """Return what a legend calls a friction of the road.
 
-    Parameters
-    ----------
     mu : over that of the tire's measurement [-].
     """
     return f"friction {mu:g}"
@@ -263,10 +257,7 @@ def drive_steering_figure(
 ) -> Figure:
     """Draw commanded angles of the front wheels over arc length, and the rate of the first drive.
 
-    Parameters
-    ----------
-    angle_limit : that the tracker keeps [rad].
-    rate_limit : that the tracker keeps [rad/s].
+    angle_limit : that the tracker keeps [rad].   rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
     figure = style.new_figure(style.PAGE, 3.4)
@@ -332,10 +323,7 @@ class CarShape(NamedTuple):
 def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0.0) -> CarShape:
     """Return a car at a pose; wheels in the order front left, front right, rear left, rear right.
 
-    Parameters
-    ----------
-    X, Y : center of gravity [m].
-    psi : heading [rad].
+    X, Y : center of gravity [m].   psi : heading [rad].
     delta : angle of the front wheels [rad], positive to the left.
     """
     long = vehicle.wheelbase

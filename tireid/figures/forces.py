@@ -39,12 +39,9 @@ def force_figure(
     lowest row shows what the online run and the last freeze miss of that force. Of a method that
     learns from a whole log there is no online run: it has neither panel nor residual.
 
-    Parameters
-    ----------
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
-    window : first and last time to show [s]; None shows all.
-    since : time from which the error of the online run counts [s], as in the replays; None counts
-        all.
+    window : first and last time to show [s]; None shows all.   since : time from which the error of
+    the online run counts [s], as in the replays; None counts all.
     """
     replays = dict(sorted((replays or {}).items()))
     recording, truth = history.recording, history.recording.axle_force
@@ -163,8 +160,6 @@ def prediction_figure(
     The residual is the frozen force minus the true force, or minus the online force where there is
     no truth; with neither there is no residual.
 
-    Parameters
-    ----------
     window : first and last time to show [s]; None shows all.
     """
     recording, truth = replay.recording, replay.recording.axle_force
@@ -258,8 +253,6 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
 def inputs_figure(recording: Recording, *, window: style.Window = None) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any.
 
-    Parameters
-    ----------
     window : first and last time to show [s]; None shows all.
     """
     ends = style.time_window(recording.t, window)

@@ -32,8 +32,6 @@ def error_figure(
 
     The axis is logarithmic where a bound lies far above the error.
 
-    Parameters
-    ----------
     bounds : by name, bounds on the norm [U s]; one that is not finite is left out.
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
@@ -98,8 +96,6 @@ def weights_figure(
 ) -> Figure:
     """Draw every entry of W and V over time: W by axle, V by the input it weighs.
 
-    Parameters
-    ----------
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
     """
@@ -160,10 +156,8 @@ def comparison_figure(
 ) -> Figure:
     """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
 
-    Parameters
-    ----------
     results : by law, by column as it is to be labeled: median, lower, upper quartile [kN]; a law
-        that diverged has no column or values that are not finite, which are left out.
+    that diverged has no column or values that are not finite, which are left out.
     paper : by law, by column: the value that the paper prints [kN].
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
@@ -234,10 +228,7 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
 
     Left all of the unit circle, right the part near z = 1, where slow poles are.
 
-    Parameters
-    ----------
-    integrator : "euler" or "rk4".
-    dt : sampling interval [s].
+    integrator : "euler" or "rk4".   dt : sampling interval [s].
     """
     step = INTEGRATORS[integrator]
     locus = step(root_locus(loop, FACTORS) * dt).ravel()

@@ -110,10 +110,7 @@ MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
-    Parameters
-    ----------
-    width : of the figure [in].
-    height : of the figure [in].
+    width : of the figure [in].   height : of the figure [in].
     """
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -207,8 +204,6 @@ DIGITS_SHOWN = 100.0  # s
 def clock_zero(t: Array) -> float:
     """Return what figures take off the times of a recording [s]; 0 where they are as short as is.
 
-    Parameters
-    ----------
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
@@ -218,10 +213,7 @@ def clock_zero(t: Array) -> float:
 def frozen_title(t: Array, t_freeze: float) -> str:
     """Return what a title calls a freeze, in the clock of the axis below it.
 
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    t_freeze : time of the freeze [s].
+    t : times of the samples (n,) [s].   t_freeze : time of the freeze [s].
     """
     return f"frozen at {freeze_key(round(t_freeze - clock_zero(t), 6))} s"
 
@@ -229,8 +221,6 @@ def frozen_title(t: Array, t_freeze: float) -> str:
 def label_time(axes: Axes, t: Array) -> None:
     """Name the time axis of a panel, and number it from the zero that it names.
 
-    Parameters
-    ----------
     t : times of the samples (n,) [s].
     """
     zero = clock_zero(t)
@@ -242,10 +232,7 @@ def label_time(axes: Axes, t: Array) -> None:
 def time_window(t: Array, window: Window) -> tuple[float, float]:
     """Return the ends of a time axis.
 
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    window : first and last time to show [s], or None for all.
+    t : times of the samples (n,) [s].   window : first and last time to show [s], or None for all.
     """
     if window is None:
         return float(t[0]), float(t[-1])
@@ -262,8 +249,6 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
 
     The limits of the time axis must be set before.
 
-    Parameters
-    ----------
     t_freeze : time of the freeze [s].
     """
     first, last = axes.get_xlim()
@@ -290,8 +275,6 @@ def legend_above(
 ) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 
-    Parameters
-    ----------
     columns : entries in a row; None puts all in one.
     """
     entries: dict[str, Any] = {}
@@ -348,10 +331,7 @@ class ForceUnit(NamedTuple):
     def format(self, error: AxleRmse, axle: int) -> str:
         """Return an axle's error as text with its unit.
 
-        Parameters
-        ----------
-        error : of both axles [N].
-        axle : 0 is the front axle, 1 the rear.
+        error : of both axles [N].   axle : 0 is the front axle, 1 the rear.
         """
         value = (error.front, error.rear)[axle] / self.newtons
         digits = f"{value:.3g}" if value >= 1.0 else f"{value:.2f}"
@@ -364,8 +344,6 @@ KILONEWTON, NEWTON = ForceUnit("kN", 1000.0), ForceUnit("N", 1.0)
 def force_unit_of(force: Array) -> ForceUnit:
     """Return kN where a force reaches 1 kN, else N.
 
-    Parameters
-    ----------
     force : any shape [N]; what is not finite does not count.
     """
     return KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else NEWTON
@@ -374,8 +352,6 @@ def force_unit_of(force: Array) -> ForceUnit:
 def impulse_unit(force_unit: float) -> str:
     """Return the name of the unit of ξ, the force unit times one second.
 
-    Parameters
-    ----------
     force_unit : U [N].
     """
     return f"{force_unit_name(force_unit)} s"

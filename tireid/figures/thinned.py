@@ -25,10 +25,7 @@ Signal = Callable[[slice | Samples], NDArray[Any]]  # values (k,) or (k, m) at s
 def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
     """Return which samples within the ends of a time axis are drawn.
 
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    ends : first and last time [s].
+    t : times of the samples (n,) [s].   ends : first and last time [s].
     """
     if len(t) <= LONG:
         within: Samples = (t >= ends[0]) & (t <= ends[1])
@@ -49,8 +46,6 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
 def drawn_times(recording: Recording, t: Array) -> Array:
     """Return times as a line is drawn over them: none where a stretch begins, so that it has a gap.
 
-    Parameters
-    ----------
     t : times of some of its samples, rising (k,) [s].
     """
     begins = recording.t[list(recording.breaks)]
@@ -61,8 +56,6 @@ def drawn_times(recording: Recording, t: Array) -> Array:
 def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     """Return the samples that are lowest or highest among `width` neighbors, rising.
 
-    Parameters
-    ----------
     signals : (k,) or (k, m) each; the last neighbors may be fewer.
     """
     found = []
@@ -119,8 +112,6 @@ def shown_of_run(
 ) -> tuple[Array, list[Array]]:
     """Return times and values of what a run recorded, as `DrawnRun` gathers them.
 
-    Parameters
-    ----------
     ends : first and last time [s].
     """
     drawn = DrawnRun(history, ends, tell)
@@ -132,10 +123,7 @@ def shown_of_run(
 def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> Samples:
     """Return which samples a cloud of points shows: of those that look alike the first.
 
-    Parameters
-    ----------
-    slips : across (k, m).
-    heights : of each curve (k, m).
+    slips : across (k, m).   heights : of each curve (k, m).
     counts : whether samples are drawn at all (k,).
     """
     if n <= LONG:

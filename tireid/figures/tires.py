@@ -274,8 +274,6 @@ def learnt_axles_figure(
     Of the axle identifier cornering stiffness, relaxation length and capacity, the force at which
     the learnt curve saturates, over the static load of the axle.
 
-    Parameters
-    ----------
     freeze_times : times at which weights were taken [s].
     drawn : `drawn_tracks` that has taken all blocks; None looks at the run.
     """

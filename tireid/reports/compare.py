@@ -31,8 +31,6 @@ def write_compare_report(
 ) -> None:
     """Write the report of a comparison.
 
-    Parameters
-    ----------
     verdicts : on what the default learns, by recording.
     """
     course = comparison.course
