@@ -8,13 +8,14 @@ import pytest
 
 from identifier.certificate import statement
 from identifier.driving import Driving, natural_driving
+from identifier.methods import certify
 from identifier.paper.design import PaperIdentifier, design_text, read_design
 from identifier.stability import Certificate
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.commands import check as check_command
-from tireid.commands.certificate_table import bound_rows, certificate_of
+from tireid.commands.certificate_table import bound_rows
 
 
 def observed(xi_tilde):
@@ -141,7 +142,7 @@ def test_every_row_is_passed_by_a_law_that_breaks_what_it_bounds():
         beginning = Beginning(W=0.0, V=12.0)
         rng = np.random.default_rng(1)
         seen = monte_carlo(planted, vehicle, driving, 30, beginning=beginning, rng=rng)
-        found = bound_rows(certificate_of(told, vehicle), seen)
+        found = bound_rows(certify(told, vehicle), seen)
         passed[name] = {row.name: row.passed for row in found}[name]
     assert min(passed.values()) > 0, passed
 
@@ -166,7 +167,7 @@ def test_drives_resume_with_the_smaller_of_proven_and_projected_weights(
 ):
     """A projection beyond what the leakage keeps, or none, lets no drive begin beyond the bound."""
     seen, design = [], PaperIdentifier.for_vehicle(sedan())
-    bound = certificate_of(design, sedan())["weight_bound"].value
+    bound = certify(design, sedan())["weight_bound"].value
     path = tmp_path / "design.toml"
     gains = replace(design.gains, W_max=share * bound)
     path.write_text(design_text(replace(design, gains=gains)))

@@ -12,6 +12,7 @@ import pytest
 import tireid.commands.demo
 import tireid.commands.paper
 from benchmarks.paper_gains import random_designs
+from identifier.methods import certify
 from identifier.paper_study import (
     FREEZES,
     GAINS,
@@ -28,7 +29,6 @@ from models.vehicle import sedan
 from tests.conftest import PNG
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.commands.certificate_table import certificate_of
 from tireid.commands.paper import PAPER, table_text, write_study
 from tireid.figures.forces import force_figure
 
@@ -136,7 +136,7 @@ def test_the_gains_are_those_that_the_search_prints():
 
 
 def test_the_pattern_is_that_of_an_instantaneous_law_beyond_its_stability_limit():
-    verdict = {law: certificate_of(paper_design(law, 0), sedan()).verdict for law in LAWS}
+    verdict = {law: certify(paper_design(law, 0), sedan()).verdict for law in LAWS}
     assert verdict == {"instantaneous": "fail", "integral": "warn", "instantaneous_scaled": "warn"}
 
 

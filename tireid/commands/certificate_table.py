@@ -7,7 +7,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.driving import Driving
-from identifier.methods import LIVE, certify
+from identifier.methods import LIVE
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.setup import force_unit_name
@@ -18,16 +18,6 @@ from tireid.output import text_table
 
 ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
 HEADER = ("property", "value", "limit", "margin", "")
-
-
-def certificate_of(
-    design: PaperIdentifier, vehicle: Vehicle, driving: Driving | None = None
-) -> Certificate:
-    """Return the certificate of a design.
-
-    driving : how hard it is driven; None takes `natural_driving`.
-    """
-    return certify(design, vehicle, driving)
 
 
 def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:

@@ -41,13 +41,13 @@ from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import (
     bound_rows,
-    certificate_of,
     certificate_text,
     method_text,
     monte_carlo_numbers,
     monte_carlo_text,
     unit_text,
 )
+from tireid.commands.demo_story import SLALOM, drives
 from tireid.figures.paper import error_figure, locus_figure
 from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
@@ -244,11 +244,12 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     driving = _driving(options, design, vehicle)
     if options.design is None:
         design = replace(design, driving=driving)
-    certificate = certificate_of(design, vehicle, driving)
+    certificate = certify(design, vehicle, driving)
     drive = None
     if options.along is not None:
         drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=design.dt)
-    _require_free(options)
+    if options.tune is not None:
+        require_free(options.tune, force=options.force)
     observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)
     passed = any(row.passed for row in rows) or (observed is not None and observed.diverged > 0)
@@ -274,7 +275,9 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
             _write_certificate(folder, text, numbers)
-            _draw(folder, vehicle, driving, design, certificate, drive)
+            learnt = drive or drives({"slalom": SLALOM})["slalom"]
+            operation = design.operation(vehicle, driving)
+            draw_check(folder, learnt, vehicle, design, operation, certificate)
         if options.tune is not None:
             write_atomically(options.tune, design_text(design))
     tell(json.dumps(numbers, indent=2) if options.json else text)
@@ -419,7 +422,7 @@ def _proposal(
         better = with_keeping(better, known, DEFAULT_KEEPING)
     except DesignError as error:
         return f"no better gains at this bandwidth: {error}"
-    gains, verdict = better.gains, certificate_of(better, vehicle, driving).verdict
+    gains, verdict = better.gains, certify(better, vehicle, driving).verdict
     return (
         f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
         f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
@@ -435,23 +438,3 @@ def _given(options: argparse.Namespace) -> str:
     return "".join(
         f" --{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in given.items()
     )
-
-
-def _draw(
-    folder: Path,
-    vehicle: Vehicle,
-    driving: Driving,
-    design: PaperIdentifier,
-    certificate: Certificate,
-    drive: Recording | None,
-) -> None:
-    from tireid.commands.demo_story import drive_to_learn
-
-    recording = drive_to_learn() if drive is None else drive
-    operation = design.operation(vehicle, driving)
-    draw_check(folder, recording, vehicle, design, operation, certificate)
-
-
-def _require_free(options: argparse.Namespace) -> None:
-    if options.tune is not None:
-        require_free(options.tune, force=options.force)

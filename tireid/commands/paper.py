@@ -9,6 +9,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from codegen.writing import write_file
+from identifier.methods import certify
 from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
@@ -34,7 +35,7 @@ from identifier.reproducibility import freeze_key
 from models.schema import require_few
 from models.vehicle import sedan
 from tireid.commands import COMMANDS
-from tireid.commands.certificate_table import certificate_of, verdict_line
+from tireid.commands.certificate_table import verdict_line
 from tireid.commands.options import add_output
 from tireid.figures.forces import force_figure
 from tireid.figures.paper import comparison_figure
@@ -185,7 +186,7 @@ def study_text(study: Study) -> str:
 def verdicts() -> list[str]:
     """Return for each law one line with the verdict on the gains of the study."""
     return [
-        f"{VARIANTS[law].title}: {verdict_line(certificate_of(paper_design(law, seed=0), sedan()))}"
+        f"{VARIANTS[law].title}: {verdict_line(certify(paper_design(law, seed=0), sedan()))}"
         for law in LAWS
     ]
 
