@@ -54,11 +54,6 @@ class Cost:
     progress : share of the speed that is not made good along the path, at 0.1.
     steering_rate : input, at 0.5 rad/s; it alone must be positive.
     terminal : factor on all errors at the end of the horizon.
-
-    Raises
-    ------
-    ValueError
-        Where a weight is negative or not finite, or steering_rate zero.
     """
 
     e_y: float = 3.0
@@ -160,11 +155,6 @@ class Problem:
     ----------
     horizon : number of stages N.
     dt : length of a stage [s].
-
-    Raises
-    ------
-    ValueError
-        Where the horizon is not at least 2 or dt not positive and finite.
     """
 
     horizon: int = 40
@@ -201,11 +191,6 @@ class Guards:
     hold_time : how long an old plan is followed [s].
     fall_back_e_y : deviation [m] that is worth as much as the acceleration.
     fall_back_acceleration : lateral, to come back by [m/s²].
-
-    Raises
-    ------
-    ValueError
-        Where a bound is not positive and finite, or hold_time negative.
     """
 
     e_y: float = 5.0

@@ -87,11 +87,6 @@ class Table:
     ----------
     rows : cells by row; numbers are given four digits, None and what is not finite becomes a dash.
     verbatim : whether cells are to be read letter by letter, as commands are.
-
-    Raises
-    ------
-    ValueError
-        Where a row has more or fewer cells than the header.
     """
 
     caption: str
@@ -115,13 +110,6 @@ class Picture:
     Parameters
     ----------
     image : the SVG, PNG, GIF or WebP itself, or the path of its file.
-
-    Raises
-    ------
-    ValueError
-        Where the image is none of them.
-    OSError
-        Where its file cannot be read.
     """
 
     image: bytes | Path

@@ -194,7 +194,7 @@ class MpcPackage(NamedTuple):
     """A package before it is written.
 
     name : prefix of every symbol.   tire : of the prediction.   problem : what is minimized.
-    params : the numbers that it begins with, of `mpc.realtime.instance.params_type`.
+    params : the numbers that it begins with, of `mpc.realtime.instance.c_types`.
     files : texts by path.   vectors : of the self-test.   about : title, version, hash, as text.
     """
 

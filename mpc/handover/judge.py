@@ -36,11 +36,6 @@ class Window:
     ----------
     seconds : longest time that can be looked back on [s].
     dt : sampling interval [s].
-
-    Raises
-    ------
-    ValueError
-        Where there is not room for two samples.
     """
 
     def __init__(self, seconds: float, dt: float) -> None:
@@ -186,11 +181,6 @@ class Judge:
     ----------
     dt : sampling interval [s].
     expected : errors of a good tire; None takes the default.
-
-    Raises
-    ------
-    ValueError
-        Where a stretch has no three samples.
     """
 
     def __init__(self, dt: float, expected: ErrorModel | None = None) -> None:

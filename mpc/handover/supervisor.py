@@ -103,11 +103,6 @@ class Supervisor:
     judge : of chi-squares; None expects the usual errors.
     proven : whether that tire is one of this car, so that what it does not explain is the road;
         else a friction is looked for only after a learnt tire took over.
-
-    Raises
-    ------
-    ValueError
-        Where a law does not have its certificate.
     """
 
     def __init__(

@@ -34,11 +34,6 @@ class Dither:
     grip : largest lateral acceleration of the car [m/s²].
     need : how much is unknown now, 0 to 1; None teaches a log, with full strength.
     strength : g now [-].
-
-    Raises
-    ------
-    ValueError
-        Where amplitude or grip are not positive.
     """
 
     vehicle: Vehicle

@@ -99,11 +99,6 @@ class LateralVelocity:
     identifier : of a method that tells v_y; it is told every sample here, and learns.
     localization : how far position and heading are trusted; None takes the default.
     body : how it rolls; None takes what the chassis of the identifier's vehicle tells.
-
-    Raises
-    ------
-    ValueError
-        Where the method does not tell v_y.
     """
 
     def __init__(

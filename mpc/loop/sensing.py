@@ -61,11 +61,6 @@ class CarSensors:
     a_y : lateral acceleration [m/s^2].
     body_fixed : whether the accelerometer rolls with the body and feels gravity then; else a_y is
         in the plane of the road.
-
-    Raises
-    ------
-    SensorError
-        For a sensor with a delay of its own: the delay of the loop is that of its command.
     """
 
     X: Sensor = EXACT
@@ -159,11 +154,6 @@ class FaultySensors:
     Parameters
     ----------
     faults : what breaks, where channels are those of `Measured`.
-
-    Raises
-    ------
-    FaultError
-        For a channel that is not measured.
     """
 
     def __init__(self, sensors: CarSensors, faults: Sequence[SensorFault]) -> None:
@@ -216,11 +206,6 @@ class SpeedProfile:
     Parameters
     ----------
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
-
-    Raises
-    ------
-    ValueError
-        When the shape is wrong, or a speed is not positive and finite.
     """
 
     def __init__(self, path: Path, v: ArrayLike) -> None:

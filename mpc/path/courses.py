@@ -59,12 +59,6 @@ class Turn:
     radius : of the constant part [m].
     angle : heading gained over all of it [rad], > 0 to the left.
     easing : length over which the curvature rises, and falls again [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is not finite, radius or easing not positive, angle zero, or the angle too
-        small for the easing.
     """
 
     radius: float

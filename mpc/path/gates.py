@@ -41,11 +41,6 @@ class Gate:
     end : where it ends [m].
     right : y of the right cones [m].
     left : y of the left cones [m].
-
-    Raises
-    ------
-    PathError
-        Where start or end is not finite, start after end, or right not below left.
     """
 
     start: float

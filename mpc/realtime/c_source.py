@@ -74,6 +74,9 @@ def c_sources(
 
     single : whether float is the default precision.
     """
+    counts = c_sizes(structure, horizon)
+    sizes = {key: (f"{count}U", words) for key, (count, words) in counts.items()}
+    version = f'"{about["version_text"]}"'
     return {
         **c_files(C, PLACES, {PREFIX: name}),
         f"include/{name}_config.h": header(
@@ -81,7 +84,7 @@ def c_sources(
             f"{in_comment(about['title'])}: precision and sizes.\n\n{generated(about)}",
             [
                 precision(name, single=single),
-                defines(name, _sizes(structure, horizon, f'"{about["version_text"]}"')),
+                defines(name, {**sizes, "VERSION": (version, "name, hash, version of tireid")}),
             ],
         ),
         f"src/{name}_equations.c": _equations(structure, name, generated(about)),
@@ -94,21 +97,19 @@ def python_file(files: Mapping[str, str], *, name: str, single: bool) -> str:
     return one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})
 
 
-def _sizes(
-    structure: TireStructure, horizon: int, version_text: str
-) -> dict[str, tuple[object, str]]:
+def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]]:
+    """Return the sizes of a tracker and what they count, by the end of their macro."""
     n_x = state_size(structure)
     lagged = ", lagged slip in front and at the rear" if n_x > 5 else ""
     return {
-        "HORIZON": (f"{horizon}U", "stages of the plan"),
-        "STATES": (f"{n_x}U", f"e_y, e_psi, v_y, r, delta{lagged}"),
-        "WEIGHTS": (f"{structure.n_weights}U", "numbers of the tire"),
-        "ERRORS": (f"{N_ERRORS}U", "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
-        "SPEEDS": (f"{N_SPEEDS}U", "of the fall-back's table"),
-        "GAINS": (f"{N_GAINS}U", "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
-        "GRIPS": (f"{N_GRIPS}U", "frictions that are held for possible"),
-        "DOUBTS": (f"{N_DOUBTS}U", "slips at which the doubt of the forces is told"),
-        "VERSION": (version_text, "name, hash, version of tireid"),
+        "HORIZON": (horizon, "stages of the plan"),
+        "STATES": (n_x, f"e_y, e_psi, v_y, r, delta{lagged}"),
+        "WEIGHTS": (structure.n_weights, "numbers of the tire"),
+        "ERRORS": (N_ERRORS, "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
+        "SPEEDS": (N_SPEEDS, "of the fall-back's table"),
+        "GAINS": (N_GAINS, "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
+        "GRIPS": (N_GRIPS, "frictions that are held for possible"),
+        "DOUBTS": (N_DOUBTS, "slips at which the doubt of the forces is told"),
     }
 
 

@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import re
 from dataclasses import fields, is_dataclass
 from enum import IntEnum
 from functools import cache
@@ -17,11 +18,9 @@ from codegen.arrays import Array
 from codegen.compiler import keep, kept
 from codegen.errors import TireidError
 from mpc.prediction import state_size
-from mpc.problem import N_ERRORS, Guards, Problem
-from mpc.realtime.c_source import c_sources, python_file
-from mpc.realtime.caution import N_GRIPS
-from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.tire import N_DOUBTS, TireStructure
+from mpc.problem import Guards, Problem
+from mpc.realtime.c_source import C, c_sizes, c_sources, python_file
+from mpc.tires.tire import TireStructure
 
 # What goes into a tracker and what comes out.
 
@@ -70,84 +69,39 @@ class Command(NamedTuple):
     iterations: int
 
 
-# The structures of the C tracker as NumPy types: Python writes and reads them in place.
+# The structures of the C tracker as NumPy types, read from its header: Python writes and reads them
+# in place.
 
-N_COMMANDS = 32
-N_STATUSES = 9
-TIMES = ("cost_rate", "stage_time", "period", "delay")
-LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "rise", "soft_e_y", "soft_slip")
-CAUTION = (
-    "caution",
-    "grips",
-    "prior",
-    "surprise",
-    "doubt",
-    "doubt_step",
-    "force_error",
-    "stiffness",
-)
-OF_AXLES = ("max_slip", "rise", "force_error")
-GUARDS = (
-    *("widest_e_y", "widest_e_psi", "max_v_y", "max_yaw_rate", "min_speed"),
-    *("max_speed", "max_curvature", "speeds", "gains", "hold_time"),
-)
+N_COMMANDS = 32  # of the past, which a delay may reach back
+STRUCTURE = re.compile(r"typedef struct \{([^}]*)\} tireid_mpc_(\w+);")
+MEMBER = re.compile(r"(\w+)\s+(\w+)((?:\[[^]]+\])*);")
+MACRO = re.compile(r"#define TIREID_MPC_(\w+) (\d+)U\b")
 
 
-def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
-    real = _real(single)
-    names = [*TIMES, *LIMITS, *CAUTION, *GUARDS, "tolerance"]
-    of_grips = dict.fromkeys(("grips", "prior"), (N_GRIPS,))
-    shapes = {
-        **dict.fromkeys(OF_AXLES, (2,)),
-        **of_grips,
-        "doubt": (2, N_DOUBTS),
-        "speeds": (N_SPEEDS,),
-        "gains": (N_SPEEDS, N_GAINS),
+@cache
+def c_types(
+    structure: TireStructure, horizon: int, *, single: bool
+) -> dict[str, np.dtype[np.void]]:
+    """Return the types of `params`, `input` and `state`."""
+    text = re.sub(r"/\*.*?\*/", "", (C / "tireid_mpc.h").read_text(encoding="utf-8"), flags=re.S)
+    sizes = {f"TIREID_MPC_{name}": int(value) for name, value in MACRO.findall(text)}
+    sizes |= {f"TIREID_MPC_{key}": n for key, (n, _) in c_sizes(structure, horizon).items()}
+    kinds = {"tireid_mpc_real": np.float32 if single else np.float64, "uint32_t": np.uint32}
+
+    def shape(dimensions: str) -> tuple[int, ...]:
+        sums = [one.split("+") for one in re.findall(r"\[([^]]+)\]", dimensions)]
+        return tuple(
+            sum(sizes.get(part.strip()) or int(part.strip(" U")) for part in one) for one in sums
+        )
+
+    return {
+        name: np.dtype(
+            [(member, kinds[kind], shape(of)) for kind, member, of in MEMBER.findall(members)],
+            align=True,
+        )
+        for members, name in STRUCTURE.findall(text)
+        if name in ("params", "input", "state")
     }
-    numbers = [(name, real, shapes.get(name, ())) for name in names]
-    arrays = [("car", 4), ("weights", n_weights), ("cost", N_ERRORS), ("cost_end", N_ERRORS)]
-    return np.dtype(
-        [(name, real, (size,)) for name, size in arrays]
-        + numbers
-        + [(name, np.uint32) for name in ("max_iterations", "linearizations", "max_active_sets")],
-        align=True,
-    )
-
-
-def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
-    real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    watch = ("gentle", "placed", "watched", "doubted")
-    counts = (*solution, "age", "planned", "guessed", "started", *watch)
-    return np.dtype(
-        [
-            ("x", real, (horizon + 1, n_x)),
-            ("u", real, (horizon,)),
-            ("feedback", real, (horizon, n_x)),
-            ("commands", real, (N_COMMANDS,)),
-            ("lagged", real, (2,)),
-            ("zero", real),
-            ("drift", real),
-            ("turning", real),
-            ("apart", real, (2,)),
-            ("stays", real, (2,)),
-            ("last", real, (2,)),
-            ("place", real, (2,)),
-            ("grip", real),
-            ("cost", real, (N_GRIPS,)),
-            ("slips", real, (N_GRIPS, 2)),
-            ("impulse", real, (N_GRIPS, 2)),
-            ("faults", np.uint32, (N_STATUSES,)),
-            *((name, np.uint32) for name in counts),
-        ],
-        align=True,
-    )
-
-
-def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
-    real = _real(single)
-    numbers = [(name, real) for name in ("e_y", "e_psi", "v_y", "r")]
-    ahead = [(name, real, (horizon + 1,)) for name in ("kappa", "v_x")]
-    return np.dtype([*numbers, *ahead], align=True)
 
 
 def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
@@ -162,10 +116,6 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
     params["max_v_y"], params["max_yaw_rate"] = guards.v_y, guards.yaw_rate
     for name in ("min_speed", "max_speed", "max_curvature", "hold_time"):
         params[name] = getattr(guards, name)
-
-
-def _real(single: bool) -> type[np.floating]:
-    return np.float32 if single else np.float64
 
 
 # The text of a tracker in one file, kept between runs: a second start generates nothing.
@@ -232,13 +182,6 @@ class Instance:
     ----------
     horizon : number of stages.
     single : whether numbers are float.
-
-    Raises
-    ------
-    NoCompilerError
-        Where there is no C compiler.
-    CompilationError
-        Where the compiler refuses the code.
     """
 
     def __init__(self, structure: TireStructure, horizon: int, *, single: bool) -> None:
@@ -249,9 +192,10 @@ class Instance:
         self._library.mpc_sizes.restype = ctypes.c_size_t
         self._real = ctypes.c_float if single else ctypes.c_double
         n_x = state_size(structure)
-        self.params = np.zeros((), params_type(structure.n_weights, single=single))
-        self.state = np.zeros((), state_type(horizon, n_x, single=single))
-        self.input = np.zeros((), input_type(horizon, single=single))
+        types = c_types(structure, horizon, single=single)
+        self.params, self.state, self.input = (
+            np.zeros((), types[name]) for name in ("params", "state", "input")
+        )
         sizes = [library.mpc_sizes(i) for i in range(4)]
         expected = [array.nbytes for array in (self.params, self.state, self.input)]
         assert sizes[:3] == expected, f"structures of {expected} bytes are {sizes[:3]} in C"

@@ -133,7 +133,7 @@ class Tracker:
 
     @property
     def params(self) -> NDArray[np.void]:
-        """A copy of the numbers that the C reads, of `mpc.realtime.instance.params_type`."""
+        """A copy of the numbers that the C reads, of `mpc.realtime.instance.c_types`."""
         return self.instance.params.copy()
 
     def set_tire(self, tire: PredictionTire) -> None:

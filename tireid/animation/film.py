@@ -4,13 +4,12 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from subprocess import CalledProcessError
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib import style
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
-from codegen.arrays import Array
 from codegen.writing import naming
 from mpc.loop import Drive
 from tireid.animation.known import KnownCurves
@@ -19,33 +18,11 @@ from tireid.figures.style import LOOK
 from tireid.figures.tires import TireCurve
 from tireid.progress import say
 
-# Which instants of a drive are shown, and how fast; matplotlib's writers make the file.
-
 RATE = 10.0  # frames a second; a GIF counts in hundredths of a second
 MOST = 120  # frames: what stays small and quick to draw
-PACES = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 HOLD = 12  # frames for which the last picture stays
 DOTS = 150  # an inch
 QUALITY = 45  # of a WebP, to 100
-
-
-class Reel(NamedTuple):
-    """Instants (k,) [s] of the drive and the pace: seconds of the drive a second of the film."""
-
-    t: Array
-    pace: float
-
-
-def reel(duration: float) -> Reel:
-    """Return what to show of a drive: at the slowest pace that is not too long.
-
-    duration : of the drive [s].
-    """
-    for pace in PACES:
-        if duration * RATE / pace <= MOST:
-            break
-    count = min(MOST, max(2, round(duration * RATE / pace)))
-    return Reel(np.linspace(0.0, duration, count), pace)
 
 
 def require_ffmpeg() -> str:
@@ -74,7 +51,9 @@ def write_film(
     known : of the tires while the first drove; None where nothing was learnt.
     """
     first = next(iter(drives.values()))
-    instants, pace = reel(float(first.t[-1] - first.t[0]))
+    duration = float(first.t[-1] - first.t[0])
+    instants = np.linspace(0.0, duration, min(MOST, max(2, round(RATE * duration))))
+    pace = RATE * duration / instants.size  # seconds of the drive a second of the film
     scene = Scene(drives, curves, drops=drops, pace=pace, title=title, known=known)
     writer = _writer(file)
     try:

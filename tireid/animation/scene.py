@@ -292,7 +292,7 @@ class Scene:
         now = Instant(k, float(drive.t[k]), self._camera.at(float(drive.s[k])))
         for part in self._parts:
             part.show(now)
-        pace = "" if self._pace == 1.0 else f"  {self._pace:g} x real time"
+        pace = "" if abs(self._pace - 1.0) < 0.01 else f"  {self._pace:.2g} x real time"
         self._says.set_text(
             f"{t:5.1f} s  {drive.v_x[k]:4.1f} m/s  a_y {drive.a_y[k]:+5.1f} m/s²  "
             f"e_y {drive.e_y[k]:+5.2f} m{pace}"

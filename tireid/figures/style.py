@@ -176,11 +176,7 @@ def figure_svg(figure: Figure) -> bytes:
     buffer = BytesIO()
     with laid_out(figure, {**LOOK, **VECTOR}):
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
-    return OUTLINE.sub(lambda path: DIGITS.sub(b"", path[0]), buffer.getvalue())
-
-
-OUTLINE = re.compile(rb' d="[^"]*"')  # of a curve or a glyph, in points or finer
-DIGITS = re.compile(rb"(?<=\.\d\d)\d+")  # more are not seen
+    return buffer.getvalue()
 
 
 def save_figure(figure: Figure, path: Path) -> None:
