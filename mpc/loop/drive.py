@@ -88,14 +88,15 @@ def drive(
 
     path : to follow, from s = 0.   tracker : which steers; it is reset.
     speed : wanted along the path, [m/s] where it is a number.
-    sensors : of the car; None measures exactly.   lateral : tells v_y, and a_y in the plane of the
-    road, in place of the sensors; None takes what they show.
-    dither : weaves along the path to teach; None keeps to it.
+    sensors : of the car; None measures exactly.
+    lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
+    they show.   dither : weaves along the path to teach; None keeps to it.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
-    widest : deviation at which the car has left the path [m].   blind : longest time without a
-    number of a position, heading or speed [s]: until then the car goes on by dead reckoning, then
-    the drive ends.   plan_every : periods between two plans that are kept; 0 keeps none.
+    widest : deviation at which the car has left the path [m].
+    blind : longest time without a number of a position, heading or speed [s]: until then the car
+    goes on by dead reckoning, then the drive ends.
+    plan_every : periods between two plans that are kept; 0 keeps none.
     name : of the drive; None takes that of the path.
     """
     if abs(car.period - tracker.period) > 1e-9:

@@ -116,7 +116,8 @@ class Drive:
 
 # Collecting a drive, period by period.
 
-OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta")
+OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "axle_force")
+OTHERS = ("s", "e_y", "e_psi", "kappa", "v_ref", "command", "solve_time", "status")
 
 
 class Recorder:
@@ -192,12 +193,8 @@ class Recorder:
         completed: bool,
         ending: str,
     ) -> Drive:
-        """Return the drive.
-
-        period : control period [s].
-        completed : whether the car reached the end on the path and without spinning.
-        """
-        s, e_y, e_psi, kappa, v_ref, steering, solve_time, status = np.array(self._others).T
+        """Return the drive; its control period is told in s."""
+        others = dict(zip(OTHERS, np.array(self._others).T, strict=True))
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
         told: dict[str, Array] = {}
         if self._told:
@@ -209,17 +206,10 @@ class Recorder:
             path=path,
             period=period,
             **{key: np.array([getattr(car, key) for car in self._cars]) for key in OF_THE_CAR},
-            axle_force=np.array([car.axle_force for car in self._cars]),
-            s=s,
-            e_y=e_y,
-            e_psi=e_psi,
-            kappa=kappa,
-            v_ref=v_ref,
-            command=steering,
+            status=others.pop("status").astype(np.int64),
+            **others,
             measured=measured,
             told=told,
-            status=status.astype(np.int64),
-            solve_time=solve_time,
             plans=tuple(self._plans),
             notes=tuple(self._notes),
             completed=completed,
@@ -231,18 +221,19 @@ class Recorder:
 
 
 class Scores(NamedTuple):
-    """Deviation from the path and cost of steering; `to_dict` is ready for JSON."""
+    """Deviation from the path and cost of steering; `to_dict` is ready for JSON.
+
+    rms_e_y_m, peak_e_y_m : root mean square and largest magnitude of the true deviation [m].
+    completed : whether the car reached the end on the path.   failures : periods in which the
+    tracker reported other than success, by status.   solve_ms : time of the tracker's step: median,
+    p99 and max [ms].
+    """
 
     rms_e_y_m: float
-    """Root mean square of the true deviation over the whole drive [m]."""
     peak_e_y_m: float
-    """Its largest magnitude [m]."""
     completed: bool
-    """Whether the car reached the end on the path."""
     failures: Mapping[str, int]
-    """Periods in which the tracker reported other than success, by status."""
     solve_ms: Mapping[str, float]
-    """Time of the tracker's step: median, p99 and max [ms]."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers and words."""
@@ -274,18 +265,19 @@ def scores(drive: Drive) -> Scores:
 
 
 class ToldScores(NamedTuple):
-    """Errors of the lateral velocity that was told, against the truth."""
+    """Errors of the lateral velocity that was estimated, against the truth.
+
+    rms_error_m_s, rms_error_deg : root mean square of the error of v_y [m/s] and of side slip
+    [deg].   rms_deg : of the true side slip [deg].   within_two_sd : share of the samples whose
+    error lies within two standard deviations.   inertial_rms_error_m_s : of the identifier alone,
+    without position [m/s].
+    """
 
     rms_error_m_s: float
-    """Root mean square of the error of v_y [m/s]."""
     rms_error_deg: float
-    """The same of side slip [degrees]."""
     rms_deg: float
-    """Root mean square of the true side slip [degrees]."""
     within_two_sd: float
-    """Share of the samples whose error lies within two standard deviations."""
     inertial_rms_error_m_s: float
-    """Root mean square of the error of the identifier alone, without position [m/s]."""
 
 
 def told_scores(drive: Drive) -> ToldScores | None:

@@ -190,14 +190,11 @@ class FaultySensors:
 
 
 class Preview(NamedTuple):
-    """The road at some times ahead, each (k,)."""
+    """The road at some times ahead, each (k,): arc length [m], curvature [1/m], speed [m/s]."""
 
     s: Array
-    """Arc length [m]."""
     kappa: Array
-    """Curvature [1/m]."""
     v_x: Array
-    """Speed [m/s]."""
 
 
 class SpeedProfile:

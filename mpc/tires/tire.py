@@ -207,8 +207,9 @@ def believed_force(
 
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
-    rise : slope beyond [N/rad], (2,).   grip : friction over the one that the weights have [-]; not
-    looked at where the structure offers no other.
+    rise : slope beyond [N/rad], (2,).
+    grip : friction over the one that the weights have [-]; not looked at where the structure offers
+    no other.
     """
     there = structure.similar(at, grip)
     if there is None:

@@ -12,8 +12,8 @@ Errors are {"front", "rear"} in N; null stands for what diverged or is not there
 """
 
 import csv
-import math
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
+from identifier.compare.course import Trial, frozen_shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
 from identifier.frozen import vehicle_numbers
@@ -230,7 +230,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             recording.name: {
                 "samples": len(recording),
                 "duration_s": recording.duration,
-                "rms_force_N": _axles(course.size(recording)),
+                "rms_force_N": asdict(course.size(recording)),
             }
             for recording in course.recordings
         },
@@ -260,12 +260,12 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
 def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     trial = comparison.trials[name]
     return {
-        "online_N": {recording: _axles(error) for recording, error in trial.online.items()},
+        "online_N": {recording: asdict(error) for recording, error in trial.online.items()},
         "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
         "diverged_at_s": dict(trial.diverged_at),
-        "percent": _percent(comparison.shares(name)),
+        "percent": comparison.shares(name)._asdict(),
         "side_slip": {
-            recording: {"rms_deg": _finite(one.rms), "within_two_sigma_percent": one.within}
+            recording: {"rms_deg": one.rms, "within_two_sigma_percent": one.within}
             for recording, one in trial.side_slip.items()
         },
         "step_s": comparison.step_times[name],
@@ -280,7 +280,7 @@ def _sweep_numbers(
     return {
         "designs": len(candidates),
         "diverged": sum(bool(candidate.diverged_on) for candidate in candidates),
-        "default": _percent(comparison.shares(name)),
+        "default": comparison.shares(name)._asdict(),
         "best": None if best is None else _candidate(best),
         "front": [_candidate(candidate) for candidate in pareto_front(candidates)],
         "trials": [_candidate(candidate) for candidate in candidates],
@@ -290,27 +290,14 @@ def _sweep_numbers(
 def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
         "values": dict(candidate.values),
-        "percent": _percent(candidate.shares),
+        "percent": candidate.shares._asdict(),
         "diverged_on": list(candidate.diverged_on),
     }
 
 
-def _percent(found: Shares) -> dict[str, float | None]:
-    return {name: _finite(share) for name, share in found._asdict().items()}
-
-
-def _axles(error: AxleRmse) -> dict[str, float | None]:
-    return {"front": _finite(error.front), "rear": _finite(error.rear)}
-
-
-def _finite(error: float | None) -> float | None:
-    """Return an error; None where a law that diverged has an infinite one."""
-    return error if error is not None and math.isfinite(error) else None
-
-
-def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float | None]]]:
+def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
     return {
-        learnt: {name: _axles(error) for name, error in replays.items()}
+        learnt: {name: asdict(error) for name, error in replays.items()}
         for learnt, replays in frozen.items()
     }
 

@@ -17,14 +17,13 @@ from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
 from tireid.commands.demo_story import FREEZE, Story
 from tireid.commands.drive import headline, inputs_of
-from tireid.commands.drive_results import drive_table as drive_lines
-from tireid.commands.drive_results import known_curves, write_drives
+from tireid.commands.drive_results import drive_lines, known_curves, write_drives
 from tireid.driving import Conditions, Run, Setup, SpeedWish, run_drive
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
 from tireid.exporting import Verdict, self_test, write_files
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
-from tireid.reports.drive import drive_table, known_blocks
+from tireid.reports.drive import SCORES, known_blocks, score_rows
 
 # The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
 
@@ -82,7 +81,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
             caption="The drive of the learning car; outlines are the others.",
             read=READ["film"],
         ),
-        drive_table(slippery.runs, f"{headline(slippery.conditions)}."),
+        _scores(slippery),
         drawing(slippery.figures["errors"], "Deviation and the rest along the path.",
                 READ["errors"]),
         *known_blocks(slippery.runs, slippery.figures),
@@ -91,11 +90,16 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
             "can give: told of the frozen model the tracker drives as well as one that is told of "
             f"the true tires. The film is {LANE_CHANGE}/drive.{FILM}."
         ),
-        drive_table(lane.runs, f"{headline(lane.conditions)}."),
+        _scores(lane),
         drawing(lane.figures["errors"], "Deviation and the rest along the lane change.",
                 READ["errors"]),
     ]  # fmt: skip
     return Section(heading=heading, blocks=blocks)
+
+
+def _scores(one: Driven) -> Table:
+    caption = f"{headline(one.conditions)}."
+    return Table(caption=caption, header=SCORES, rows=score_rows(one.runs))
 
 
 def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:

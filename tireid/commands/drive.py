@@ -19,7 +19,7 @@ from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
-from tireid.commands.drive_results import NO_FILM, drive_table, known_curves, write_drives
+from tireid.commands.drive_results import NO_FILM, drive_lines, known_curves, write_drives
 from tireid.driving.learn import DURATION
 from tireid.driving.runs import (
     FROZEN,
@@ -255,7 +255,7 @@ def run(options: argparse.Namespace) -> int:
             film=folder / f"drive.{options.film}" if options.film in SHOWN else None,
             command=options.words,
         )
-        told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
+        told = f"{headline(conditions)}\ntires: {source}\n{drive_lines(runs)}"
     tell(told)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else NOT_COMPLETED

@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
@@ -16,7 +15,13 @@ from models.vehicle import Vehicle, sedan
 from mpc.loop import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from mpc.realtime.caution import require_caution
-from tireid.commands.options import chosen_method, network_model, read_vehicle, seed_of
+from tireid.commands.options import (
+    chosen_method,
+    network_model,
+    number_with_unit,
+    read_vehicle,
+    seed_of,
+)
 from tireid.driving.learn import learning_drive
 from tireid.driving.runs import (
     FROZEN,
@@ -35,7 +40,6 @@ from tireid.verdicts import warn_of, warn_of_stored
 
 # Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
 
-PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
@@ -44,22 +48,17 @@ def parse_speed(text: str) -> SpeedWish:
 
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
     """
-    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text)
-    try:
-        value = float(found[1]) if found else math.nan
-    except ValueError:
-        value = math.nan
-    unit = found[2] if found else None
+    value, unit = number_with_unit(text, "%", "m/s", "km/h")
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
     if unit is None and value > PLAIN:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
-    if unit in (METERS, KILOMETERS):
-        speed = value / (3.6 if unit == KILOMETERS else 1.0)
+    if unit in ("m/s", "km/h"):
+        speed = value / (3.6 if unit == "km/h" else 1.0)
         if not 3.0 <= speed <= 100.0:
             raise ValueError(f"--speed must be 3 to 100 m/s, it is {speed:.3g} m/s")
         return SpeedWish(None, speed)
-    share = value / (100.0 if unit == PERCENT else 1.0)
+    share = value / (100.0 if unit == "%" else 1.0)
     if not 0.05 <= share <= PLAIN:
         raise ValueError(f"--speed must be 5 to 150 % of the grip, it is {100.0 * share:.3g} %")
     return SpeedWish(share, None)

@@ -31,6 +31,7 @@ from tireid.figures.style import save_figure
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import text_table, write_csv, write_json
 from tireid.progress import say
+from tireid.reports.drive import SCORES, score_rows
 
 NO_FILM = "none"
 
@@ -117,39 +118,31 @@ COLUMNS_TOLD = {
 }
 
 
+UNITS = {  # of signals of a drive, by their name
+    **dict.fromkeys(("s", "X", "Y", "e_y"), "m"),
+    **dict.fromkeys(("psi", "delta", "command", "e_psi"), "rad"),
+    **dict.fromkeys(("v_x", "v_y", "v_ref"), "m_s"),
+    **dict.fromkeys(("a_x", "a_y"), "m_s2"),
+    **{"t": "s", "r": "rad_s", "kappa": "1_m"},
+}
+SIGNALS = (
+    *("t", "s", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "command"),
+    *("e_y", "e_psi", "kappa", "v_ref"),
+)
+
+
 def drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
-    slip = axle_slip(drive)
-    units = {"t": "s", "psi": "rad", "r": "rad_s", "delta": "rad", "v_x": "m_s", "v_y": "m_s"}
-    measured = {
-        f"{name}_measured_{units.get(name, 'm_s2' if name == 'a_y' else 'm')}": values
-        for name, values in drive.measured.items()
-        if name != "t"
-    }
+    slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
     return {
-        "t_s": drive.t,
-        "s_m": drive.s,
-        "X_m": drive.X,
-        "Y_m": drive.Y,
-        "psi_rad": drive.psi,
-        "v_x_m_s": drive.v_x,
-        "v_y_m_s": drive.v_y,
-        "r_rad_s": drive.r,
-        "a_x_m_s2": drive.a_x,
-        "a_y_m_s2": drive.a_y,
-        "delta_rad": drive.delta,
-        "command_rad": drive.command,
-        "e_y_m": drive.e_y,
-        "e_psi_rad": drive.e_psi,
-        "kappa_1_m": drive.kappa,
-        "v_ref_m_s": drive.v_ref,
+        **{f"{name}_{UNITS[name]}": getattr(drive, name) for name in SIGNALS},
         "alpha_f_rad": slip[:, 0],
         "alpha_r_rad": slip[:, 1],
         "Fyf_N": drive.axle_force[:, 0],
         "Fyr_N": drive.axle_force[:, 1],
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
-        **measured,
+        **{f"{name}_measured_{UNITS[name]}": values for name, values in measured if name != "t"},
         **{COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
     }
 
@@ -177,20 +170,10 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
 
 # What `tireid drive` prints: one line a drive.
 
-TIMES = "wall time: median / p99 / max"
-COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", TIMES)
 
-
-def drive_table(runs: Sequence[Run]) -> str:
+def drive_lines(runs: Sequence[Run]) -> str:
     """Return the scores of drives as lines of text."""
-    rows = [list(COLUMNS)]
-    for run in runs:
-        score = run.scores
-        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
-        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
-        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
-        rows.append([run.label, *off, _completed(run), failures, f"{times} ms"])
-    lines = [text_table(rows, "<>><>>")]
+    lines = [text_table([SCORES, *score_rows(runs)], "<>><>>")]
     lines += [f"{run.label}: {told_words(run)}" for run in runs if run.drive.told]
     for run in runs:
         lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
@@ -206,9 +189,3 @@ def told_words(run: Run) -> str:
         f"{told.rms_deg:.2f} degrees rms; {100.0 * told.within_two_sd:.0f} % of the errors within "
         f"two standard deviations"
     )
-
-
-def _completed(run: Run) -> str:
-    if run.scores.completed:
-        return "yes"
-    return f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +19,6 @@ from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
-    Reproduction,
     force_rms,
     freeze_key,
     online_error,
@@ -44,16 +44,8 @@ from tireid.reports.identify import guaranteed_sentence
 # The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
 
 
-def _axles(error: AxleRmse | None) -> dict[str, float] | None:
-    return None if error is None else {"front": error.front, "rear": error.rear}
-
-
-def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
-    return {
-        "past_against_online": _axles(sides.past_against_online),
-        "past_against_truth": _axles(sides.past_against_truth),
-        "after_against_truth": _axles(sides.after_against_truth),
-    }
+def _told(error: AxleRmse | None) -> dict[str, float] | None:
+    return None if error is None else asdict(error)
 
 
 def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | None:
@@ -101,19 +93,19 @@ def summarize_replays(
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
         "replay_verdicts": {name: one.to_dict() for name, one in asked.items()},
-        "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
+        "rms_force_N": {h.recording.name: _told(force_rms(h)) for h in runs},
         "rmse_N": {
-            "online": {h.recording.name: _axles(online_error(h)) for h in runs},
+            "online": {h.recording.name: _told(online_error(h)) for h in runs},
             "frozen": {
-                key: {name: _axles(r.against_truth) for name, r in replays.items()}
+                key: {name: _told(r.against_truth) for name, r in replays.items()}
                 for key, replays in frozen.items()
             },
             "frozen_against_online": {
-                key: {name: _axles(r.against_online) for name, r in replays.items()}
+                key: {name: _told(r.against_online) for name, r in replays.items()}
                 for key, replays in frozen.items()
             },
             "reproducibility": {
-                key: {name: _sides(r.reproduction) for name, r in replays.items() if r.reproduction}
+                key: {name: asdict(r.reproduction) for name, r in replays.items() if r.reproduction}
                 for key, replays in frozen.items()
             },
         },

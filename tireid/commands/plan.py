@@ -34,12 +34,11 @@ from tireid.planning import (
     rehearsals,
 )
 from tireid.progress import Progress, say, tell
-from tireid.reports.plan import plan_words, write_plan_report
+from tireid.reports.plan import RIVALS, plan_words, rival_rows, write_plan_report
 from tireid.verdicts import warn_of_stored
 
 PERIOD = 0.01  # s, of steering.csv
 RUN_UP = 1.0  # s straight ahead, before each pass
-METERS, KILOMETERS = "m/s", "km/h"
 
 
 def add_parser(commands: Any) -> None:
@@ -170,7 +169,7 @@ def run(options: argparse.Namespace) -> int:
         write_plan_report(
             folder, found, figures, inputs=inputs, command=options.words, driven=driven
         )
-    tell("\n".join([*plan_words(found, driven), plan_table(found)]))
+    tell("\n".join([*plan_words(found, driven), text_table([RIVALS, *rival_rows(found)], "<>>>")]))
     say(f"wrote {options.out}/")
     return 0
 
@@ -213,20 +212,11 @@ def parse_area(text: str) -> tuple[float, float]:
 
 
 def parse_speed(text: str) -> float:
-    """Return the speed [m/s] of --speed.
-
-    text : 15, 15m/s or 54km/h.
-    """
-    found = re.fullmatch(r"\s*([\d.]+)\s*(m/s|km/h)?\s*", text, re.ASCII)
-    try:
-        value = float(found[1]) if found else math.nan
-    except ValueError:
-        value = math.nan
-    speed = value / (3.6 if found and found[2] == KILOMETERS else 1.0)
+    """Return the speed [m/s] of --speed: 15, 15m/s or 54km/h."""
+    value, unit = shared.number_with_unit(text, "m/s", "km/h")
+    speed = value / (3.6 if unit == "km/h" else 1.0)
     if not 0.1 <= speed <= 100.0:
-        raise ValueError(
-            f"--speed wants 0.1 to 100 m/s (15, 15{METERS}, 54{KILOMETERS}), not {text!r}"
-        )
+        raise ValueError(f"--speed wants 0.1 to 100 m/s (15, 15m/s, 54km/h), not {text!r}")
     return speed
 
 
@@ -328,15 +318,3 @@ def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
         "hash": digest(inputs),
         "version": __version__,
     }
-
-
-def plan_table(found: Plan) -> str:
-    """Return the plan beside slalom and random steering, as text."""
-    rows = [["", "time", "room", "expected error"]]
-    space = found.space
-    room = f"{space.length:g} x {space.width:g} m"
-    rows.append(["plan", f"{found.time:.1f} s", room, f"{100.0 * found.error:.1f} %"])
-    for one in found.rivals:
-        wide = f"{one.length:.0f} x {one.width:.1f} m"
-        rows.append([one.name, f"{found.time:.1f} s", wide, f"{100.0 * one.error:.1f} %"])
-    return text_table(rows, "<>>>")

@@ -40,8 +40,9 @@ def force_figure(
     learns from a whole log there is no online run: it has neither panel nor residual.
 
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
-    window : first and last time to show [s]; None shows all.   since : time from which the error of
-    the online run counts [s], as in the replays; None counts all.
+    window : first and last time to show [s]; None shows all.
+    since : time from which the error of the online run counts [s], as in the replays; None counts
+    all.
     """
     replays = dict(sorted((replays or {}).items()))
     recording, truth = history.recording, history.recording.axle_force

@@ -114,27 +114,29 @@ def _bad(text: str) -> bool:
     return text.startswith(Verdict.FAULT.value) or "dead reckoning" in text
 
 
-def drive_table(runs: Sequence[Run], caption: str) -> Table:
-    """Return the scores of drives."""
-    rows = [
-        [
-            run.label,
-            f"{run.scores.rms_e_y_m:.3f}",
-            f"{run.scores.peak_e_y_m:.3f}",
-            "completed" if run.scores.completed else run.drive.ending,
-            f"{run.scores.solve_ms['median']:.3f}",
-        ]
-        for run in runs
-    ]
-    header = ["tires", "rms deviation [m]", "largest [m]", "end", "a step, median [ms]"]
-    return Table(caption=caption, header=header, rows=rows)
+SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
+
+
+def score_rows(runs: Sequence[Run]) -> list[list[str]]:
+    """Return the scores of drives under `SCORES`."""
+    rows = []
+    for run in runs:
+        score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
+        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
+        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
+        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
+        completed = "yes" if score.completed else end
+        rows.append([run.label, *off, completed, failures, f"{times} ms"])
+    return rows
 
 
 def drive_blocks(
     runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
     """Return film, table and figures of drives."""
-    blocks: list[Block] = [drive_table(runs, "Scores of the drives.")]
+    blocks: list[Block] = [
+        Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
+    ]
     if film is not None:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
         blocks.append(Picture(image=film, caption=caption, read=READ["film"]))
