@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec
 
 import numpy as np
-from matplotlib import font_manager, get_data_path, style
+from matplotlib import font_manager, get_data_path, rc_params_from_file, style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -51,36 +51,9 @@ LINEAR: Mapping[str, Any] = {
     "label": "linear tire",
 }
 
-LOOK: dict[str, Any] = {
-    "font.size": 8.0,
-    "axes.titlesize": 8.0,
-    "axes.labelsize": 8.0,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "legend.fontsize": 8.0,
-    "legend.frameon": False,
-    "legend.handlelength": 2.2,
-    "legend.columnspacing": 1.6,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": "#444444",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "axes.titlelocation": "left",
-    "axes.titlepad": 4.0,
-    "axes.formatter.use_mathtext": True,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.5,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.major.size": 3.0,
-    "ytick.major.size": 3.0,
-    "figure.constrained_layout.wspace": 0.04,
-    "agg.path.chunksize": 20000,
-    "path.simplify_threshold": 0.3,  # dots of a PNG, points of a drawing
-    "savefig.bbox": None,
-}
+LOOK: dict[str, Any] = rc_params_from_file(
+    Path(__file__).with_name("look.mplstyle"), use_default_template=False
+)
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
