@@ -74,8 +74,6 @@ class Car(Protocol):
         """
 
 
-# The double-track plant as a car to drive: roll, load transfer, relaxation, lagged steering.
-
 HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 
 

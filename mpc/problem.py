@@ -168,9 +168,6 @@ class Problem:
         require_positive(ValueError, dt=self.dt)
 
 
-# What the tracker takes for possible, and what it does where it cannot plan.
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guards:
     """Bounds of measurements and of plans, and the fall-back.

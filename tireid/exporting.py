@@ -187,8 +187,6 @@ def _write_onnx(
     export_onnx(model, folder / f"{package.specialized.name}.onnx", with_band=band)
 
 
-# With `mpc`: the tracker beside the identifier, and a car driven by both.
-
 TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
 
 
@@ -214,8 +212,6 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
         f"{tracker.about['hash']}",
     ]
 
-
-# The self-test of an exported package, compiled and run as an embedded engineer would.
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
 

@@ -302,6 +302,11 @@ def write_csv(path: Path, columns: Mapping[str, Array]) -> None:
     write_long_csv(path, [columns])
 
 
+def axle_columns(pattern: str, values: Array) -> dict[str, Array]:
+    """Return columns of both axles (n, 2) by a name in which {} is f in front and r at the rear."""
+    return {pattern.format(axle): values[:, i] for i, axle in enumerate("fr")}
+
+
 ROWS = 4096  # that are put into words at once
 
 

@@ -33,8 +33,6 @@ from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import PredictionTire
 from mpc.tires.tire import ALL
 
-# The parameters of a tracker as C and as JSON, in the order of the structure.
-
 Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
 
@@ -59,8 +57,6 @@ def _initializer(value: NDArray[Any]) -> str:
         return f"{int(value)}U"
     return f"R({float(value)!r})"
 
-
-# The self-test of a package: a closed-loop record, and what Python's tracker steered in it.
 
 STEPS = 200
 SPEED = 20.0  # m/s

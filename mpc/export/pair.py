@@ -20,8 +20,6 @@ from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import prediction_tire
 
-# C that turns what an identifier has learnt into the weights of the prediction.
-
 C = Path(__file__).parent / "pair"
 HANDOVER: Mapping[str, str] = {"tireid_handover.h": "include", "tireid_handover.c": "src"}
 EXAMPLES: Mapping[str, str] = dict.fromkeys(

@@ -24,8 +24,6 @@ from models.vehicle import GRAVITY
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
 
-# The last seconds of a drive: what models are judged on.
-
 COLUMNS = ("v_x", "v_y", "r", "delta")  # m/s, m/s, rad/s, rad
 
 
@@ -77,8 +75,6 @@ class Window:
         """Forget everything."""
         self._kept = 0
 
-
-# The axle forces that prediction tires tell from measured motion, sample by sample.
 
 SHORTEST_LAG = 1e-3  # m
 

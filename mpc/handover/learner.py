@@ -13,8 +13,6 @@ from mpc.loop.sensing import Measured
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
 
-# Moving weights to new ones so gently that the plan does not jump.
-
 HALVINGS = 6
 
 

@@ -16,8 +16,6 @@ from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
 
-# Has the car been driven so that there was something to learn, and where was it learnt?
-
 LEARNS = 0.005  # rad: below, a tire is a straight line in noise
 BEYOND = 1.2  # slip that is trusted over the largest one that was learnt from
 

@@ -21,8 +21,6 @@ from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Measurement
 
-# What the loop asks of a tracker, whatever solves its problem.
-
 
 class PathTracker(Protocol):
     """Steers a car along a path, one control period at a time; `mpc.realtime.Tracker` is one."""

@@ -114,8 +114,6 @@ class Drive:
         )
 
 
-# Collecting a drive, period by period.
-
 OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "axle_force")
 OTHERS = ("s", "e_y", "e_psi", "kappa", "v_ref", "command", "solve_time", "status")
 
@@ -217,9 +215,6 @@ class Recorder:
         )
 
 
-# What a drive is worth, in a few numbers.
-
-
 class Scores(NamedTuple):
     """Deviation from the path and cost of steering; `to_dict` is ready for JSON.
 
@@ -259,9 +254,6 @@ def scores(drive: Drive) -> Scores:
             "max": float(solve_ms.max()),
         },
     )
-
-
-# How right it was, where v_y was told.
 
 
 class ToldScores(NamedTuple):

@@ -238,8 +238,6 @@ def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Ar
     return np.vstack((middle + across, middle - across))
 
 
-# The built-in paths by the names that a command line knows them by.
-
 BUILT_IN: Mapping[str, Callable[[], Path]] = MappingProxyType(
     {
         "iso-3888-1": iso_3888_1,

@@ -278,8 +278,6 @@ def _path(
     return Path.from_line(line, name=name, cones=cones_of(gates))
 
 
-# A slalom: cones in a row at equal distances, passed left and right in turn.
-
 EASING = 6.0  # m
 
 

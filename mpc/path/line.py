@@ -65,8 +65,6 @@ def line_from_heading(
     return Line(s, place[0], place[1], psi[::4], kappa[::4])
 
 
-# Whether samples are one curve over its arc length.
-
 LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
 DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
 
@@ -112,8 +110,6 @@ def _check_ends(line: Line, name: str, h: float) -> None:
             f"{bend:.3g} rad and {kink:.3g} 1/m"
         )
 
-
-# What lies between two samples of a line, from their values, slopes and second derivatives.
 
 Pair: TypeAlias = tuple[Any, Any]  # at both ends of a step, numbers or arrays
 

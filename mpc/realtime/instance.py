@@ -22,8 +22,6 @@ from mpc.problem import Guards, Problem
 from mpc.realtime.c_source import C, c_sizes, c_sources, python_file
 from mpc.tires.tire import TireStructure
 
-# What goes into a tracker and what comes out.
-
 
 class Status(IntEnum):
     """What a step did; below QP_FAILED the plan is new, above the steering is a fall-back."""
@@ -117,8 +115,6 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
     for name in ("min_speed", "max_speed", "max_curvature", "hold_time"):
         params[name] = getattr(guards, name)
 
-
-# The text of a tracker in one file, kept between runs: a second start generates nothing.
 
 NAME = "mpc"
 PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the text

@@ -106,9 +106,6 @@ class LaggedAxles(TireStructure):
         return at.w[n], at.w[n + 1]
 
 
-# The linear tire of the textbook: F = C α of the paper's (3), without a limit.
-
-
 @dataclass(frozen=True, slots=True)
 class LinearAxles(SmallSlip):
     """F = C α; w = [C_f, C_r] [N/rad]."""

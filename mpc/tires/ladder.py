@@ -188,8 +188,6 @@ def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
     return vehicle.downforce if vehicle.has_downforce else ()
 
 
-# A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.
-
 UNITS = 6
 NARROWEST = 0.25  # α_1 over the slip F_max/C at which the linear tire would reach the peak force
 WORST = 0.02  # largest error of a fit over the largest force

@@ -14,8 +14,6 @@ from mpc.path import Path
 from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_look
 from tireid.figures.style import PURPLE
 
-# Where the picture looks: it goes along the path, and turns with it where the path winds.
-
 WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
 LOOK_BACK, LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]
 LEVEL = 9.0  # a straight path whose sides are this close [m] is not followed sidewards

@@ -34,8 +34,6 @@ from tireid.figures.style import (
 )
 from tireid.figures.tires import TireCurve, axle_slip
 
-# The small panels of the film: force over slip with the learnt curve, deviation, whole course.
-
 TAIL = 80  # samples
 SMALL = 7.0  # points of the text
 MANY = 10  # entries of a legend that one row does not hold

@@ -137,8 +137,6 @@ def number(value: float | None) -> str:
     return "inf" if math.isinf(value) else f"{value:.4g}"
 
 
-# `tireid check --monte-carlo`: the proven bounds beside what happened on random drives.
-
 TOLERANCE = 1e-9  # of rounding, in parts of a bound
 BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it
     ("error_bound", "xi_tilde", "|xi - xi_hat|, by the leakage"),

@@ -53,8 +53,6 @@ from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 
-# The figures of `tireid check`: root locus with its margin, bounds against a real error.
-
 FIGURES = ("locus.png", "bounds.png")
 BOUNDS = {
     "error_bound": "proven bound, leakage",

@@ -31,12 +31,10 @@ from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.figures.compare import matrix_figure, methods_figure, pareto_figure
 from tireid.figures.side_slip import side_slip_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
 from tireid.reports.compare import HINDSIGHT
-
-# The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
@@ -211,9 +209,7 @@ def write_comparison(
     if any(trial.side_slip for trial in comparison.trials.values()):
         told = {name: trial.side_slip for name, trial in comparison.trials.items()}
         figures["side_slip"] = side_slip_figure(comparison.course.recordings, told)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def comparison_text(comparison: Comparison) -> str:

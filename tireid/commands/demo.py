@@ -65,8 +65,6 @@ from tireid.verdicts import (
     verdict_warnings,
 )
 
-# The demo's report: what was driven, learnt, frozen and predicted, in order.
-
 REFERENCE = (
     'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire '
     'Forces"'

@@ -25,8 +25,6 @@ from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
 from tireid.reports.drive import SCORES, known_blocks, score_rows
 
-# The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
-
 LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 FILM = FORMATS[0]
 DELAY = 2  # periods of 10 ms
@@ -137,8 +135,6 @@ def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> D
     )
     return Driven(conditions, runs, figures)
 
-
-# What was exported, beside Python.
 
 FOLDER = "package"
 NOT_BUILT = (

@@ -38,8 +38,6 @@ from tireid.learning import identify
 from tireid.progress import Progress
 from tireid.verdicts import warn_of, warn_of_stored
 
-# Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
-
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
@@ -106,8 +104,6 @@ def parse_fault(text: str, kind: str = FULL) -> SensorFault:
         raise ValueError(f"--fault {text}: {how} needs a size")
     return fault
 
-
-# The words of `tireid drive` made into a case.
 
 ALL = "all"
 LONGEST_DELAY = 100.0  # ms

@@ -27,9 +27,9 @@ from tireid.figures.drive import (
     drive_steering_figure,
 )
 from tireid.figures.side_slip import drive_lateral_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
-from tireid.output import text_table, write_csv, write_json
+from tireid.output import axle_columns, text_table, write_csv, write_json
 from tireid.progress import say
 from tireid.reports.drive import SCORES, score_rows
 
@@ -73,8 +73,7 @@ def write_drives(
     }
     if first.drive.told:
         figures["lateral"] = drive_lateral_figure(first.drive)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
+    save_figures(folder, figures)
     if film != NO_FILM:
         title = f"{first.drive.path.name}: {first.label} tires"
         write_film(
@@ -136,18 +135,13 @@ def drive_columns(drive: Drive) -> dict[str, Array]:
     slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
     return {
         **{f"{name}_{UNITS[name]}": getattr(drive, name) for name in SIGNALS},
-        "alpha_f_rad": slip[:, 0],
-        "alpha_r_rad": slip[:, 1],
-        "Fyf_N": drive.axle_force[:, 0],
-        "Fyr_N": drive.axle_force[:, 1],
+        **axle_columns("alpha_{}_rad", slip),
+        **axle_columns("Fy{}_N", drive.axle_force),
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
         **{f"{name}_measured_{UNITS[name]}": values for name, values in measured if name != "t"},
         **{COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
     }
-
-
-# What a tracker is told of the tires, as curves.
 
 
 def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
@@ -166,9 +160,6 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
     v_x = float(setup.speeds().mean())
     return [steady_curve(label, model, v_x) for label, model in models.items()]
-
-
-# What `tireid drive` prints: one line a drive.
 
 
 def drive_lines(runs: Sequence[Run]) -> str:

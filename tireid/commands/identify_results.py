@@ -34,14 +34,12 @@ from tireid import __version__
 from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
 from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.figures.thinned import DrawnRun
 from tireid.figures.tires import drawn_tracks, learnt_axles_figure, slip_figure
-from tireid.output import text_table, write_csv, write_json, write_table
+from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 from tireid.reports.identify import guaranteed_sentence
-
-# The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
 
 
 def _told(error: AxleRmse | None) -> dict[str, float] | None:
@@ -271,13 +269,10 @@ def _write_curves(
 
 
 def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
-    observed, z = block.outputs[OBSERVED], block.before["z"]
     return {
         "t_s": learnt.recording.t[block.part],
-        "xi_tilde_f_Us": observed[:, 0],
-        "xi_tilde_r_Us": observed[:, 1],
-        "z_f_Us2": z[:, 0],
-        "z_r_Us2": z[:, 1],
+        **axle_columns("xi_tilde_{}_Us", block.outputs[OBSERVED]),
+        **axle_columns("z_{}_Us2", block.before["z"]),
     }
 
 
@@ -331,8 +326,7 @@ def _force_columns(
         "r_rad_s": recording.r[part],
         "delta_f_rad": recording.delta_f[part],
         "delta_r_rad": recording.delta_r[part],
-        "alpha_f_rad": alpha[:, 0],
-        "alpha_r_rad": alpha[:, 1],
+        **axle_columns("alpha_{}_rad", alpha),
     }
     columns |= {name: values[part] for name, values in told.items()}
     curves = {"online": history.axle_force} if history.online else {}
@@ -340,7 +334,7 @@ def _force_columns(
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
     for name, force in curves.items():
-        columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
+        columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
     return columns
 
 
@@ -360,18 +354,14 @@ def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str
     end = min(FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, CURVE_POINTS)
     force = model.force(slip)
-    columns = {"slip_rad": slip, "Fyf_N": force[:, 0], "Fyr_N": force[:, 1]}
+    columns = {"slip_rad": slip, **axle_columns("Fy{}_N", force)}
     if known is not None:
         inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
     band = model.band(slip)
-    if band is not None:
-        for side, bound in zip(("low", "high"), band, strict=True):
-            columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
-    sure = model.guaranteed_band(slip)
-    if sure is not None:
-        for side, bound in zip(("least", "most"), sure, strict=True):
-            columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
+    for sides, found in (("low", "high"), band), (("least", "most"), model.guaranteed_band(slip)):
+        for side, bound in zip(sides, found or (), strict=found is not None):
+            columns |= axle_columns(f"Fy{{}}_{side}_N", bound)
     return columns
 
 
@@ -401,9 +391,7 @@ def _draw(
     for other in others:
         replay = frozen[last][other.recording.name]
         figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, _beside(other))
-    for label, figure in figures.items():
-        save_figure(figure, folder / f"{label}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def _beside(run: History) -> History | None:
@@ -447,9 +435,7 @@ def write_network_results(
         figures[f"slip{last}"] = slip_figure(model, recording, _beside(history))
         figures[f"replay_{name}"] = prediction_figure(own, _beside(history))
     figures["inputs"] = inputs_figure(histories[0].recording)
-    for label, figure in figures.items():
-        save_figure(figure, folder / f"{label}.png")
-    return replays, figures
+    return replays, save_figures(folder, figures)
 
 
 def network_table(law: str, histories: Sequence[History], replays: Mapping[str, Replay]) -> str:

@@ -151,9 +151,6 @@ def number_with_unit(text: str, *units: str) -> tuple[float, str | None]:
         return math.nan, None
 
 
-# What learns: a method by its name, the paper's, or the design in a file.
-
-
 def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
@@ -213,9 +210,6 @@ def chosen_method(
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
     return Chosen(name, make_method(name, vehicle, seed or 0))
-
-
-# Logs: recordings that are judged against physics and the vehicle.
 
 
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
@@ -318,8 +312,6 @@ def column_words(pairs: Sequence[str]) -> dict[str, str]:
         columns[name] = column
     return columns
 
-
-# `--network FILE.onnx`: a tire network of one's own in place of one that was learnt.
 
 CONVENTIONS = (
     "A network of --network is static: its outputs are the lateral forces F_yf, F_yr of both tires "

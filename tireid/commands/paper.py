@@ -40,7 +40,7 @@ from tireid.commands.options import add_output
 from tireid.figures.forces import force_figure
 from tireid.figures.paper import comparison_figure
 from tireid.figures.scheme import scheme_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, say, tell
 
@@ -166,8 +166,6 @@ def settings(gains: Gains, network: Network) -> str:
     )
 
 
-# The files of `tireid paper`: tables as JSON and text, seeds that diverged, Figs. 1-5 as PNG.
-
 SCHEME = "fig1_scheme"
 FIGURES = {  # number of the paper's figure, by maneuver and law
     ("step_steer", "instantaneous"): "fig2",
@@ -200,9 +198,7 @@ def write_study(folder: Path, study: Study) -> dict[str, Figure]:
     figures = {SCHEME: scheme_figure()}
     for maneuver in study.errors:
         figures |= _draw(study, maneuver)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def _draw(study: Study, maneuver: str) -> dict[str, Figure]:

@@ -20,7 +20,7 @@ from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.planning import (
     FRICTION,
@@ -164,8 +164,7 @@ def run(options: argparse.Namespace) -> int:
             "steering": plan_steering_figure(found, ratio),
             "band": plan_band_figure(found),
         }
-        for name, figure in figures.items():
-            save_figure(figure, folder / f"{name}.png")
+        save_figures(folder, figures)
         write_plan_report(
             folder, found, figures, inputs=inputs, command=options.words, driven=driven
         )

@@ -23,10 +23,17 @@ from tireid.commands import options as shared
 from tireid.commands.identify_results import error_cells
 from tireid.figures.forces import prediction_figure
 from tireid.figures.predict import friction_figure, motion_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
 from tireid.learning import replay
-from tireid.output import output_folder, text_table, write_csv, write_json, write_long_csv
+from tireid.output import (
+    axle_columns,
+    output_folder,
+    text_table,
+    write_csv,
+    write_json,
+    write_long_csv,
+)
 from tireid.progress import say, tell
 from tireid.reports.predict import write_predict_report
 from tireid.verdicts import verdict_text, warn_of_stored
@@ -143,7 +150,7 @@ def force_columns(
     forces = {"predicted": prediction.axle_force, "half_band": half, "true": recording.axle_force}
     for name, force in forces.items():
         if force is not None:
-            columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
+            columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
     return columns
 
 
@@ -200,9 +207,7 @@ def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Fi
         figures["motion"] = motion_figure(verdict.shown, prediction.model.vehicle)
     if verdict.friction is not None:
         figures["friction"] = friction_figure(verdict.friction)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def error_table(prediction: Prediction) -> str:

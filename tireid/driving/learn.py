@@ -13,8 +13,6 @@ from mpc.loop import Measured, Measures, TellsLateral, cornering_limit, inertial
 from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
 
-# The drive to learn on: the same car on an open field, steered at random and ever harder.
-
 DURATION = 40.0  # s
 SPEED = 20.0  # m/s
 FREQUENCY = 0.6  # Hz, of the fastest swings

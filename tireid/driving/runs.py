@@ -41,8 +41,6 @@ from tireid.driving.known import Known, Witness
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
 from tireid.progress import Progress
 
-# What may change the tire of a tracker on the way: learning, or being told the true friction.
-
 
 class Informer:
     """Tells the tracker of an oracle the true tire of the road that the car is on."""

@@ -17,8 +17,6 @@ from identifier.compare.sweep import Candidate, frozen_share, pareto_front
 from identifier.reproducibility import AxleRmse
 from tireid.figures import style
 
-# Labels and scales that the figures of a comparison share.
-
 TICKS = ((1, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 1.5, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,))
 MOST = 6  # ticks of an axis
 FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mpc.loop import Drive
     from mpc.path import Path
 
-# How long the tracker took for a step: a histogram with its percentiles, and where it failed.
-
 BINS = 60
 WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
 MILLI = 1e3
@@ -78,8 +76,6 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     return figure
 
 
-# How the pictures of a drive tell paths, cones and the tires that a tracker was told of.
-
 PATH: Mapping[str, Any] = {
     "color": "#9ADBC6",
     "linewidth": 3.5,
@@ -111,8 +107,6 @@ def tire_look(label: str) -> dict[str, Any]:
     look = dict(TIRES.get(label.split()[0], TIRES["frozen"]))
     return look | {"linestyle": LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
-
-# How far the car was from its path, and how fast, over the arc length of the path.
 
 REPLANNED, NOTICED = "plans with another tire or grip", "sensor fault noticed"
 ARC = "arc length of the path [m]"
@@ -240,8 +234,6 @@ def _roomy(axes: Axes, slowest: float) -> None:
         low, high = middle - 1.0, middle + 1.0
     axes.set_ylim(min(low, slowest), high)
 
-
-# What the tracker asked of the steering, and what the wheels did.
 
 NEAR = 0.75  # a limit is drawn where a command comes this close to it
 

@@ -149,9 +149,6 @@ def _errors(replay: Replay, unit: style.ForceUnit, axle: int) -> str:
     return f"{said}\npast to online {unit.format(sides.past_against_online, axle)}"
 
 
-# A frozen model on a recording that it did not learn from, and what it misses there.
-
-
 @style.styled
 def prediction_figure(
     replay: Replay | Prediction, online: History | None = None, *, window: style.Window = None
@@ -210,8 +207,6 @@ def prediction_figure(
     return figure
 
 
-# Frozen models side by side on a drive that none of them has learnt.
-
 COLORS = (style.ORANGE, style.BLUE, style.GREEN, style.PURPLE)
 
 
@@ -245,9 +240,6 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
     panels[1, 0].set_ylabel(f"residual [{unit.name}]")
     style.legend_above(figure)
     return figure
-
-
-# What the identifier was given: speed, steering and motion of a recording over time.
 
 
 @style.styled

@@ -15,8 +15,6 @@ from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
 from tireid.figures.thinned import shown_of_run
 
-# A table as a picture: medians and quartiles by law and column, with the paper's values.
-
 WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 
 
@@ -76,8 +74,6 @@ def error_figure(
     style.legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
     return figure
 
-
-# The weights over time: what was learnt when, and whether it settled.
 
 SYMBOLS = {
     "v_y": "$v_y$",
@@ -216,8 +212,6 @@ def comparison_figure(
     style.legend_above(figure, columns=len(results), order=order)
     return figure
 
-
-# How far the learning loop is from instability: its sampled poles at any gain.
 
 FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 

@@ -157,7 +157,12 @@ def save_figure(figure: Figure, path: Path) -> None:
     write_file(path, figure_png(figure))
 
 
-# Parts that several figures share: time axes, freeze marks, legends, errors in titles.
+def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
+    """Write figures as PNG under their names, and return them."""
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return figures
+
 
 Window = tuple[float, float] | None
 
@@ -285,8 +290,6 @@ def _bolder(legend: Legend) -> None:
             line.set_markersize(7.0)
             line.set_alpha(1.0)
 
-
-# Units that suit the size of what is drawn: kN for cars, N for models, and the impulse of each.
 
 FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
 

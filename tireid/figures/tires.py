@@ -156,9 +156,6 @@ def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
             axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
 
 
-# What pictures of a drive say of tires: the slip of its axles, and curves of force over slip.
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TireCurve:
     """Steady axle forces over slip, one curve an axle.
@@ -180,8 +177,6 @@ def axle_slip(drive: "Drive") -> Array:
     motion = {"v_x": drive.v_x, "v_y": drive.v_y, "r": drive.r}
     return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
 
-
-# Axle force over slip on the drive: what the tires did, what the tracker believed, the truth.
 
 REACH = 1.25  # curves go on this far beyond the slip of the drive
 
@@ -249,9 +244,6 @@ def _missed_of_truth(
         part = np.abs(slip) <= reach
         found.append((curve.label, slip[part], (curve.force - truth.force)[part] / newtons))
     return [one for one in found if not one[0].startswith(ORACLE)]
-
-
-# What the axle identifier has learnt over time, in the numbers an engineer reads.
 
 
 def drawn_tracks(history: History) -> DrawnRun | None:

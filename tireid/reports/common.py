@@ -6,7 +6,7 @@ how to read each, and where it came from.
 
 import platform
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -28,6 +28,11 @@ with Path(__file__).with_name("read.toml").open("rb") as file:
 
 def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
     return Picture(image=style.figure_svg(figure), caption=caption, read=read)
+
+
+def drawings(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[Picture]:
+    """Return the figures that there are of some, by their captions."""
+    return [drawing(figures[n], text, READ[n]) for n, text in captions.items() if n in figures]
 
 
 def recording_digest(recording: Recording) -> str:

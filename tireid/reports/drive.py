@@ -12,7 +12,7 @@ from mpc.loop import told_scores
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import READ, REPORT, drawings, origin
 
 
 def write_drive_report(
@@ -37,9 +37,7 @@ def write_drive_report(
             Section(heading="What the tracker knew", blocks=known_blocks(runs, figures)),
             Section(
                 heading="Was it in time?",
-                blocks=[
-                    drawing(figures["solve_times"], "How long a step took.", READ["solve_times"])
-                ],
+                blocks=drawings(figures, {"solve_times": "How long a step took."}),
             ),
             origin(
                 command,
@@ -145,16 +143,16 @@ def drive_blocks(
         "errors": "Deviation, heading, acceleration and speed along the path.",
         "steering": "What was asked of the front wheels.",
     }
-    return blocks + [drawing(figures[name], text, READ[name]) for name, text in captions.items()]
+    return [*blocks, *drawings(figures, captions)]
 
 
 def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
     """Return what trackers believed of the tires, and what they were told on the way."""
-    caption = "Forces of the first drive, and what trackers believed of the tires."
-    blocks: list[Block] = [drawing(figures["tires"], caption, READ["tires"])]
-    if "lateral" in figures:
-        caption = "Lateral velocity, which nothing measured: the truth, and what was told."
-        blocks.append(drawing(figures["lateral"], caption, READ["lateral"]))
+    captions = {
+        "tires": "Forces of the first drive, and what trackers believed of the tires.",
+        "lateral": "Lateral velocity, which no sensor measured: the truth and the estimate.",
+    }
+    blocks: list[Block] = [*drawings(figures, captions)]
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
         header = ["tires", "time [s]", "what"]

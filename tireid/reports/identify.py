@@ -25,7 +25,7 @@ from models.files import digest
 from models.recordings import Recording
 from tireid import report as page
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import READ, REPORT, drawing, drawings, origin
 from tireid.verdicts import (
     missed_headline,
     number_headlines,
@@ -63,9 +63,7 @@ def write_identify_report(
         ),
         page.Section(
             heading="What went in",
-            blocks=[
-                drawing(figures["inputs"], f"Signals of {learnt.recording.name}.", READ["inputs"])
-            ],
+            blocks=drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
         ),
         diagnosis_section(diagnosis),
         origin(
@@ -229,15 +227,13 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     for told in (band_sentence(model), guaranteed_sentence(model)):
         if told:
             blocks.append(page.Paragraph(text=told))
-    for name, caption in (
-        ("side_slip", "Side slip as it was estimated."),
-        ("learnt", "What was learnt over time."),
-        ("error", "Norm of the observer's error."),
-        ("weights", "Weights of the network."),
-    ):
-        if name in figures:
-            blocks.append(drawing(figures[name], caption, READ[name]))
-    return blocks
+    captions = {
+        "side_slip": "Side slip as it was estimated.",
+        "learnt": "What was learnt over time.",
+        "error": "Norm of the observer's error.",
+        "weights": "Weights of the network.",
+    }
+    return [*blocks, *drawings(figures, captions)]
 
 
 def band_sentence(model: TireModel) -> str:
