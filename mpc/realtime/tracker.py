@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
+from models.rules import require_within
 from mpc.problem import Guards, Problem
-from mpc.realtime.caution import require_caution, set_caution
+from mpc.realtime.caution import set_caution
 from mpc.realtime.fall_back import fall_back
 from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
 from mpc.tires.tire import PredictionTire, valid_slip
@@ -81,7 +82,8 @@ class Tracker:
         if max_active_sets < 0:
             raise ValueError(f"max_active_sets must not be negative, it is {max_active_sets}")
         self.tire, self.problem, self.period, self.delay = tire, problem, period, delay
-        self.caution = require_caution("caution", caution)
+        require_within(ValueError, 0.0, 1.0, caution=caution)
+        self.caution = caution
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
         self._preview: Instance | None = None  # what would be planned with another tire

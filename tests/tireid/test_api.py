@@ -566,7 +566,7 @@ def test_learnt_tires_steer_better_than_linear_ones(car):
     [
         ({"delay": 0.015}, "steps of 0.01 s"),
         ({"share": 0.0}, "share must be positive"),
-        ({"friction": 9.0}, "friction must be"),
+        ({"friction": 9.0}, "friction must lie between"),
         ({"laps": 2.0}, "laps are of a closed path"),
         ({"learning": True}, "none is given"),
     ],

@@ -10,11 +10,11 @@ import numpy as np
 from identifier.frozen import VEHICLE_KEYS
 from identifier.tire_model import TireModel, load_model
 from models.faults import SIZED, FaultError, SensorFault
+from models.rules import require_within
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from mpc.loop import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
-from mpc.realtime.caution import require_caution
 from tireid.commands.options import (
     chosen_method,
     network_model,
@@ -30,10 +30,10 @@ from tireid.driving.runs import (
     LEARNING,
     LINEAR,
     ORACLE,
+    WEAVES,
     Conditions,
-    require_dither,
 )
-from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
+from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.learning import identify
 from tireid.progress import Progress
 from tireid.verdicts import warn_of, warn_of_stored
@@ -76,7 +76,8 @@ def parse_drop(text: str) -> tuple[float, float]:
         raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
     if not (math.isfinite(s) and s >= 0.0):
         raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
-    return s, require_friction("--mu-drop", mu)
+    require_within(ValueError, *FRICTIONS, **{"friction of --mu-drop": mu})
+    return s, mu
 
 
 def parse_fault(text: str, kind: str = FULL) -> SensorFault:
@@ -118,7 +119,9 @@ def labels_of(words: Sequence[str]) -> list[str]:
 def conditions_of(options: argparse.Namespace) -> Conditions:
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_dither("--dither", options.dither)
+    require_within(ValueError, *WEAVES, **{"--dither in m": options.dither})
+    require_within(ValueError, *FRICTIONS, **{"--mu": options.mu})
+    require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     path = named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
@@ -126,7 +129,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
     setup = make_setup(
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
-        mu=require_friction("--mu", options.mu),
+        mu=options.mu,
         drops=[parse_drop(text) for text in options.mu_drop],
         wish=parse_speed(options.speed),
     )
@@ -139,7 +142,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
         seed=seed_of(options),
         laps=options.laps,
         faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
-        caution=require_caution("--caution", options.caution),
+        caution=options.caution,
         kind=options.sensors,
         dither=options.dither,
     )

@@ -6,8 +6,8 @@ from typing import Any
 from identifier.method import Method
 from identifier.methods import LIVE, continuing
 from identifier.tire_model import TireModel, load_model
+from models.rules import require_within
 from models.vehicle import Vehicle
-from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.exporting import export
@@ -56,8 +56,8 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    caution = require_caution("--caution", options.caution)
-    if caution and not options.mpc:
+    require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
+    if options.caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
     start = None if options.weights is None else load_model(options.weights)
     if options.weights is not None:
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
         fmu=options.fmu,
         onnx=options.onnx,
         mpc=options.mpc,
-        caution=caution,
+        caution=options.caution,
         overwrite=options.force,
     )
     for line in str(exported).splitlines():

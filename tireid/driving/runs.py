@@ -14,6 +14,7 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.friction import Friction
+from models.rules import require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
@@ -35,10 +36,9 @@ from mpc.loop import drive as drive_tracker
 from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
-from mpc.realtime.caution import require_caution
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.known import Known, Witness
-from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
+from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.progress import Progress
 
 
@@ -143,7 +143,7 @@ def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
 FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
-WIDEST_WEAVE = 0.5  # m
+WEAVES = (0.0, 0.5)  # m
 PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
@@ -212,15 +212,6 @@ class Run:
             f"<Run on {self.label} tires along {self.drive.path.name}: {self.drive.ending}; "
             f"{rms:.3f} m rms off the path, {peak:.3f} m at most>"
         )
-
-
-def require_dither(name: str, dither: float) -> None:
-    """Refuse a weave that is none, or wider than a car drives for the sake of knowing.
-
-    dither : deviation that it may make [m].
-    """
-    if not 0.0 <= dither <= WIDEST_WEAVE:
-        raise ValueError(f"{name} must be 0 to {WIDEST_WEAVE:g} m, it is {dither:g}")
 
 
 def require_compiler() -> None:
@@ -376,12 +367,14 @@ def drive(
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_dither("dither", dither)
+    require_within(ValueError, *WEAVES, **{"dither in m": dither})
+    require_within(ValueError, *FRICTIONS, friction=friction)
+    require_within(ValueError, 0.0, 1.0, caution=caution)
     vehicle.require_chassis()
     setup = Setup(
         path=path,
         vehicle=vehicle,
-        mu=require_friction("friction", friction),
+        mu=friction,
         drops=(),
         wish=SpeedWish(share if speed is None else None, speed),
     )
@@ -393,7 +386,7 @@ def drive(
         laps=laps,
         kind=sensors,
         dither=dither,
-        caution=require_caution("caution", caution),
+        caution=caution,
     )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN
     return run_drive(label, conditions, tire)

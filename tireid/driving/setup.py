@@ -24,6 +24,7 @@ PLANT = "double-track"
 FASTEST = 30.0  # on a closed course [m/s]
 ACCELERATION, BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
 PERIOD = 0.01  # control period [s]
+FRICTIONS = (0.05, 1.5)  # least and most over that of the tire's measurement [-]
 
 
 class SpeedWish(NamedTuple):
@@ -129,13 +130,3 @@ class Setup:
 @cache
 def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
     return oracle_tire(vehicle, cast(Tire, tire), mu)
-
-
-def require_friction(word: str, mu: float) -> float:
-    """Return a friction over that of the tire's measurement, if a road can have it.
-
-    mu : the friction [-].
-    """
-    if not 0.05 <= mu <= 1.5:
-        raise ValueError(f"{word}: friction must be 0.05 to 1.5, it is {mu:g}")
-    return mu
