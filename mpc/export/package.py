@@ -10,19 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen import package as packaging
 from codegen.arrays import Array
-from codegen.package import (
-    about_package,
-    c_files,
-    check_name,
-    cmake,
-    content_head,
-    generated,
-    header,
-    manifest_text,
-    plain,
-    rows,
-)
+from codegen.package import rows
 from codegen.template import Values, Words, filled
 from identifier.frozen import vehicle_numbers
 from mpc.prediction import build_stage, state_size
@@ -154,7 +144,7 @@ def _road(n: int, period: float) -> Array:
 
 
 def vectors_header(name: str, found: Vectors) -> str:
-    return header(
+    return packaging.header(
         f"{name}_vectors.h",
         "Generated. Measurements e_y, e_psi, v_y, r; steering [rad] and status that follow; "
         "curvature\nand speed each period: row k now, k + offset + stride j in stage j. SI.",
@@ -219,7 +209,7 @@ def build_mpc_package(
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.
     """
-    check_name(name, "_mpc")
+    packaging.check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
     params: Params = tracker.params
     content = _ingredients(tracker, params, name, single=single)
@@ -229,12 +219,14 @@ def build_mpc_package(
     )
     vectors = record(tracker)
     files |= {
-        **c_files(C, PLACES, {PREFIX: name}),
+        **packaging.c_files(C, PLACES, {PREFIX: name}),
         f"src/{name}_tables.h": _tables(name, params, about),
         f"tests/{name}_vectors.h": vectors_header(name, vectors),
     }
-    files |= cmake(files, about, flags=FLAGS, so_that="loops over all rows in vector registers")
-    files |= {f"{name}.json": manifest_text(content, files)}
+    files |= packaging.cmake(
+        files, about, flags=FLAGS, so_that="loops over all rows in vector registers"
+    )
+    files |= {f"{name}.json": packaging.manifest_text(content, files)}
     return MpcPackage(name, tire, tracker.problem, params, files, vectors, about)
 
 
@@ -274,13 +266,13 @@ def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -
         else {"text": repr(structure)}
     )
     return {
-        **content_head(FORMAT, name, single=single),
-        "tire": {"kind": type(structure).__name__, **plain(numbers)},
-        "vehicle": plain(vehicle_numbers(tire.vehicle)),
-        "problem": plain(asdict(problem)),
+        **packaging.content_head(FORMAT, name, single=single),
+        "tire": {"kind": type(structure).__name__, **packaging.plain(numbers)},
+        "vehicle": packaging.plain(vehicle_numbers(tire.vehicle)),
+        "problem": packaging.plain(asdict(problem)),
         "period_s": tracker.period,
         "delay_s": tracker.delay,
-        "params": plain(plain_params(params)),
+        "params": packaging.plain(plain_params(params)),
         "statuses": {status.name: int(status) for status in Status},
     }
 
@@ -288,7 +280,7 @@ def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -
 def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Words]:
     times = tracker.times
     return {
-        **about_package(content, f"Path tracking of the car {tracker.tire.vehicle.name}"),
+        **packaging.about_package(content, f"Path tracking of the car {tracker.tire.vehicle.name}"),
         "tire": content["tire"]["kind"],
         "horizon": str(tracker.problem.horizon),
         "dt": f"{tracker.problem.dt:g}",
@@ -300,9 +292,9 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
 
 def _tables(name: str, params: Params, about: Values) -> str:
     """Return the numbers of the export as C."""
-    return header(
+    return packaging.header(
         f"{name}_tables.h",
-        f"The numbers of the export.\n\n{generated(about)}",
+        f"The numbers of the export.\n\n{packaging.generated(about)}",
         [
             f'#include "{name}.h"\n',
             f"#define R(x) (({name}_real)(x))\n",

@@ -8,18 +8,9 @@ from pathlib import Path
 
 import casadi as ca
 
+from codegen import package
 from codegen.clean_c import Statements, recognized
 from codegen.graph import graph_of
-from codegen.package import (
-    c_files,
-    defines,
-    equations_file,
-    generated,
-    header,
-    in_comment,
-    one_file,
-    precision,
-)
 from codegen.template import Values
 from codegen.tuned import tuned
 from mpc.prediction import build_axles, build_end, build_rk4, build_stage, state_size
@@ -78,23 +69,26 @@ def c_sources(
     sizes = {key: (f"{count}U", words) for key, (count, words) in counts.items()}
     version = f'"{about["version_text"]}"'
     return {
-        **c_files(C, PLACES, {PREFIX: name}),
-        f"include/{name}_config.h": header(
+        **package.c_files(C, PLACES, {PREFIX: name}),
+        f"include/{name}_config.h": package.header(
             f"{name}_config.h",
-            f"{in_comment(about['title'])}: precision and sizes.\n\n{generated(about)}",
+            f"{package.in_comment(about['title'])}: precision and sizes.\n\n"
+            f"{package.generated(about)}",
             [
-                precision(name, single=single),
-                defines(name, {**sizes, "VERSION": (version, "name, hash, version of tireid")}),
+                package.precision(name, single=single),
+                package.defines(
+                    name, {**sizes, "VERSION": (version, "name, hash, version of tireid")}
+                ),
             ],
         ),
-        f"src/{name}_equations.c": _equations(structure, name, generated(about)),
+        f"src/{name}_equations.c": _equations(structure, name, package.generated(about)),
     }
 
 
 def python_file(files: Mapping[str, str], *, name: str, single: bool) -> str:
-    (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: name}).values()
+    (glue,) = package.c_files(C, {"glue.c": "."}, {PREFIX: name}).values()
     texts = [*(files[path.format(name)] for path in ORDER), glue]
-    return one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})
+    return package.one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})
 
 
 def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]]:
@@ -133,7 +127,7 @@ def _equations(structure: TireStructure, name: str, sentence: str) -> str:
         "force[2], "
         f"{real} slip[2], {real} length[2])": _body(build_axles(structure), name, READ, "{}[{}]"),
     }
-    return equations_file(name, f"The prediction and its derivatives. {sentence}", bodies)
+    return package.equations_file(name, f"The prediction and its derivatives. {sentence}", bodies)
 
 
 def _free_motion(structure: TireStructure) -> ca.Function:

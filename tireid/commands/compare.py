@@ -18,14 +18,8 @@ from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE
+from tireid.commands import compare_results as results
 from tireid.commands import options as shared
-from tireid.commands.compare_results import (
-    comparison_text,
-    pair_tables,
-    remarks,
-    summary_rows,
-    write_comparison,
-)
 from tireid.commands.demo_story import plant_recordings
 from tireid.learning import identify
 from tireid.output import output_folder
@@ -140,20 +134,20 @@ def run(options: argparse.Namespace) -> int:
         )
         work.begin("step times, tables and figures")
         verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}
-        figures = write_comparison(folder, comparison, verdicts)
-        rows = summary_rows(comparison)
+        figures = results.write_comparison(folder, comparison, verdicts)
+        rows = results.summary_rows(comparison)
         write_compare_report(
             folder,
             comparison,
             rows,
             figures,
             verdicts,
-            remarks=remarks(comparison),
+            remarks=results.remarks(comparison),
             command=options.words,
         )
-        told = [comparison_text(comparison)]
+        told = [results.comparison_text(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
-            told.append(pair_tables(comparison))
+            told.append(results.pair_tables(comparison))
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")

@@ -12,29 +12,9 @@ from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict, judge, judge_prediction
 from tireid import report as page
-from tireid.commands import COMMANDS
+from tireid.commands import COMMANDS, certificate_table, demo_parts
 from tireid.commands import options as shared
-from tireid.commands.certificate_table import (
-    HEADER,
-    advised,
-    certificate_rows,
-    certificate_text,
-    notes,
-    verdict_line,
-)
 from tireid.commands.check import draw_check
-from tireid.commands.demo_parts import (
-    FOLDER,
-    Driven,
-    Shipped,
-    drive_numbers,
-    drive_section,
-    drive_story,
-    drive_text,
-    package_section,
-    ship,
-    shipped_text,
-)
 from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
 from tireid.commands.identify_results import write_results
 from tireid.commands.paper import (
@@ -74,9 +54,9 @@ REFERENCE = (
 def demo_report(
     story: Story,
     verdict: Verdict,
-    shipped: Shipped,
+    shipped: demo_parts.Shipped,
     study: Study,
-    driven: dict[str, Driven],
+    driven: dict[str, demo_parts.Driven],
     figures: Mapping[str, Mapping[str, Figure]],
     folder: Path,
     command: str,
@@ -92,15 +72,15 @@ def demo_report(
             *missed_headline(verdict),
             *number_headlines(verdict),
             *identify_headlines(model, runs, story.axle.frozen[FREEZE]),
-            *drive_numbers(driven),
+            *demo_parts.drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
         sections=[
             verdict_section(verdict),
-            drive_section(driven, folder),
+            demo_parts.drive_section(driven, folder),
             _learn(figures["identify"], model, verdict),
             _predict(story),
-            package_section(shipped),
+            demo_parts.package_section(shipped),
             page.Section(
                 heading="The paper's study",
                 blocks=[
@@ -180,20 +160,21 @@ def _predict(story: Story) -> page.Section:
 
 def _certify(story: Story, learning: Path) -> list[page.Block]:
     certificate, unit = story.certificate, story.design.force_unit
-    said = [f"{e.title}: {e.status}; {e.advice}." for e in advised(certificate)]
-    said += [f"Note: {remark}." for remark in notes(certificate)]
+    said = [f"{e.title}: {e.status}; {e.advice}." for e in certificate_table.advised(certificate)]
+    said += [f"Note: {remark}." for remark in certificate_table.notes(certificate)]
     return [
         page.Subheading(text="The gains of the paper's law are judged before it learns"),
         page.Paragraph(
             text="The certificate follows from the gains, the network and how hard the car is "
-            f"driven, not from a run. {page.printed(verdict_line(certificate)).capitalize()}."
+            "driven, not from a run. "
+            f"{page.printed(certificate_table.verdict_line(certificate)).capitalize()}."
         ),
         page.Table(
             caption="Properties of the learning loop at the worst regressor; those without a "
             "limit are stated, not judged.",
-            header=list(HEADER),
+            header=list(certificate_table.HEADER),
             rows=[[page.printed(c) if isinstance(c, str) else c for c in row]
-                  for row in certificate_rows(certificate, unit)],
+                  for row in certificate_table.certificate_rows(certificate, unit)],
         ),
         *(page.Paragraph(text=page.printed(one)) for one in said),
         page.Picture(
@@ -348,11 +329,11 @@ def run(options: argparse.Namespace) -> None:
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
         work.begin(EXPORTING)
-        shipped = ship(story, folder / FOLDER)
+        shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
         study = run_study(SEEDS, partial(work.begin(TESTING).step, STEPS))
         figures["paper"] = write_study(folders["paper"], study)
         work.begin(DRIVING)
-        driven = drive_story(story, folder)
+        driven = demo_parts.drive_story(story, folder)
         work.begin(REPORTING)
         report = demo_report(
             story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
@@ -360,10 +341,10 @@ def run(options: argparse.Namespace) -> None:
         page.write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),
-            f"{certificate_text(story.certificate, story.design.force_unit)}\n",
+            f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
             f"{story.text()}\n",
-            f"{shipped_text(shipped)}\n",
-            drive_text(driven),
+            f"{demo_parts.shipped_text(shipped)}\n",
+            demo_parts.drive_text(driven),
         ]
     tell("\n".join(told))
     tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

@@ -20,25 +20,15 @@ from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.commands.drive_results import NO_FILM, drive_lines, known_curves, write_drives
+from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION
-from tireid.driving.runs import (
-    FROZEN,
-    FULL,
-    IMU,
-    ORACLE,
-    SENSORS,
-    TIRES,
-    Conditions,
-    require_compiler,
-    run_drive,
-)
 from tireid.driving.setup import PERIOD, PLANT
 from tireid.output import output_folder
 from tireid.progress import say, tell
 from tireid.reports.drive import write_drive_report
 
 
-def headline(conditions: Conditions) -> str:
+def headline(conditions: driving.Conditions) -> str:
     """Return a case in one line."""
     setup = conditions.setup
     v = setup.speeds()
@@ -48,7 +38,7 @@ def headline(conditions: Conditions) -> str:
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
     noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
-    noise += ", no v_y" if conditions.kind == IMU else ""
+    noise += ", no v_y" if conditions.kind == driving.IMU else ""
     noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
@@ -59,7 +49,7 @@ def headline(conditions: Conditions) -> str:
 
 
 def inputs_of(
-    conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
+    conditions: driving.Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
 ) -> dict[str, Any]:
     """Return all that goes into drives, ready for JSON."""
     setup = conditions.setup
@@ -84,7 +74,7 @@ def inputs_of(
         "delay_ms": 1e3 * PERIOD * conditions.delay,
         "period_ms": 1e3 * PERIOD,
         "noise": conditions.noise,
-        **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
+        **({"sensors": conditions.kind} if conditions.kind != driving.FULL else {}),
         **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
         **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
         "faults": [_finite(asdict(fault)) for fault in conditions.faults],
@@ -152,10 +142,11 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--tires",
         nargs="+",
-        choices=(*TIRES, ALL),
-        default=[FROZEN],
+        choices=(*driving.TIRES, ALL),
+        default=[driving.FROZEN],
         metavar="NAME",
-        help=f"what the tracker is told: {', '.join(TIRES)}, or {ALL}; the first leads ({FROZEN})",
+        help=f"tires that the tracker plans with: {', '.join(driving.TIRES)}, or {ALL}; "
+        f"the first leads ({driving.FROZEN})",
     )
     shared.add_weights(parser, "the frozen tires, as identified")
     shared.add_method(parser)
@@ -172,8 +163,8 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument(
         "--sensors",
-        choices=SENSORS,
-        default=FULL,
+        choices=driving.SENSORS,
+        default=driving.FULL,
         metavar="NAME",
         help="full: v_y is measured; imu: yaw rate and a_y of an inertial unit on the body (0.003 "
         "rad/s and 0.1 m/s² of noise, biases of 0.001 and 0.05), wheel speed (0.03 m/s), steering, "
@@ -227,15 +218,15 @@ def run(options: argparse.Namespace) -> int:
     setup = conditions.setup
     if options.film == "mp4":
         require_ffmpeg()
-    require_compiler()
+    driving.require_compiler()
     with output_folder(options.out, force=options.force) as folder:
         say(headline(conditions))
-        if ORACLE in labels:
+        if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions)
         if learnt is not None:
             learnt.save(folder / "weights.json")
-        runs = [run_drive(label, conditions, learnt) for label in labels]
+        runs = [driving.run_drive(label, conditions, learnt) for label in labels]
         inputs = inputs_of(conditions, labels, source, learnt)
         figures = write_drives(
             folder,

@@ -22,17 +22,8 @@ from tireid.commands.options import (
     read_vehicle,
     seed_of,
 )
+from tireid.driving import runs
 from tireid.driving.learn import learning_drive
-from tireid.driving.runs import (
-    FROZEN,
-    FULL,
-    IMU,
-    LEARNING,
-    LINEAR,
-    ORACLE,
-    WEAVES,
-    Conditions,
-)
 from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.learning import identify
 from tireid.progress import Progress
@@ -80,7 +71,7 @@ def parse_drop(text: str) -> tuple[float, float]:
     return s, mu
 
 
-def parse_fault(text: str, kind: str = FULL) -> SensorFault:
+def parse_fault(text: str, kind: str = runs.FULL) -> SensorFault:
     """Return what --fault says of a sensor.
 
     text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
@@ -97,7 +88,7 @@ def parse_fault(text: str, kind: str = FULL) -> SensorFault:
         ) from None
     try:
         fault = SensorFault(channel=channel, kind=how, start=start, duration=duration, size=most)
-        sensors = imu_and_localization(None) if kind == IMU else CarSensors()
+        sensors = imu_and_localization(None) if kind == runs.IMU else CarSensors()
         FaultySensors(sensors, [fault])  # refuses what is no channel
     except FaultError as error:
         raise ValueError(f"--fault {text}: {error}") from None
@@ -112,14 +103,14 @@ LONGEST_DELAY = 100.0  # ms
 
 def labels_of(words: Sequence[str]) -> list[str]:
     """Return the tires in order, each once; all begins with the frozen ones."""
-    wanted = [FROZEN, LINEAR, ORACLE, LEARNING] if ALL in words else list(words)
+    wanted = [runs.FROZEN, runs.LINEAR, runs.ORACLE, runs.LEARNING] if ALL in words else list(words)
     return list(dict.fromkeys(wanted))
 
 
-def conditions_of(options: argparse.Namespace) -> Conditions:
+def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_within(ValueError, *WEAVES, **{"--dither in m": options.dither})
+    require_within(ValueError, *runs.WEAVES, **{"--dither in m": options.dither})
     require_within(ValueError, *FRICTIONS, **{"--mu": options.mu})
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     path = named_path(options.path)
@@ -135,7 +126,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
     )
     hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
     require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
-    return Conditions(
+    return runs.Conditions(
         setup=setup,
         delay=_periods(options.delay),
         noise=options.noise,
@@ -200,11 +191,11 @@ def make_setup(
 
 
 def frozen_tires(
-    options: argparse.Namespace, labels: Sequence[str], conditions: Conditions
+    options: argparse.Namespace, labels: Sequence[str], conditions: runs.Conditions
 ) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed."""
     setup = conditions.setup
-    if not {FROZEN, LEARNING} & set(labels):
+    if not {runs.FROZEN, runs.LEARNING} & set(labels):
         return "nothing was learnt", None
     if options.weights is not None:
         model = load_model(options.weights)

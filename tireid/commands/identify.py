@@ -25,19 +25,9 @@ from identifier.verdict import Verdict, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
+from tireid.commands import identify_results as results
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import resumed_line, verdict_line
-from tireid.commands.identify_results import (
-    NETWORK,
-    AskedBound,
-    error_cells,
-    file_name,
-    guaranteed_text,
-    network_table,
-    no_truth,
-    write_network_results,
-    write_results,
-)
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify, with_v_y
@@ -118,7 +108,7 @@ def run(options: argparse.Namespace) -> int:
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
-    bound = None if options.bound is None else AskedBound.of(options.bound)
+    bound = None if options.bound is None else results.AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
         raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
     start = None if options.weights is None else load_model(options.weights)
@@ -182,11 +172,11 @@ def run(options: argparse.Namespace) -> int:
             verdict = with_doctor(verdict, diagnosis, repair)
             asked = _asked(network, others)
             progress.begin(DRAWING)
-            replays, figures = write_network_results(
+            replays, figures = results.write_network_results(
                 folder, options.network, law, network, histories, verdict, asked, options.curves
             )
-            by_key = {NETWORK: replays}
-            told = network_table(law, histories, replays)
+            by_key = {results.NETWORK: replays}
+            told = results.network_table(law, histories, replays)
         else:
             learnt = histories[0]
             for t in freeze_times:
@@ -195,7 +185,7 @@ def run(options: argparse.Namespace) -> int:
             verdict = with_doctor(judge(learnt, freeze_times[-1]), diagnosis, repair)
             asked = _asked(learnt.freeze(freeze_times[-1]), others)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
-            figures = write_results(
+            figures = results.write_results(
                 folder,
                 law,
                 learnt,
@@ -213,7 +203,7 @@ def run(options: argparse.Namespace) -> int:
             told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
         doctor = doctor_text(diagnosis, repair, options.repair)
         model = network or load_model(folder / "weights.json")
-        sure = "" if bound is None else guaranteed_text(model)
+        sure = "" if bound is None else results.guaranteed_text(model)
         of_others = asked_text(asked)
         parts_told = (told, sure, doctor, of_others, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
@@ -300,7 +290,7 @@ def _read(
 
 
 def _require_distinct(recordings: list[Recording]) -> None:
-    files = [file_name(recording) for recording in recordings]
+    files = [results.file_name(recording) for recording in recordings]
     for recording, name in zip(recordings, files, strict=True):
         if files.count(name) > 1:
             raise ValueError(
@@ -340,10 +330,12 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            note = no_truth(error, sizes[name])
-            cells = error_cells(error, sizes[name])
+            note = results.no_truth(error, sizes[name])
+            cells = results.error_cells(error, sizes[name])
             rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
             sides = result.reproduction
             if sides is not None and sides.past_against_online is not None:
-                rows.append(["", OWN_PAST, *error_cells(sides.past_against_online, sizes[name])])
+                rows.append(
+                    ["", OWN_PAST, *results.error_cells(sides.past_against_online, sizes[name])]
+                )
     return text_table(rows, "><>>")

@@ -16,23 +16,12 @@ from identifier.tire_model import load_model
 from models.files import digest
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
-from tireid import __version__
+from tireid import __version__, planning
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
 from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_csv, write_json
-from tireid.planning import (
-    FRICTION,
-    LONGEST_LAG,
-    MARGIN,
-    RATE,
-    SHARE,
-    SHORTEST_LAG,
-    TIME,
-    plan,
-    rehearsals,
-)
 from tireid.progress import Progress, say, tell
 from tireid.reports.plan import RIVALS, plan_words, rival_rows, write_plan_report
 from tireid.verdicts import warn_of_stored
@@ -60,7 +49,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--time",
         type=float,
-        default=TIME,
+        default=planning.TIME,
         metavar="S",
         help="of steering, over as many passes as the area takes (%(default)g)",
     )
@@ -71,12 +60,15 @@ def add_parser(commands: Any) -> None:
         help="weights.json, as identified: plan what is still unknown",
     )
     parser.add_argument(
-        "--mu", type=float, metavar="MU", help=f"friction, a guess within 30 %% ({FRICTION:g})"
+        "--mu",
+        type=float,
+        metavar="MU",
+        help=f"friction, a guess within 30 %% ({planning.FRICTION:g})",
     )
     parser.add_argument(
         "--grip",
         type=float,
-        default=100.0 * SHARE,
+        default=100.0 * planning.SHARE,
         metavar="PERCENT",
         help="share of the grip that is used at most (%(default)g)",
     )
@@ -84,13 +76,13 @@ def add_parser(commands: Any) -> None:
         "--margin",
         type=float,
         metavar="M",
-        help=f"from the car to the edge of the area ({MARGIN:g} wheelbases)",
+        help=f"from the car to the edge of the area ({planning.MARGIN:g} wheelbases)",
     )
     parser.add_argument(
         "--steering-rate",
         type=float,
         metavar="DEG/S",
-        help=f"largest, of the front wheels ({math.degrees(RATE):.0f} over sqrt(L/g))",
+        help=f"largest, of the front wheels ({math.degrees(planning.RATE):.0f} over sqrt(L/g))",
     )
     parser.add_argument(
         "--steering-angle",
@@ -140,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
         vehicle = shared.read_vehicle(options)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
-            found = plan(
+            found = planning.plan(
                 vehicle,
                 area=area,
                 speed=speed,
@@ -156,7 +148,7 @@ def run(options: argparse.Namespace) -> int:
                 seed=seed,
                 progress=progress,
             )
-        driven = rehearsals(found)
+        driven = planning.rehearsals(found)
         inputs = inputs_of(options, vehicle, area, speed)
         write_plan(folder, found, inputs, ratio)
         figures = {
@@ -180,7 +172,7 @@ def _require_ranges(options: argparse.Namespace) -> None:
         ("--grip", 20.0, 100.0 * REAR),
         ("--margin", 0.0, 1e3),
         ("--steering-angle", 1.0, 60.0),
-        ("--steering-lag", SHORTEST_LAG, LONGEST_LAG),
+        ("--steering-lag", planning.SHORTEST_LAG, planning.LONGEST_LAG),
     ):
         value = vars(options)[word.removeprefix("--").replace("-", "_")]
         if value is not None:

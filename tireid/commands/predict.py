@@ -17,7 +17,7 @@ from identifier.reproducibility import beyond_known
 from identifier.tire_model import UNCALIBRATED, TireModel, load_model
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
-from tireid import __version__
+from tireid import __version__, output
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.identify_results import error_cells
@@ -26,14 +26,6 @@ from tireid.figures.predict import friction_figure, motion_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
 from tireid.learning import replay
-from tireid.output import (
-    axle_columns,
-    output_folder,
-    text_table,
-    write_csv,
-    write_json,
-    write_long_csv,
-)
 from tireid.progress import say, tell
 from tireid.reports.predict import write_predict_report
 from tireid.verdicts import verdict_text, warn_of_stored
@@ -75,16 +67,16 @@ def run(options: argparse.Namespace) -> int:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict
     half, friction = model.half_band_over(recording), verdict.friction
-    with output_folder(options.out, force=options.force) as folder:
+    with output.output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))
-        write_long_csv(
+        output.write_long_csv(
             folder / "forces.csv", (force_columns(model, prediction, half, part) for part in parts)
         )
         if friction is not None:
             columns = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
             columns |= {"another": friction.another, "unexplained": friction.unexplained}
-            write_csv(folder / "friction.csv", columns)
-        write_json(folder / "summary.json", summary(model, prediction, verdict, half))
+            output.write_csv(folder / "friction.csv", columns)
+        output.write_json(folder / "summary.json", summary(model, prediction, verdict, half))
         lines = prediction_text(model, prediction, half, friction)
         say("drawing figures")
         figures = draw(folder, prediction, verdict)
@@ -150,7 +142,7 @@ def force_columns(
     forces = {"predicted": prediction.axle_force, "half_band": half, "true": recording.axle_force}
     for name, force in forces.items():
         if force is not None:
-            columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
+            columns |= output.axle_columns(f"Fy{{}}_{name}_N", force[part])
     return columns
 
 
@@ -216,7 +208,9 @@ def error_table(prediction: Prediction) -> str:
     if error is None:
         return ""
     name = visible(prediction.recording.name)
-    return text_table([["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>")
+    return output.text_table(
+        [["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>"
+    )
 
 
 def prediction_text(

@@ -24,16 +24,9 @@ from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from models.recordings import Recording
 from tireid import report as page
+from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.reports.common import READ, REPORT, drawing, drawings, origin
-from tireid.verdicts import (
-    missed_headline,
-    number_headlines,
-    of_answer,
-    verdict_headline,
-    verdict_section,
-    verdict_warnings,
-)
 
 EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
@@ -55,7 +48,7 @@ def write_identify_report(
     """Write the report of what was learnt, or of a network that was judged."""
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
-        verdict_section(verdict),
+        verdicts.verdict_section(verdict),
         page.Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
         page.Section(
             heading="How well it predicts",
@@ -78,24 +71,24 @@ def write_identify_report(
         title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
-            verdict_headline(verdict, notes),
-            *of_answer(
+            verdicts.verdict_headline(verdict, notes),
+            *verdicts.of_answer(
                 verdict,
                 [
-                    *missed_headline(verdict),
+                    *verdicts.missed_headline(verdict),
                     *asked_headlines(asked),
-                    *number_headlines(verdict),
+                    *verdicts.number_headlines(verdict),
                     *identify_headlines(model, runs, last),
                 ],
             ),
         ],
         lead=[curve_drawing(figures, verdict)],
         warnings=[
-            *verdict_warnings(verdict),
+            *verdicts.verdict_warnings(verdict),
             *(
                 one
                 for name, found in asked.items()
-                for one in verdict_warnings(found, f"{name}, replayed: ")
+                for one in verdicts.verdict_warnings(found, f"{name}, replayed: ")
             ),
             *notes,
         ],
