@@ -51,7 +51,9 @@ LINEAR: Mapping[str, Any] = {
     "label": "linear tire",
 }
 
-LOOK = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
+LOOK: dict[str, Any] = {
+    **rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
+}
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
