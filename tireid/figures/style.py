@@ -51,9 +51,8 @@ LINEAR: Mapping[str, Any] = {
     "label": "linear tire",
 }
 
-LOOK: dict[str, Any] = {
-    **rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
-}
+_look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
+LOOK: dict[str, Any] = dict(_look.items())
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
