@@ -14,7 +14,9 @@ from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import Drive, cornering_limit, drive, inertial_unit
+from mpc.loop.drive import drive
+from mpc.loop.record import Drive
+from mpc.loop.sensing import cornering_limit, inertial_unit
 from mpc.path import iso_3888_2, steady_speed
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from models.vehicle import Vehicle, sedan
     from mpc import path as paths
     from tireid import errors
-    from tireid.driving import drive, sample_recording
+    from tireid.driving.learn import sample_recording
+    from tireid.driving.runs import drive
     from tireid.exporting import export
     from tireid.figures.forces import inputs_figure as plot
     from tireid.learning import identify, replay

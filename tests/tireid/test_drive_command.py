@@ -13,8 +13,7 @@ from models.files import digest
 from models.friction import Friction
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import CarSensors
-from mpc.loop.sensing import cornering_limit
+from mpc.loop.sensing import CarSensors, cornering_limit
 from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
 from tests.pages import faults_of, outline

@@ -10,7 +10,7 @@ from PIL import Image, ImageSequence
 
 from models.faults import SensorFault
 from models.vehicle import sedan
-from mpc.loop import Drive, Plan
+from mpc.loop.record import Drive, Plan
 from mpc.path import Path
 from tireid.animation import film as frames
 from tireid.animation import write_film

@@ -7,7 +7,8 @@ from models.vehicle import sedan
 from mpc.path import Path
 from tireid.commands.drive import headline
 from tireid.commands.drive_case import parse_fault
-from tireid.driving import Conditions, Setup, SpeedWish
+from tireid.driving.runs import Conditions
+from tireid.driving.setup import Setup, SpeedWish
 
 AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
 COURSE = Path.from_waypoints(90.0 * np.cos(AROUND), 40.0 * np.sin(AROUND), closed=True, name="oval")

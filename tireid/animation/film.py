@@ -11,7 +11,7 @@ from matplotlib import style
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
 from codegen.writing import naming
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
 from tireid.figures.style import LOOK

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from codegen.arrays import Array
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from mpc.path import Path
 from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_look
 from tireid.figures.style import PURPLE

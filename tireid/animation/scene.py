@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
 from codegen.escape import mathtext
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from tireid.animation.ground import Camera, Ground, Instant, sample_at
 from tireid.animation.known import KnownCurves
 from tireid.figures.drive import AT_THE_END, ORACLE, mark_drops, tire_look

@@ -18,8 +18,8 @@ from tireid.animation import FORMATS
 from tireid.commands.demo_story import FREEZE, Story
 from tireid.commands.drive import headline, inputs_of
 from tireid.commands.drive_results import drive_lines, known_curves, write_drives
-from tireid.driving import Conditions, Run, Setup, SpeedWish, run_drive
-from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions, Run, run_drive
+from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Verdict, self_test, write_files
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing

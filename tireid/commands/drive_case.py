@@ -13,7 +13,7 @@ from models.faults import SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
-from mpc.loop import CarSensors, FaultySensors, imu_and_localization
+from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import (
     chosen_method,

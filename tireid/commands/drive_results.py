@@ -12,7 +12,7 @@ from codegen.arrays import Array
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.files import digest
-from mpc.loop import Drive, told_scores
+from mpc.loop.record import Drive, told_scores
 from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film

@@ -7,7 +7,7 @@ from typing import Any
 from models.recordings import write_recording
 from tireid.commands import COMMANDS
 from tireid.commands.options import add_force, add_seed, add_vehicle, read_vehicle, seed_of
-from tireid.driving import sample_recording
+from tireid.driving.learn import sample_recording
 from tireid.output import require_free
 from tireid.progress import say
 

@@ -9,7 +9,8 @@ from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from mpc.cars import Car, DoubleTrackCar
-from mpc.loop import Measured, Measures, TellsLateral, cornering_limit, inertial_unit
+from mpc.loop.lateral import TellsLateral
+from mpc.loop.sensing import Measured, Measures, cornering_limit, inertial_unit
 from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
 

@@ -18,21 +18,19 @@ from models.rules import require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
-from mpc.loop import (
+from mpc.loop.dither import Dither
+from mpc.loop.drive import LearningTires
+from mpc.loop.drive import drive as drive_tracker
+from mpc.loop.lateral import LateralVelocity
+from mpc.loop.record import Drive, Scores, scores
+from mpc.loop.sensing import (
     CarSensors,
-    Dither,
-    Drive,
     FaultySensors,
-    LateralVelocity,
-    LearningTires,
     Measured,
     Measures,
-    Scores,
     imu_and_localization,
     inertial_unit,
-    scores,
 )
-from mpc.loop import drive as drive_tracker
 from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker

@@ -15,8 +15,7 @@ from models.friction import Friction, FrictionChange
 from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.cars import Car, DoubleTrackCar
-from mpc.loop import SpeedProfile
-from mpc.loop.sensing import cornering_limit
+from mpc.loop.sensing import SpeedProfile, cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
 

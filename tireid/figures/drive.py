@@ -15,7 +15,7 @@ from models.vehicle import Vehicle
 from tireid.figures import style
 
 if TYPE_CHECKING:
-    from mpc.loop import Drive
+    from mpc.loop.record import Drive
     from mpc.path import Path
 
 BINS = 60

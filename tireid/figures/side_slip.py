@@ -16,7 +16,7 @@ from tireid.figures.drive import ARC
 from tireid.figures.thinned import Signal, drawn_times, shown
 
 if TYPE_CHECKING:
-    from mpc.loop import Drive
+    from mpc.loop.record import Drive
 
 FIRST = "inertial"  # which has the band where several tell v_y
 MOST = 4  # recordings that are drawn

@@ -20,7 +20,7 @@ from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
 from tireid.figures.thinned import DrawnRun, cloud
 
 if TYPE_CHECKING:
-    from mpc.loop import Drive
+    from mpc.loop.record import Drive
 
 UNKNOWN = "slip not known"
 BAND = "band of 90 %"

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from models.files import digest
 from mpc.handover.rules import Verdict
-from mpc.loop import told_scores
+from mpc.loop.record import told_scores
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report

@@ -8,7 +8,7 @@ import pytest
 import tireid as ti
 from codegen import find_compiler
 from models.vehicle import sedan
-from mpc.loop import Dither
+from mpc.loop.dither import Dither
 from mpc.realtime.instance import Measurement
 from tireid.driving.runs import unknown_of
 

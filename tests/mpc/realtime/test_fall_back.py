@@ -13,7 +13,7 @@ from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.export.package import build_mpc_package
-from mpc.loop import drive
+from mpc.loop.drive import drive
 from mpc.path.path import Path
 from mpc.problem import Problem
 from mpc.realtime import Guards, Measurement, Status, Tracker
