@@ -211,51 +211,35 @@ def package_section(shipped: Shipped) -> Section:
             "tireid export writes."
         )
     ]
-    if shipped.checks:
-        blocks.append(
-            Table(
-                caption="The package, compiled and run on this machine: its self-test, and the "
-                "slalom again beside Python, which begins with the same model.",
-                header=["precision", "self-test", "its vectors", "from Python [N]", "refused"],
-                rows=[
-                    [
-                        check.precision,
-                        check.verdict.verdict,
-                        check.verdict.difference,
-                        f"{check.difference:.2g}",
-                        f"{check.refused} of {check.samples}",
-                    ]
-                    for check in shipped.checks
-                ],
-            )
+    checks = [
+        [
+            one.precision,
+            *one.verdict.verdict,
+            one.verdict.difference,
+            f"{one.difference:.2g}",
+            f"{one.refused} of {n}",
+        ]
+        for one in shipped.checks
+        for test, of in [(one.verdict, f"{one.refused} of {one.samples}")]
+    ]
+    if checks:
+        caption = (
+            "The package, compiled and run on this machine: its self-test, and the slalom again "
+            "beside Python, which begins with the same model."
         )
+        header = ["precision", "self-test", "its vectors", "from Python [N]", "refused"]
+        blocks.append(Table(caption=caption, header=header, rows=checks))
     else:
         blocks.append(Paragraph(text=NOT_BUILT))
     if shipped.costs:
-        blocks.append(
-            Table(
-                caption=f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}.",
-                header=[
-                    "processor",
-                    "precision",
-                    "instructions",
-                    "flash [B]",
-                    "RAM [B]",
-                    "stack [B]",
-                ],
-                rows=[
-                    [
-                        cost.processor,
-                        cost.precision,
-                        f"{cost.replay.instructions}",
-                        f"{cost.flash}",
-                        f"{cost.ram}",
-                        f"{cost.replay.stack}",
-                    ]
-                    for cost in shipped.costs
-                ],
-            )
-        )
+        caption = f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}."
+        header = ["processor", "precision", "instructions", "flash [B]", "RAM [B]", "stack [B]"]
+        rows = [
+            [one.processor, one.precision, *(f"{n}" for n in numbers)]
+            for one in shipped.costs
+            for numbers in [(one.replay.instructions, one.flash, one.ram, one.replay.stack)]
+        ]
+        blocks.append(Table(caption=caption, header=header, rows=rows))
     else:
         missing = ", ".join(missing_tools())
         blocks.append(Paragraph(text=f"Costs on Arm are not measured, missing: {missing}."))

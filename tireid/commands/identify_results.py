@@ -58,14 +58,11 @@ def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | No
 
 
 def summarize(
-    *,
     law: str,
-    learnt: History,
-    others: Sequence[History],
-    frozen: Mapping[float, Mapping[str, Replay]],
-    verdict: Verdict,
+    runs: Sequence[History],
+    frozen: Mapping[str, Mapping[str, Replay]],
+    verdict: Verdict | None,
     asked: Mapping[str, Verdict],
-    parts: Sequence[History] = (),
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
@@ -74,19 +71,8 @@ def summarize(
     the recording that was learnt at the freeze, and its `past_against_online` is the measure of the
     paper's section IV-A.
 
-    frozen : freeze time [s] to recording name to replay.
+    runs : the first of them was learnt.   frozen : freeze time [s] to recording name to replay.
     """
-    by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict, asked)
-
-
-def summarize_replays(
-    law: str,
-    runs: Sequence[History],
-    frozen: Mapping[str, Mapping[str, Replay]],
-    verdict: Verdict | None,
-    asked: Mapping[str, Verdict],
-) -> dict[str, Any]:
     learnt = runs[0]
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
@@ -179,18 +165,9 @@ def write_results(
     tire = calibrated(learnt, max(frozen))
     if bound is not None:
         tire = guaranteed(learnt, bound.told, max(frozen), tire)
-    write_json(
-        folder / "summary.json",
-        summarize(
-            law=law,
-            learnt=learnt,
-            others=others,
-            frozen=frozen,
-            verdict=verdict,
-            asked=asked,
-            parts=parts,
-        ),
-    )
+    by_key = {freeze_key(t): replays for t, replays in frozen.items()}
+    summary = summarize(law, [learnt, *parts, *others], by_key, verdict, asked)
+    write_json(folder / "summary.json", summary)
     for t in frozen:
         last = "" if t == max(frozen) else f"_{freeze_key(t)}s"
         model = learnt.freeze(t) if last else tire
@@ -420,7 +397,7 @@ def write_network_results(
     """Write everything that is known of a network into a folder; return replays and figures."""
     replays = {history.recording.name: replay(model, history) for history in histories}
     about = {"file": file.name, "inputs": list(model.signals), "slip_sign": model.slip_sign}
-    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict, asked)
+    summary = summarize(law, histories, {NETWORK: replays}, verdict, asked)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json", valid=verdict.valid)
     columns = curve_columns(model, [history.recording for history in histories])
