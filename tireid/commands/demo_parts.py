@@ -212,13 +212,7 @@ def package_section(shipped: Shipped) -> Section:
         )
     ]
     checks = [
-        [
-            one.precision,
-            *one.verdict.verdict,
-            one.verdict.difference,
-            f"{one.difference:.2g}",
-            f"{one.refused} of {n}",
-        ]
+        [one.precision, test.verdict, test.difference, f"{one.difference:.2g}", of]
         for one in shipped.checks
         for test, of in [(one.verdict, f"{one.refused} of {one.samples}")]
     ]
