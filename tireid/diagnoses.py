@@ -23,13 +23,12 @@ from tireid.reports.common import READ, REPORT, drawing, origin
 HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
     "acceleration_sensor_x": "accelerometer ahead of the c.g.",
-    "center_of_gravity": "center of gravity told too far back",
+    "center_of_gravity": "center of gravity stated too far back",
     "clock": "clock jumps",
     "clock_unit": "clock in ms",
     "copied": "computed, not measured",
     "dropout": "drops to zero",
     "factor": "scaled",
-    "frozen": "frozen",
     "held": "repeats old values",
     "jitter": "samples late at random",
     "lag": "low-passed",
