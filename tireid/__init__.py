@@ -57,7 +57,7 @@ _HOMES = {
     "certify": ("identifier.methods", "certify"),
     "diagnose": ("identifier.doctor", "diagnose"),
     "errors": ("tireid.errors", ""),
-    "drive": ("tireid.driving", "drive"),
+    "drive": ("tireid.driving.runs", "drive"),
     "export": ("tireid.exporting", "export"),
     "identify": ("tireid.learning", "identify"),
     "make_method": ("identifier.methods", "make_method"),
@@ -68,7 +68,7 @@ _HOMES = {
     "read_recording": ("models.recordings", "read_recording"),
     "read_repaired": ("models.recordings", "read_repaired"),
     "replay": ("tireid.learning", "replay"),
-    "sample_recording": ("tireid.driving", "sample_recording"),
+    "sample_recording": ("tireid.driving.learn", "sample_recording"),
     "sedan": ("models.vehicle", "sedan"),
 }
 __all__ = [
