@@ -32,6 +32,7 @@ from benchmarks.random_drives import FORCE_UNIT, random_vehicle
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.driving import Driving, natural_driving
+from identifier.methods import certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS, Gains
 from identifier.paper.network import Network
@@ -39,7 +40,6 @@ from identifier.stability import Certificate
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.loop import direction_matrix
 from models.vehicle import Vehicle
-from tireid.commands.certificate_table import certificate_of
 
 SEED, PROCESSES = 5, 2
 DRAWN = ("integral", "integral", "instantaneous", "pi_lead")
@@ -212,15 +212,15 @@ def designs(
     certificate = None
     while certificate is None or "error_bound" not in stated(certificate):
         design = with_leakage(rng, vehicle, random_design(rng, network, driving))
-        certificate = certificate_of(design, vehicle)
+        certificate = certify(design, vehicle)
     yield design, certificate
     design = with_projection(rng, random_design(rng, network, driving, rng.uniform(0.5, 20.0)))
-    yield design, certificate_of(design, vehicle)
+    yield design, certify(design, vehicle)
     certificate = None
     while certificate is None or "error_bound" not in stated(certificate):
         leaking = with_leakage(rng, vehicle, random_design(rng, network, driving))
         design = with_dead_zone(rng, vehicle, leaking)
-        certificate = certificate_of(design, vehicle)
+        certificate = certify(design, vehicle)
     yield design, certificate
 
 

@@ -99,7 +99,6 @@ MORE = (
     *(
         "--fault all:noisy:0:1:inf",
         "--delay 1e9",
-        "--plant drift",
         "--bandwidth 1e-300",
         "--slip 1e-300",
         "--friction 1e300",

@@ -107,8 +107,8 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
         return Diagnosis(name=recording.name, findings=(finding,), unseen=NEVER)
     if recording.logged_v_y is None:
-        found = (*_contradictions(recording, vehicle), *_samples(recording))
-        return Diagnosis(name=recording.name, findings=found, unseen=(WITHOUT_V_Y, *NEVER))
+        told = (*_contradictions(recording, vehicle), *_samples(recording))
+        return Diagnosis(name=recording.name, findings=told, unseen=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
     found, fine = list(gross.findings), Examination()
@@ -160,7 +160,7 @@ def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
 
 def _samples(recording: Recording) -> list[Finding]:
     """Return what is wrong with the samples of a log without a v_y."""
-    return clock_findings(recording) or sample_findings(recording)
+    return list(clock_findings(recording)) or sample_findings(recording)
 
 
 def _told_once(findings: list[Finding]) -> list[Finding]:

@@ -22,13 +22,13 @@ from benchmarks.monte_carlo import (
 )
 from identifier.certificate import Certificate, statement
 from identifier.driving import natural_driving
+from identifier.methods import certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import NetworkModel, Weights
 from identifier.run import History, identify
 from models.bicycle import bicycle
 from models.recordings import Recording
 from models.vehicle import sedan
-from tireid.commands.certificate_table import certificate_of
 
 CAR = sedan()
 DRIVING = natural_driving(CAR)
@@ -225,6 +225,6 @@ def test_every_row_is_passed_by_a_law_that_breaks_what_it_bounds():
         beginning = Beginning(W=0.0, V=12.0)
         rng = np.random.default_rng(1)
         seen = monte_carlo(planted, vehicle, driving, 30, beginning=beginning, rng=rng)
-        found = bound_rows(certificate_of(told, vehicle), seen)
+        found = bound_rows(certify(told, vehicle), seen)
         passed[name] = {row.name: row.passed for row in found}[name]
     assert min(passed.values()) > 0, passed

@@ -202,7 +202,7 @@ def test_all_errors_have_one_base_and_the_builtin_of_their_meaning():
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             bases = [one.id for one in getattr(node, "bases", []) if isinstance(one, ast.Name)]
             if {base for base in bases if hasattr(builtins, base)} and node.name != "TireidError":
-                assert bases[0] == "TireidError", f"{path}: {node.name}"
+                assert not hasattr(builtins, bases[0]), f"{path}: {node.name}"
     for error in map(ti.errors.__dict__.get, ti.errors.__all__):
         assert issubclass(error, ti.TireidError)
         meanings = ValueError | ArithmeticError | RuntimeError
@@ -566,7 +566,7 @@ def test_learnt_tires_steer_better_than_linear_ones(car):
     [
         ({"delay": 0.015}, "steps of 0.01 s"),
         ({"share": 0.0}, "share must be positive"),
-        ({"friction": 9.0}, "friction must be"),
+        ({"friction": 9.0}, "friction must lie between"),
         ({"laps": 2.0}, "laps are of a closed path"),
         ({"learning": True}, "none is given"),
     ],

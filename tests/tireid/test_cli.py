@@ -128,7 +128,7 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tireid.commands.paper.run_study", interrupted)
+    monkeypatch.setattr("identifier.paper_study.run_study", interrupted)
     assert main(["paper", "--out", str(tmp_path / "out")]) == 130
     assert "interrupted" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

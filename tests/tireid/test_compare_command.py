@@ -3,7 +3,7 @@
 import csv
 import html
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -14,9 +14,9 @@ from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.commands import compare_results
 from tireid.commands.compare_results import ERROR_COLUMNS
 from tireid.figures.compare import short_names
+from tireid.output import write_json
 
 METHODS_TRIED = ("integral", "linear", "linear_kf", "fit")
 
@@ -278,8 +278,10 @@ def test_runs_of_one_file_are_named_by_the_run_alone():
     assert short_names(["log:a", "other:a"]) == {"log:a": "log:a", "other:a": "other:a"}
 
 
-def test_what_diverged_is_null_in_the_file_and_not_infinite():
-    diverged = compare_results._percent(Shares(np.inf, np.inf, None))
-    assert diverged == {"online": None, "in_sample": None, "other": None}
-    assert compare_results._axles(INFINITE) == {"front": None, "rear": None}
-    assert compare_results._percent(Shares(5.0, 6.0, None))["in_sample"] == 6.0
+def test_what_diverged_is_null_in_the_file_and_not_infinite(tmp_path):
+    shares = Shares(np.inf, 6.0, None)._asdict()
+    write_json(tmp_path / "compare.json", {"percent": shares, "online_N": asdict(INFINITE)})
+    assert json.loads((tmp_path / "compare.json").read_text()) == {
+        "percent": {"online": None, "in_sample": 6.0, "other": None},
+        "online_N": {"front": None, "rear": None},
+    }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export import processor as figures
+from codegen import processor as figures
 from identifier.export.compiled import CompiledPackage
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method

@@ -13,7 +13,7 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.figures import side_slip_figure
+from tireid.figures.side_slip import side_slip_figure
 
 CAR = sedan()
 TOLD = ("linear_kf", "joint_ekf", "washout", "inertial")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from identifier.driving import Driving
-from identifier.methods import LIVE, certify
+from identifier.methods import LIVE
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.setup import force_unit_name
@@ -17,23 +17,9 @@ ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radi
 HEADER = ("property", "value", "limit", "margin", "")
 
 
-def certificate_of(
-    design: PaperIdentifier, vehicle: Vehicle, driving: Driving | None = None
-) -> Certificate:
-    """Return the certificate of a design.
-
-    Parameters
-    ----------
-    driving : how hard it is driven; None takes `natural_driving`.
-    """
-    return certify(design, vehicle, driving)
-
-
 def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:
     """Return title with unit, value, limit, margin and status of every property.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     return [
@@ -51,8 +37,6 @@ def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[s
 def certificate_text(certificate: Certificate, force_unit: float) -> str:
     """Return the certificate as lines of text, ending with advice and the verdict.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
@@ -104,7 +88,6 @@ def notes(certificate: Certificate) -> list[str]:
 
 
 def verdict_line(certificate: Certificate) -> str:
-    """Return the verdict and the margins in one line."""
     gain, phase = certificate["gain_sampled"], certificate["phase_margin"]
     worst = [e.title for e in certificate.properties if e.status == certificate.verdict]
     reason = "" if certificate.verdict == "pass" else f" ({'; '.join(worst)})"
@@ -138,9 +121,6 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
 def unit_text(unit: str, force_unit: float) -> str:
     """Return a unit with the force unit written out, kN or N where it is one.
 
-    Parameters
-    ----------
-    unit : with U for the force unit.
     force_unit : U [N].
     """
     name = force_unit_name(force_unit)

@@ -34,29 +34,17 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import options as shared
 from tireid.commands.certificate_table import (
-    certificate_of,
     certificate_text,
     method_text,
     unit_text,
 )
-from tireid.commands.options import (
-    Chosen,
-    add_log_map,
-    add_method,
-    add_output,
-    add_vehicle,
-    chosen_method,
-    method_is_given,
-    read_log,
-    read_vehicle,
-    told_map,
-)
-from tireid.figures import error_figure, locus_figure, save_figure
+from tireid.commands.demo_story import SLALOM, drives
+from tireid.figures.paper import error_figure, locus_figure
+from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
-
-# The figures of `tireid check`: root locus with its margin, bounds against a real error.
 
 FIGURES = ("locus.png", "bounds.png")
 BOUNDS = {
@@ -75,13 +63,7 @@ def draw_check(
     operation: Operation,
     certificate: Certificate,
 ) -> list[Path]:
-    """Draw locus.png and bounds.png; return their paths.
-
-    Parameters
-    ----------
-    folder : where to, made if missing.
-    recording : a drive, for the error to compare the bounds with.
-    """
+    """Draw locus.png and bounds.png; return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     chosen = LAWS[design.law]
     law = chosen.error(design.gains.lead)
@@ -123,7 +105,6 @@ TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
@@ -135,8 +116,8 @@ def add_parser(commands: Any) -> None:
         "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
         "--tune, find gains and write them.",
     )
-    add_vehicle(parser)
-    add_method(parser, LIVE)
+    shared.add_vehicle(parser)
+    shared.add_method(parser, LIVE)
     parser.add_argument(
         "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
     )
@@ -148,7 +129,7 @@ def add_parser(commands: Any) -> None:
             f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
         )
     parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
-    add_log_map(parser)
+    shared.add_log_map(parser)
     parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
     parser.add_argument(
         "--tune", type=Path, metavar="FILE", help="find gains and write them, for --design FILE"
@@ -163,7 +144,7 @@ def add_parser(commands: Any) -> None:
         "them), a leakage with a dead zone, or a projection in its place "
         f"({DEFAULT_KEEPING})",
     )
-    add_output(parser, None)
+    shared.add_output(parser, None)
     parser.set_defaults(run=run)
 
 
@@ -171,7 +152,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 0, or 1 where the design fails."""
     _require_sense(options)
     _require_drive(options)
-    vehicle = read_vehicle(options)
+    vehicle = shared.read_vehicle(options)
     name, method = _method(options, vehicle)
     if isinstance(method, PaperIdentifier):
         return _judge_gains(options, vehicle, method)
@@ -179,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
     driving = replace(natural_driving(vehicle), **_overrides(options))
     certificate = certify(method, vehicle, driving)
     if options.along is not None:
-        drive = read_log(options.along, vehicle, told_map(options), dt=method.dt)
+        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
         along = method.certify_along(identify(drive, vehicle, method))
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
@@ -212,10 +193,10 @@ def _require_drive(options: argparse.Namespace) -> None:
             raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
 
 
-def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
+def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
-        return chosen_method(options, vehicle, online=True)
+        return shared.chosen_method(options, vehicle, online=True)
     if options.design is not None:
         raise ValueError("--tune finds gains: give no --design FILE to judge with it")
     law = options.method or REFERENCE
@@ -227,7 +208,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
     margin = options.phase_margin or PHASE_MARGIN
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
     known = found.operation(vehicle, driving)
-    return Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
+    return shared.Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
 
 
 def _refuse_gains(options: argparse.Namespace, name: str) -> None:
@@ -244,11 +225,12 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     driving = _driving(options, design, vehicle)
     if options.design is None:
         design = replace(design, driving=driving)
-    certificate = certificate_of(design, vehicle, driving)
+    certificate = certify(design, vehicle, driving)
     drive = None
     if options.along is not None:
-        drive = read_log(options.along, vehicle, told_map(options), dt=design.dt)
-    _require_free(options)
+        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=design.dt)
+    if options.tune is not None:
+        require_free(options.tune, force=options.force)
     numbers = {
         "method": design.law,
         "conditions": asdict(driving),
@@ -268,7 +250,9 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
             _write_certificate(folder, text, numbers)
-            _draw(folder, vehicle, driving, design, certificate, drive)
+            learnt = drive or drives({"slalom": SLALOM})["slalom"]
+            operation = design.operation(vehicle, driving)
+            draw_check(folder, learnt, vehicle, design, operation, certificate)
         if options.tune is not None:
             write_atomically(options.tune, design_text(design))
     tell(json.dumps(numbers, indent=2) if options.json else text)
@@ -288,7 +272,7 @@ def _say_written(options: argparse.Namespace) -> None:
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    method_is_given(options)
+    shared.method_is_given(options)
     if options.tune is None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
@@ -378,7 +362,7 @@ def _proposal(
         better = with_keeping(better, known, DEFAULT_KEEPING)
     except DesignError as error:
         return f"no better gains at this bandwidth: {error}"
-    gains, verdict = better.gains, certificate_of(better, vehicle, driving).verdict
+    gains, verdict = better.gains, certify(better, vehicle, driving).verdict
     return (
         f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
         f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
@@ -394,23 +378,3 @@ def _given(options: argparse.Namespace) -> str:
     return "".join(
         f" --{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in given.items()
     )
-
-
-def _draw(
-    folder: Path,
-    vehicle: Vehicle,
-    driving: Driving,
-    design: PaperIdentifier,
-    certificate: Certificate,
-    drive: Recording | None,
-) -> None:
-    from tireid.commands.demo_story import drive_to_learn
-
-    recording = drive_to_learn() if drive is None else drive
-    operation = design.operation(vehicle, driving)
-    draw_check(folder, recording, vehicle, design, operation, certificate)
-
-
-def _require_free(options: argparse.Namespace) -> None:
-    if options.tune is not None:
-        require_free(options.tune, force=options.force)

@@ -15,28 +15,9 @@ from identifier.verdict import Verdict
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE
-from tireid.commands.compare_results import (
-    pair_tables,
-    remarks,
-    summary_rows,
-    summary_table,
-    write_comparison,
-)
+from tireid.commands import compare_results as results
+from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
-from tireid.commands.options import (
-    add_accept,
-    add_log_reading,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    exit_code,
-    network_model,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
-)
 from tireid.learning import identify
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
@@ -47,7 +28,6 @@ FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
         help=COMMANDS["compare"],
@@ -59,24 +39,24 @@ def add_parser(commands: Any) -> None:
         epilog=f"methods: {', '.join(methods())}",
     )
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
-    add_vehicle(parser)
+    shared.add_vehicle(parser)
     parser.add_argument(
         "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
     )
     parser.add_argument(
         "--method", nargs="+", action="extend", metavar="NAME", help="these only (all)"
     )
-    add_seed(parser, "sensor noise, and the weights of networks")
-    add_log_reading(parser)
-    add_network_arguments(parser, "compare with this network, which learns nothing")
-    add_accept(parser)
-    add_output(parser, "compare")
+    shared.add_seed(parser, "sensor noise, and the weights of networks")
+    shared.add_log_reading(parser)
+    shared.add_network_arguments(parser, "compare with this network, which learns nothing")
+    shared.add_accept(parser)
+    shared.add_output(parser, "compare")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what the default learns on a recording is not valid."""
-    seed, known = seed_of(options), methods()
+    seed, known = shared.seed_of(options), methods()
     names = list(dict.fromkeys(options.method or known))
     unknown = [name for name in names if name not in known]
     if unknown:
@@ -84,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
-    vehicle = read_vehicle(options)
+    vehicle = shared.read_vehicle(options)
     others = _network(options, vehicle)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with (
@@ -115,24 +95,24 @@ def run(options: argparse.Namespace) -> int:
         )
         work.begin("step times, tables and figures")
         verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}
-        figures = write_comparison(folder, comparison, verdicts)
-        rows = summary_rows(comparison)
+        figures = results.write_comparison(folder, comparison, verdicts)
+        rows = results.summary_rows(comparison)
         write_compare_report(
             folder,
             comparison,
             rows,
             figures,
             verdicts,
-            remarks=remarks(comparison),
+            remarks=results.remarks(comparison),
             command=options.words,
         )
-        told = [summary_table(comparison)]
+        told = [results.summary_table(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
-            told.append(pair_tables(comparison))
+            told.append(results.pair_tables(comparison))
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
-    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
+    return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
@@ -142,13 +122,15 @@ def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
     """Return the network of --network as a method by the name of its file."""
-    model = network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
+    model = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
     return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    told = told_map(options)
-    recordings = [read_log(log, vehicle, told, check=not options.no_check) for log in options.logs]
+    told = shared.told_map(options)
+    recordings = [
+        shared.read_log(log, vehicle, told, check=not options.no_check) for log in options.logs
+    ]
     if options.simulate or not options.logs:
         say(f"driving the plant of {vehicle.name} with noisy sensors")
         recordings += plant_recordings(vehicle, np.random.default_rng(seed))

@@ -12,8 +12,8 @@ Errors are {"front", "rear"} in N; null stands for what diverged or is not there
 """
 
 import csv
-import math
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,32 +21,22 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Shares, Trial, where_learnt_and_elsewhere
+from identifier.compare.course import Trial, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
 from identifier.reproducibility import AxleRmse
 from identifier.verdict import Verdict
 from tireid import __version__
-from tireid.figures import (
-    matrix_figure,
-    methods_figure,
-    save_figure,
-    side_slip_figure,
-)
+from tireid.figures.compare import matrix_figure, methods_figure
+from tireid.figures.side_slip import side_slip_figure
+from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
 
-# The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
-
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
-    """Return the means over recordings of every method, best on other recordings first.
-
-    Parameters
-    ----------
-    comparison : the methods; the first row is the header.
-    """
+    """Return the means over recordings of every method, best on other recordings first."""
     lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
@@ -117,8 +107,6 @@ def pair_tables(comparison: Comparison) -> str:
 def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
     """Return an error as percent of the rms force and in newtons, front / rear.
 
-    Parameters
-    ----------
     error : over it [N].
     """
     return _mean(comparison, [(name, error)])
@@ -127,8 +115,6 @@ def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
 def newton_text(value: float) -> str:
     """Return a force with three digits, more where it is above 1000 N.
 
-    Parameters
-    ----------
     value : [N].
     """
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
@@ -170,9 +156,6 @@ def write_comparison(
 ) -> dict[str, Figure]:
     """Write everything that was found out into a folder; return the figures by their file's name.
 
-    Parameters
-    ----------
-    folder : an empty folder.
     verdicts : on what the default learns, by recording.
     """
     numbers = comparison_numbers(comparison)
@@ -187,9 +170,7 @@ def write_comparison(
     if any(trial.side_slip for trial in comparison.trials.values()):
         told = {name: trial.side_slip for name, trial in comparison.trials.items()}
         figures["side_slip"] = side_slip_figure(comparison.course.recordings, told)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
@@ -200,7 +181,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             recording.name: {
                 "samples": len(recording),
                 "duration_s": recording.duration,
-                "rms_force_N": _axles(course.size(recording)),
+                "rms_force_N": asdict(course.size(recording)),
             }
             for recording in course.recordings
         },
@@ -217,12 +198,12 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
 def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     trial, timed = comparison.trials[name], name in comparison.step_times
     return {
-        "online_N": {recording: _axles(error) for recording, error in trial.online.items()},
+        "online_N": {recording: asdict(error) for recording, error in trial.online.items()},
         "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
         "diverged_at_s": dict(trial.diverged_at),
-        "percent": _percent(comparison.shares(name)),
+        "percent": comparison.shares(name)._asdict(),
         "side_slip": {
-            recording: {"rms_deg": _finite(one.rms), "within_two_sigma_percent": one.within}
+            recording: {"rms_deg": one.rms, "within_two_sigma_percent": one.within}
             for recording, one in trial.side_slip.items()
         },
         "step_s": comparison.step_times[name] if timed else None,
@@ -230,22 +211,9 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     }
 
 
-def _percent(found: Shares) -> dict[str, float | None]:
-    return {name: _finite(share) for name, share in found._asdict().items()}
-
-
-def _axles(error: AxleRmse) -> dict[str, float | None]:
-    return {"front": _finite(error.front), "rear": _finite(error.rear)}
-
-
-def _finite(error: float | None) -> float | None:
-    """Return an error; None where a law that diverged has an infinite one."""
-    return error if error is not None and math.isfinite(error) else None
-
-
-def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float | None]]]:
+def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
     return {
-        learnt: {name: _axles(error) for name, error in replays.items()}
+        learnt: {name: asdict(error) for name, error in replays.items()}
         for learnt, replays in frozen.items()
     }
 

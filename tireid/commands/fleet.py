@@ -12,13 +12,7 @@ from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.options import (
-    add_force,
-    add_jobs,
-    add_log_map,
-    jobs_of,
-    told_map,
-)
+from tireid.commands.options import add_force, add_jobs, add_log_map, jobs_of, told_map
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, COLUMNS, Merged, fleet_prior, merge, usable

@@ -14,18 +14,7 @@ from codegen.escape import mathtext
 from identifier.compare.course import where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.reproducibility import AxleRmse
-from tireid.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PAGE,
-    legend_above,
-    new_figure,
-    styled,
-)
-
-# Labels and scales that the figures of a comparison share.
+from tireid.figures import style
 
 TICKS = ((1, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 1.5, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,))
 MOST = 6  # ticks of an axis
@@ -48,11 +37,7 @@ def method_label(name: str) -> str:
 def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from low to high, at most to FARTHEST, with ticks in percent.
 
-    Parameters
-    ----------
-    which : "x" or "y".
-    low : smallest value shown [%].
-    high : largest value shown [%].
+    low : smallest value shown [%].   high : largest value shown [%].
     """
     axis = axes.xaxis if which == "x" else axes.yaxis
     limits = low / 1.2, min(high, FARTHEST) * 1.2
@@ -73,21 +58,20 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 ONLINE, OWN, OTHER = "online", "frozen, where learnt", "frozen, other recordings"
-KINDS = {ONLINE: (BLUE, "o", -0.22), OWN: (GREEN, "D", 0.0), OTHER: (ORANGE, "s", 0.22)}
+KINDS = {
+    ONLINE: (style.BLUE, "o", -0.22),
+    OWN: (style.GREEN, "D", 0.0),
+    OTHER: (style.ORANGE, "s", 0.22),
+}
 ROW = 0.3  # height of a method [in]
 
 
-@styled
+@style.styled
 def methods_figure(comparison: Comparison) -> Figure:
-    """Draw a row for each method: means over recordings, lines from the best to the worst.
-
-    Parameters
-    ----------
-    comparison : the methods.
-    """
+    """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
-    figure = new_figure(PAGE, 0.9 + ROW * len(rows))
+    figure = style.new_figure(style.PAGE, 0.9 + ROW * len(rows))
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
@@ -99,7 +83,7 @@ def methods_figure(comparison: Comparison) -> Figure:
                 0.995,
                 position,
                 "diverged",
-                color=GREY,
+                color=style.GREY,
                 ha="right",
                 va="center",
                 transform=axes.get_yaxis_transform(),
@@ -110,7 +94,7 @@ def methods_figure(comparison: Comparison) -> Figure:
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
@@ -157,19 +141,9 @@ DARK = 0.55  # share of the color scale from which text is white
 LONGEST = 17  # letters of a recording's name beside a map
 
 
-@styled
+@style.styled
 def matrix_figure(comparison: Comparison) -> Figure:
-    """Draw the frozen error of each method, rows learnt on, columns replayed on.
-
-    Parameters
-    ----------
-    comparison : the methods; signal estimators have no map.
-
-    Raises
-    ------
-    ValueError
-        Where no method can be frozen.
-    """
+    """Draw the frozen error of each method, rows learnt on, columns replayed on."""
     maps = {
         method_label(name): frozen
         for name in ranking(comparison)
@@ -180,8 +154,8 @@ def matrix_figure(comparison: Comparison) -> Figure:
     size = len(comparison.names)
     columns = min(len(maps), 4 if size <= 4 else 2)
     rows = math.ceil(len(maps) / columns)
-    cell = (PAGE - 1.6) / columns / size
-    figure = new_figure(PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
+    cell = (style.PAGE - 1.6) / columns / size
+    figure = style.new_figure(style.PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
     grid = figure.subplots(rows, columns, squeeze=False)
     norm, colors = LogNorm(BEST, WORST), colormaps["viridis_r"]
     for axes, (label, frozen) in zip(grid.flat, maps.items(), strict=False):

@@ -10,7 +10,7 @@ from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import freeze_key
 from identifier.verdict import Verdict
 from tireid.report import Block, Headline, Report, Section, Table, write_report
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import REPORT, drawings, origin
 from tireid.verdicts import verdict_warnings, verdicts_headline
 
 
@@ -26,8 +26,6 @@ def write_compare_report(
 ) -> None:
     """Write the report of a comparison.
 
-    Parameters
-    ----------
     verdicts : on what the default learns, by recording.
     """
     course = comparison.course
@@ -44,11 +42,7 @@ def write_compare_report(
             rows=rows[1:],
         )
     ]
-    blocks += [
-        drawing(figures[name], text, READ[name])
-        for name, text in captions.items()
-        if name in figures
-    ]
+    blocks += drawings(figures, captions)
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Every method learns on each recording, is frozen at its end and asked about all "

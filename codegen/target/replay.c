@@ -1,19 +1,7 @@
-/* Runs a recording through the package and prints a hash of all that came out, and what it cost. */
-#include "tireid.h"
+/* Takes what `replayed.h` of a package gives through the package; prints a hash of all that came out,
+ * and what it cost. */
 #include "machine.h"
-
-#define SPOT 16U /* the stack is looked at each so many steps */
-
-#define INPUTS (sizeof(tireid_input) / sizeof(tireid_real))
-
-typedef struct {
-    double value[INPUTS];
-} sample;
-
-extern const sample recorded_samples[];
-extern const sample recorded_end[];
-
-static tireid_state state; /* in .bss: bytes between its members are zero everywhere */
+#include "replayed.h"
 
 static uint64_t hash_bytes(uint64_t hash, const void *start, uint32_t size)
 {
@@ -40,35 +28,23 @@ static void print(const char *key, uint64_t number)
     machine_print(text);
 }
 
-/* A sample in the precision of the package. */
-static tireid_input input_of(const sample *at)
+/* Instructions between two readings of a counter that wraps. */
+static uint32_t since(uint32_t before, uint32_t after)
 {
-    union {
-        tireid_real number[INPUTS];
-        tireid_input input;
-    } both;
-    uint32_t i;
-    for (i = 0U; i < INPUTS; i++) {
-        both.number[i] = (tireid_real)at->value[i];
-    }
-    return both.input;
+    return (after >= before) ? (after - before) : ((after + (0x1000000U * 40U)) - before);
 }
 
 int main(void)
 {
-    tireid_params params;
     uint64_t hash = 14695981039346656037U;
     uint64_t total = 0U;
     uint32_t most = 0U;
     uint32_t steps = 0U;
-    uint32_t driven = 0U;
+    uint32_t counted = 0U;
     uint32_t stack = 0U;
-    const sample *at;
-    (void)tireid_default_params(&params);
-    (void)tireid_init(&state);
+    replayed_begin();
     machine_start_clock();
-    for (at = recorded_samples; at != recorded_end; at++) {
-        const tireid_input input = input_of(at);
+    while (replayed_next(steps) != 0) {
         uint32_t code; /* an enum has not the same size everywhere */
         uint32_t before;
         uint32_t spent;
@@ -76,16 +52,15 @@ int main(void)
             machine_paint_stack();
         }
         before = machine_instructions();
-        code = (uint32_t)tireid_step(&state, &params, &input);
-        spent = machine_instructions() - before;
-        spent = (spent > 0x80000000U) ? 0U : spent; /* the counter wrapped */
+        code = replayed_step();
+        spent = since(before, machine_instructions());
         if ((steps % SPOT) == 0U) {
             const uint32_t used = machine_painted_stack_used();
             stack = (used > stack) ? used : stack;
         }
-        if (code == (uint32_t)TIREID_OK) {
+        if (code <= COUNTS) {
             total += spent;
-            driven++;
+            counted++;
         }
         most = (spent > most) ? spent : most;
         steps++;
@@ -95,10 +70,11 @@ int main(void)
     print("hash", hash);
     print("stack", stack);
     print("steps", steps);
-    print("instructions", (driven > 0U) ? (total / driven) : 0U);
+    print("instructions", (counted > 0U) ? (total / counted) : 0U);
     print("most_instructions", most);
     print("state", (uint64_t)sizeof state);
     print("params", (uint64_t)sizeof params);
-    print("faults", state.faults);
+    print("work", WORK);
+    print("faults", FAULTS);
     return 0;
 }

@@ -1,39 +1,37 @@
-"""The carried-over tire against the package's own functions, and what moves a car."""
+"""The carried-over car against the package's own functions, and the repair of its equations."""
 
-import importlib.util
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from models.friction import Friction, FrictionChange
-from models.vehicle import sedan
-from mpc.cars.bmw_equations import axle_force
-from mpc.cars.commonroad import friction_at
+pytest.importorskip("vehiclemodels", reason="needs commonroad-vehicle-models")
 
-needs_package = pytest.mark.skipif(
-    importlib.util.find_spec("vehiclemodels") is None,
-    reason="needs commonroad-vehicle-models",
+from vehiclemodels import vehicle_dynamics_mb as program
+from vehiclemodels.utils import tire_model
+
+from benchmarks.commonroad_bmw import CommonRoadTire, bmw_parameters, bmw_tire
+from benchmarks.commonroad_multibody import (
+    V_X,
+    V_Y,
+    V_Y_FRONT,
+    V_Y_REAR,
+    YAW_RATE,
+    MultiBody,
+    SlipAtTheAxles,
 )
 
 
 def random_coefficients(rng):
     """The tire of the package with every coefficient awake."""
-    from mpc.cars.bmw import bmw_tire
-
     return {
         name: value * rng.uniform(0.8, 1.2) + (0.02 * rng.normal() if abs(value) < 0.05 else 0.0)
         for name, value in bmw_tire().items()
     }
 
 
-@needs_package
 @pytest.mark.parametrize("case", range(8))
 def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
-    from vehiclemodels.utils import tire_model
-
-    from mpc.cars.bmw import CommonRoadTire
-
     rng = np.random.default_rng(case)
     coefficients = random_coefficients(rng)
     tire, p = CommonRoadTire(p=tuple(coefficients.items())), SimpleNamespace(**coefficients)
@@ -51,10 +49,7 @@ def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
         np.testing.assert_allclose((float(ours.F_x), float(ours.F_y)), expected, rtol=2e-3)
 
 
-@needs_package
 def test_its_stiffnesses_are_its_slopes_at_zero():
-    from mpc.cars.bmw import CommonRoadTire
-
     tire, h = CommonRoadTire.read(), 1e-5
     for F_z in (2000.0, 5000.0):
         ahead, back = (tire.forces(s, 0.0, 0.0, F_z).F_y for s in (h, -h))
@@ -63,48 +58,22 @@ def test_its_stiffnesses_are_its_slopes_at_zero():
         assert tire.slip_stiffness(F_z) == pytest.approx(float(ahead - back) / 2 / h, rel=0.01)
 
 
-@needs_package
 def test_the_repair_moves_unsprung_mass_until_both_axles_balance():
-    from mpc.cars.bmw import bmw_parameters
-
     plain, repaired = bmw_parameters(), bmw_parameters(repaired=True)
     assert repaired.m_uf + repaired.m_ur == pytest.approx(plain.m_uf + plain.m_ur)
     assert repaired.m_uf * repaired.a == pytest.approx(repaired.m_ur * repaired.b)
     assert repaired.m_uf - plain.m_uf == pytest.approx(6.6, abs=0.1)
 
 
-@needs_package
 def test_friction_scales_both_directions_of_a_parameter_set():
-    from mpc.cars.bmw import bmw_parameters, bmw_tire
-
     slippery, tire = bmw_parameters(0.4).tire, bmw_tire()
     assert slippery.p_dx1 == pytest.approx(0.4 * tire["p_dx1"])
     assert slippery.p_dy1 == pytest.approx(0.4 * tire["p_dy1"])
     assert tire == bmw_tire(), "the package's own set is not changed"
 
 
-@pytest.mark.parametrize(("a_y", "r_dot"), [(3.0, 0.0), (0.0, 2.0), (-4.0, 1.5)])
-def test_axle_forces_are_those_that_move_the_car_by_newton_and_euler(a_y, r_dot):
-    car = sedan()
-    front, rear = axle_force(car, a_y, r_dot)
-    assert front + rear == pytest.approx(car.mass * a_y, abs=1e-9)
-    assert car.l_f * front - car.l_r * rear == pytest.approx(car.yaw_inertia * r_dot, abs=1e-9)
-
-
-def test_the_friction_under_a_car_is_that_of_its_time_or_place():
-    in_time = Friction(scale=0.9, changes=(FrictionChange(scale=0.4, at_time=5.0),))
-    assert friction_at(in_time, 4.0, 1e3) == pytest.approx(0.9)
-    assert friction_at(in_time, 8.0, 0.0) == pytest.approx(0.4)
-    in_place = Friction(scale=0.9, changes=(FrictionChange(scale=0.4, at_place=50.0),))
-    assert friction_at(in_place, 99.0, 20.0) == pytest.approx(0.9)
-    assert friction_at(in_place, 0.0, 80.0) == pytest.approx(0.4)
-
-
-@needs_package
 def test_a_tire_slips_by_the_velocity_of_its_axle():
     """Front pair, then rear pair: each is told what its axle moves sideways beside the body."""
-    from mpc.cars.bmw_equations import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE, SlipAtTheAxles
-
     told = SimpleNamespace(
         formula_longitudinal=lambda kappa: kappa,
         formula_lateral=lambda alpha: alpha,
@@ -122,19 +91,13 @@ def test_a_tire_slips_by_the_velocity_of_its_axle():
     assert tires.formula_longitudinal(0.2) == 0.2
 
 
-@needs_package
 def test_their_program_stays_as_it_is():
     """Once repaired, once not: the tires that others find in the package are the published ones."""
-    from vehiclemodels import vehicle_dynamics_mb as program
-    from vehiclemodels.utils import tire_model
-
-    from mpc.cars.bmw import bmw, bmw_parameters
-    from mpc.cars.bmw_equations import V_Y_FRONT, MultiBody
 
     before, tires, parameters = dict(vars(tire_model)), program.tireModel, bmw_parameters()
     found = []
     for repaired in (False, True, False):
-        equations = MultiBody(bmw(), repaired=repaired)
+        equations = MultiBody(repaired=repaired)
         x = equations.start([0.0, 0.0, 0.02, 20.0, 0.0, 0.1, 0.01], parameters)
         x[V_Y_FRONT] += 0.05
         found.append(equations.derivative(x, 0.0, 0.0, parameters))

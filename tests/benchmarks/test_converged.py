@@ -8,8 +8,8 @@ interior point there.
 import numpy as np
 import pytest
 
+from benchmarks.converged import NotConvergedError, build_errors, iterated, numbers, solve_converged
 from models.vehicle import sedan
-from mpc.converged import NotConvergedError, build_errors, numbers, solve_converged
 from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
 from mpc.realtime import Status, Tracker
@@ -74,7 +74,7 @@ def test_iterated_to_the_end_the_tracker_finds_what_ipopt_finds(tire, tracker, c
     kappa, v_x = road(*CASES[case][1:])
     x0 = start_of(tire, case)
     best = solve_converged(tire, PROBLEM, x0, kappa, v_x)
-    found = tracker.solve_converged(x0, kappa, v_x)
+    found = iterated(tracker, x0, kappa, v_x)
     assert found.status == Status.OK
     ours = cost_of(tire, found.plan_x, found.plan_u, kappa, v_x)
     assert ours == pytest.approx(best.cost, rel=1e-6)
@@ -86,7 +86,7 @@ def test_iterated_to_the_end_the_tracker_finds_what_ipopt_finds(tire, tracker, c
 @pytest.mark.parametrize("case", CASES)
 def test_the_plan_obeys_motion_and_hard_limits(tire, tracker, case):
     kappa, v_x = road(*CASES[case][1:])
-    plan = tracker.solve_converged(start_of(tire, case), kappa, v_x)
+    plan = iterated(tracker, start_of(tire, case), kappa, v_x)
     step = build_rk4(tire.structure)
     for k in range(PROBLEM.horizon):
         there = step(
@@ -107,7 +107,7 @@ def test_the_plan_obeys_motion_and_hard_limits(tire, tracker, case):
 def test_the_cases_press_against_what_they_say(tire, tracker):
     plans = {}
     for case, (_, *given) in CASES.items():
-        plans[case] = tracker.solve_converged(start_of(tire, case), *road(*given))
+        plans[case] = iterated(tracker, start_of(tire, case), *road(*given))
     limits = PROBLEM.limits
     free, rate, angle = plans.values()
     assert np.abs(free.plan_u).max() < 0.9 * limits.steering_rate

@@ -1,8 +1,10 @@
-"""The tracker's problem solved to convergence by IPOPT: slow, and right. The oracle of the tests.
+"""The tracker's problem solved to convergence by IPOPT: slow, and right.
 
-Multiple shooting with the exact cost and `build_rk4`; soft limits by slack variables.
+Multiple shooting with the exact cost and `build_rk4`; soft limits by slack variables. Beside it the
+tracker's own solver on a state of the prediction, once and iterated.
 """
 
+import time
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -11,15 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
-from codegen.errors import TireidError
 from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
+from mpc.realtime import Command, Status, Tracker
 from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
 
+STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged
 N_SOFT = 3  # e_y, slip in front, slip at the rear
 
 
-class NotConvergedError(TireidError, RuntimeError):
+class NotConvergedError(RuntimeError):
     """IPOPT did not find a solution; the message holds what it said."""
 
 
@@ -171,3 +174,40 @@ def solve_converged(
         float(answer["f"]),
         int(said["iter_count"]),
     )
+
+
+# The tracker's solver, from a state: x0 (n_x,), curvature [1/m] and speed [m/s] of the stages (N,).
+
+
+def solve(tracker: Tracker, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> Command:
+    """Take one iteration from the plan as it is; the steering is that behind the first stage."""
+    instance = tracker.instance
+    instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+    instance.start[:] = x0
+    start = time.perf_counter()
+    status = instance.solve()
+    return instance.command(float(instance.state["x"][1, 4]), status, time.perf_counter() - start)
+
+
+def prepare_solution(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> float:
+    """Do ahead of `solve` what does not ask for its state, along the plan as it is; return [s]."""
+    instance = tracker.instance
+    instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+    start = time.perf_counter()
+    instance.prepare_from(instance.state["x"][0])
+    return time.perf_counter() - start
+
+
+def iterated(
+    tracker: Tracker, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike, *, most: int = 100
+) -> Command:
+    """Iterate from a guess until the plan stays; its status is that of the last iteration."""
+    instance = tracker.instance
+    instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+    instance.guess(x0)
+    for _ in range(most):
+        before = instance.state["u"].copy()
+        command = solve(tracker, x0, kappa, v_x)
+        if np.abs(instance.state["u"] - before).max() <= STAYS:
+            return command
+    return command._replace(status=int(Status.ITERATION_LIMIT))

@@ -1,51 +1,18 @@
 """The BMW 320i of commonroad-vehicle-models: parameters, tire, and the car in our words."""
 
 import copy
-import importlib
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import casadi as ca
+from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 
-from codegen.errors import TireidError
-from models.extras import needs
 from models.tires import TireForces
 from models.vehicle import GRAVITY, Chassis, Vehicle
 
-# The package commonroad-vehicle-models, which not everybody has installed.
-
-
-class MissingCommonRoadError(TireidError, ImportError):
-    """The package is not installed; the message says how to install it."""
-
-
-def require_commonroad() -> None:
-    """Refuse to go on without the package.
-
-    Raises
-    ------
-    MissingCommonRoadError
-        Where it is not installed.
-    """
-    try:
-        importlib.import_module("vehiclemodels.parameters_vehicle2")
-    except ImportError:
-        raise MissingCommonRoadError(
-            needs("a CommonRoad car", "commonroad-vehicle-models", "commonroad")
-        ) from None
-
 
 def bmw_320i() -> Any:
-    """Return a copy of the parameters of their BMW 320i.
-
-    Raises
-    ------
-    MissingCommonRoadError
-        Where the package is not installed.
-    """
-    require_commonroad()
-    from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
-
+    """Return a copy of the parameters of their BMW 320i."""
     return copy.deepcopy(parameters_vehicle2())
 
 

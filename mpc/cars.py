@@ -1,4 +1,4 @@
-"""What every car that can be driven has in common: a state, and a step of one control period."""
+"""Cars to drive that are not the prediction model: a state, and a step of one control period."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -12,34 +12,30 @@ from models.vehicle import Vehicle
 
 
 class CarState(NamedTuple):
-    """The truth about a car at one instant, SI, ISO axes; nothing changes it."""
+    """The truth about a car at one instant, SI, ISO axes; nothing changes it.
+
+    t : since the start [s].   X, Y : position of the center of gravity [m].   psi : heading, not
+    wrapped [rad].   v_x, v_y : velocity of the center of gravity along the body and to the left
+    [m/s].   r : yaw rate [rad/s].   delta : actual angle of the front road wheels [rad].
+    a_x, a_y : acceleration of the center of gravity, a_y = dv_y/dt + v_x r [m/s^2].
+    roll : angle of the body against the road, positive where its right side dips [rad].
+    axle_force : side force of the front and the rear axle, frame of the body, (2,) [N].
+    inner : what only the car itself reads.
+    """
 
     t: float
-    """Time since the start [s]."""
     X: float
-    """Position of the center of gravity [m]."""
     Y: float
-    """Position of the center of gravity [m]."""
     psi: float
-    """Heading, not wrapped [rad]."""
     v_x: float
-    """Velocity of the center of gravity along the body [m/s]."""
     v_y: float
-    """Velocity of the center of gravity to the left [m/s]."""
     r: float
-    """Yaw rate [rad/s]."""
     delta: float
-    """Actual angle of the front road wheels [rad]."""
     a_x: float
-    """Acceleration of the center of gravity along the body [m/s^2]."""
     a_y: float
-    """Acceleration of the center of gravity to the left, dv_y/dt + v_x r [m/s^2]."""
     roll: float
-    """Angle of the body against the road, positive where its right side dips [rad]."""
     axle_force: Array
-    """Side force of the front and the rear axle, frame of the body, (2,) [N]."""
     inner: Any
-    """What only the car itself reads."""
 
 
 class Car(Protocol):
@@ -68,29 +64,15 @@ class Car(Protocol):
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
         """Return the car rolling straight ahead.
 
-        Parameters
-        ----------
-        v_x : speed [m/s].
-        X, Y : position of the center of gravity [m].
-        psi : heading [rad].
+        v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
         """
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.
 
-        Parameters
-        ----------
-        command : angle asked of the front road wheels [rad].
-        v_ref : wanted speed [m/s].
-
-        Raises
-        ------
-        ArithmeticError
-            When the car left the range of its equations.
+        command : angle asked of the front road wheels [rad].   v_ref : wanted speed [m/s].
         """
 
-
-# The double-track plant as a car to drive: roll, load transfer, relaxation, lagged steering.
 
 HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 
@@ -131,30 +113,12 @@ class DoubleTrackCar:
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
-        """Return the car one period later.
-
-        Raises
-        ------
-        PlantError
-            When a state stops being a finite number.
-        """
+        """Return the car one period later."""
         return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
     def _state(self, plant: PlantState) -> CarState:
         v_x, v_y, r, roll, _, X, Y, psi = (float(value) for value in plant.x[:8])
         a_x, a_y = (float(value) for value in plant.acceleration)
-        return CarState(
-            t=plant.steps * self._plant.dt,
-            X=X,
-            Y=Y,
-            psi=psi,
-            v_x=v_x,
-            v_y=v_y,
-            r=r,
-            delta=float(plant.x[12]),
-            a_x=a_x,
-            a_y=a_y,
-            roll=roll,
-            axle_force=plant.axle_force,
-            inner=plant,
-        )
+        t, delta = plant.steps * self._plant.dt, float(plant.x[12])
+        force = plant.axle_force
+        return CarState(t, X, Y, psi, v_x, v_y, r, delta, a_x, a_y, roll, force, plant)
