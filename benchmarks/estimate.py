@@ -2,7 +2,8 @@
 
     python -m benchmarks.estimate [--only PART ...] [--methods NAME ...] [--record]
 
-By the road of a user: `ti.identify`, `freeze`, `ti.replay`. The error is that of both axles in
+By the road of a user: `ti.identify`, `freeze`, `ti.replay`; rivals are all methods of `compare`
+but the paper's laws. The error is that of both axles in
 percent of their rms force; where a drive has no measured force, against what its motion shows
 (inverse single-track forces). Places: random cars of four classes with good sensors, of whose
 drives a full one, a gentle one and a single step teach; CarMaker, either run of what the other
@@ -43,6 +44,11 @@ from models.plant import PlantError
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
+ASKED = tuple(  # the paper's laws are not: `learn_and_extrapolate` has them, at 60 % elsewhere
+    name
+    for name in METHODS
+    if name not in ("integral", "instantaneous", "instantaneous_scaled", "pi_lead")
+)
 CARS = 6  # of each class
 GENTLE = 0.3  # of the steering that reaches the limit
 STEPS = (0.5, 0.35, 0.2, 0.1)  # of it, the first that the car survives
@@ -544,7 +550,7 @@ def main() -> int:
     targets, record = Targets("estimate"), keeps()
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, metavar="PART")
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, metavar="NAME")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=ASKED, metavar="NAME")
     told = parser.parse_args()
     if not DATA.is_dir():
         print(f"skipped recorded cars: the recordings are not there: {DATA} (set TIREID_DATA)")
@@ -565,7 +571,7 @@ def main() -> int:
         judge_bands(targets)
     if "cost" in told.only:
         judge_cost(targets)
-    whole = tuple(told.only) == PARTS and len(told.methods) == len(METHODS)
+    whole = tuple(told.only) == PARTS and set(ASKED) <= set(told.methods)
     return targets.finish(keep=record and whole)
 
 
