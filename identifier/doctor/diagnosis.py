@@ -125,6 +125,9 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
             found += _contradictions(*mended.apply(recording, vehicle))
         except (RecordingError, VehicleError) as error:
             blind = str(error)
+    elif any(one.code == "straight" for one in found):  # by a yaw rate that may be the fault
+        broken = _contradictions(recording, vehicle)
+        found = [one for one in found if one.code != "straight" or not broken] + broken
     sizes = doubted(fine.findings, found)
     ranked = sorted([*found, *sizes], key=lambda one: not one.matters)
     return Diagnosis(

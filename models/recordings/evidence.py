@@ -20,6 +20,7 @@ SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars to
 TURNS = 0.2  # of what a channel reaches, beyond which the car turns
 ALIKE, BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
 LEAST = 0.1  # [m/s^2], rms, below which nothing turns
+LONGEST = 8.0  # [m], wheelbase by which steering says how much it turns at least
 TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
@@ -283,17 +284,15 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     if not keep.any():
         return None
     together = pair(r[keep], kinematic[keep])
-    moving = max(float(np.sqrt(np.mean((w.v_x * r) ** 2))), _rms_of(w.a_y))
+    felt = 0.0 if w.a_y is None else float(np.std(w.a_y))
+    turned, steered = (float(np.sqrt(np.mean((w.v_x * one) ** 2))) for one in (r, kinematic))
+    moving = max(turned, felt, steered / LONGEST)
     if together.sign == 0 or moving < LEAST:
         return None
     r, kinematic = r[keep], kinematic[keep]
     some = turning(r, kinematic)
     x, y = (_less_offset(one, some) for one in (r, kinematic))
     return Steering(float(np.sqrt((y @ y) / (x @ x))), together.correlation)
-
-
-def _rms_of(a: Array | None) -> float:
-    return 0.0 if a is None else float(np.std(a))
 
 
 def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:
