@@ -74,7 +74,7 @@ def told_by(signals: Iterable[str]) -> set[str]:
 def quantity_of(name: str, unit: str) -> str:
     """Return what a signal is; of wheels a speed or a rate, as the unit has it."""
     turns = [one for one in quantities(unit) if one in (RATE, TURNS)]
-    return turns[0] if name in WHEELS and turns else QUANTITIES[name]
+    return turns[-1] if name in WHEELS and turns else QUANTITIES[name]
 
 
 def signal_name(name: str) -> str | None:

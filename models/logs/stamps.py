@@ -20,17 +20,11 @@ from codegen.arrays import Array, blocks, filled
 from models.logs.growing import LONGEST_IN_MEMORY
 from models.logs.log import Clock, RecordingError
 from models.logs.spelling import unit_in_name
-from models.logs.units import PER_SECOND, time_unit
+from models.logs.units import PER_SECOND, TABLES, time_unit
 
 MISSING = -(2**63)  # an instant that is not there, in ns
 DAY = 86400.0
-NAMES = (
-    "t", "time", "timestamp", "timestamps", "times", "zeit", "sec", "secs", "second", "seconds",
-    "elapsed", "elapsedtime", "sessiontime", "logtime", "systime", "epoch", "unixtime",
-    "unixepoch", "datetime", "stamp", "utc", "utctime", "timeutc", "gpstime", "timeofday",
-    "tod", "relativetime", "reltime", "testtime", "simtime", "rostime", "headerstamp",
-    "zeitstempel", "temps", "tiempo",
-)  # fmt: skip
+NAMES: tuple[str, ...] = tuple(TABLES["clock"]["names"].split())
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 CALENDAR = 1e8  # [s]: times above count from 1970
