@@ -17,7 +17,7 @@ from models.logs.magic import GZIP, HEAD, format_of
 TEXTS = (".csv", ".txt", ".dat", ".asc", ".tsv", ".vbo", ".log")  # which gzip may pack
 ENDINGS = (
     *TEXTS, *(ending + ".gz" for ending in TEXTS), ".parquet", ".mat", ".h5", ".hdf5", ".mf4",
-    ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc",
+    ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".npz", ".npy",
 )  # fmt: skip
 OPENERS = {
     "parquet": "models.logs.parquet:open_parquet",
@@ -27,9 +27,18 @@ OPENERS = {
     "can": "models.logs.can:open_",
     "text": "models.logs.text:open_text",
 }
+RATED = ("text", "parquet", "matlab")  # which may lack a time
 
 
-def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = False) -> LogFile:
+def open_log(
+    path: str | Path,
+    dbc: str | Path | None = None,
+    *,
+    mend: bool = False,
+    clock: str = "",
+    clock_unit: str = "",
+    rate: float = 0.0,
+) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
 
     Parameters
@@ -37,6 +46,8 @@ def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = Fa
     path : of a file; of a folder, where a format keeps a log in one.
     dbc : of the file that tells the signals in the frames of a CAN bus.
     mend : whether stamps that do not rise are mended, and not refused.
+    clock, clock_unit : channel that is the time, where it is not what the format takes for it.
+    rate : of the samples [Hz], where no channel is a time; 0 where none is told.
     """
     path = Path(path)
     if not path.exists():
@@ -47,14 +58,19 @@ def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = Fa
         format = format_of(path, _unpacked(head) if packed else head)
         if path.is_dir() and format == "text":
             raise RecordingError(f"{path}: there is no such file, it is a folder")
-        told = () if dbc is None else (Path(dbc),)
+        told: tuple[Any, ...] = () if dbc is None else (Path(dbc),)
         if packed and (told or format != "text"):
             raise RecordingError(
                 f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
             )
-        module, _, function = OPENERS["can" if told else format].partition(":")
+        format = "can" if told else format
+        if rate and format not in RATED:
+            raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
+        module, _, function = OPENERS[format].partition(":")
+        told += (rate,) * (format == "matlab")
         opened: Any = getattr(import_module(module), function)(path, *told)
-        log: LogFile = replace(opened, mend=mend)
+        more = {"rate": rate} if format in ("text", "parquet") else {}
+        log: LogFile = replace(opened, mend=mend, clock_name=clock, clock_unit=clock_unit, **more)
         return log
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None

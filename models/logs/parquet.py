@@ -62,6 +62,7 @@ class ParquetTable:
 
     format = "Parquet"
     place = "row"
+    rate = 0.0
 
     @cached_property
     def names(self) -> tuple[str, ...]:

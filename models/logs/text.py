@@ -92,6 +92,11 @@ class TextTable:
         return self.layout.words
 
     @property
+    def rate(self) -> float:
+        """Samples per second by the lines above the table [Hz], 0 where they tell none."""
+        return self.layout.rate
+
+    @property
     def numeric(self) -> tuple[bool, ...]:
         """Which columns hold numbers, by the first rows."""
         return self.layout.numeric

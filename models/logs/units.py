@@ -25,7 +25,10 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
 }
 OTHERS = {name: tuple(some.split()) for name, some in TABLES["others"].items()}
 NO_UNIT = ("", *OTHERS.pop("none"))
-PER_SECOND = {unit: round(1.0 / factor, 9) for unit, factor in FACTORS[TIME].items()}
+PER_SECOND = {  # exact
+    unit: 1.0 / factor if factor > 1.0 else float(round(1.0 / factor))
+    for unit, factor in FACTORS[TIME].items()
+}
 _SPELLED = {word: unit for unit, some in TABLES["spellings"].items() for word in some.split()}
 _WORD = re.compile(
     "(?<![a-z'])(?:" + "|".join(sorted(_SPELLED, key=len, reverse=True)) + ")(?![a-z'])"

@@ -12,7 +12,6 @@ import numpy as np
 from codegen.escape import visible
 from models.files import write_atomically
 from models.logs.clock import holes
-from models.logs.door import open_log
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, told_by
@@ -34,7 +33,7 @@ from models.recordings.choice import (
     standard_signals,
     with_wheels,
 )
-from models.recordings.map import CUT, MEND
+from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, told_map
@@ -72,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         if options.write.suffix.lower() != ".toml":
             raise ValueError(f"{options.write}: the name must end in .toml")
         require_free(options.write, force=options.force)
-    log = open_log(path, told.dbc or None, mend=told.order == MEND)
+    log = told.opened(path)
     chosen = _run_of(log, options.run_name or named or told.run)
     listed = log.listed()
     names = [one.name for one in listed]
