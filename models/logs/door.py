@@ -10,8 +10,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from models.logs.joined import open_folder
 from models.logs.log import LogFile, RecordingError
 from models.logs.magic import GZIP, HEAD, format_of
+from models.logs.table import TableLog
 
 # Endings of names that logs have; "LOG:RUN" is split after one, and a recording's name lacks it.
 TEXTS = (".csv", ".txt", ".dat", ".asc", ".tsv", ".vbo", ".log")  # which gzip may pack
@@ -56,24 +58,42 @@ def open_log(
         head = _head(path)
         packed = head.startswith(GZIP)
         format = format_of(path, _unpacked(head) if packed else head)
-        if path.is_dir() and format == "text":
-            raise RecordingError(f"{path}: there is no such file, it is a folder")
         told: tuple[Any, ...] = () if dbc is None else (Path(dbc),)
         if packed and (told or format != "text"):
             raise RecordingError(
                 f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
             )
+        if format == "folder":
+            inside: dict[Path, LogFile | RecordingError] = {}
+            for one in sorted(path.iterdir()):
+                if one.is_file() and one.name.lower().endswith(ENDINGS):
+                    inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
+            return open_folder(path, inside)
         format = "can" if told else format
         if rate and format not in RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
         module, _, function = OPENERS[format].partition(":")
         told += (rate,) * (format == "matlab")
         opened: Any = getattr(import_module(module), function)(path, *told)
-        more = {"rate": rate} if format in ("text", "parquet") else {}
+        more = {"rate": rate} if isinstance(opened, TableLog) else {}
         log: LogFile = replace(opened, mend=mend, clock_name=clock, clock_unit=clock_unit, **more)
         return log
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _of_folder(
+    path: Path, mend: bool, clock: str, clock_unit: str, rate: float
+) -> LogFile | RecordingError:
+    """Return a log of a folder, of which the clock may be that of another, or why it is none."""
+    try:
+        log = open_log(path, mend=mend)
+        if isinstance(log, TableLog) and (clock in log.names or rate):
+            log = replace(log, clock_name=clock, clock_unit=clock_unit, rate=rate)
+        log.listed()
+        return log
+    except RecordingError as error:
+        return error
 
 
 def _head(path: Path) -> bytes:

@@ -59,14 +59,14 @@ def frames_in(head: bytes) -> str:
 
 
 def format_of(path: Path, head: bytes) -> str:
-    """Return the reader of a file or folder: "parquet", "mdf", "matlab", "bag", "can" or "text".
+    """Return the reader of a file or folder, as `door.OPENERS` has it, or "folder".
 
     Parameters
     ----------
     head : its first bytes, unpacked; none of a folder.
     """
     if path.is_dir():
-        return "bag" if (path / BAG_METADATA).is_file() else "text"
+        return "bag" if (path / BAG_METADATA).is_file() else "folder"
     if head.startswith(PARQUET) or path.suffix.lower() == ".parquet":
         return "parquet"
     if head.startswith(MDF):

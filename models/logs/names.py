@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from models.logs.axes import Triad, along_axes, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import (
     BETA,
@@ -58,6 +59,7 @@ LOOKED_AT = 20_000  # samples at most, in telling contents apart
 SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is told, "" SI.
 UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
+OBLIQUE = "its box lies oblique: no axis of it is one of the car"
 SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
@@ -85,8 +87,8 @@ def _spelled(text: str, apart: str = "|") -> str:
     return text
 
 
-REFERENCE, CORNERS, SOURCES, FILTERED = (
-    frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered")
+REFERENCE, CORNERS, SOURCES, FILTERED, SIGN = (
+    frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
 )
 RULES: Mapping[str, Rule] = {
     name: Rule(
@@ -158,12 +160,16 @@ class Guess:
     confidence : from 0 to 1.
     hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
+    sign : channel that has the sign of the amounts in this one; empty where there is none.
+    factor : -1 of an axis that points the other way.
     """
 
     channel: tuple[str, ...]
     confidence: float
     hand: bool = False
     unit: str = ""
+    sign: str = ""
+    factor: float = 1.0
     why: str = ""
 
 
@@ -208,8 +214,8 @@ class Proposal:
         if len(forces & set(kept)) == 1:
             kept = [name for name in kept if name not in forces]
         return {
-            name: Signal(channel=self.guesses[name].channel, unit=self.guesses[name].unit)
-            for name in kept
+            name: Signal(channel=one.channel, unit=one.unit, sign=one.sign, factor=one.factor)
+            for name, one in ((name, self.guesses[name]) for name in kept)
         }
 
 
@@ -296,10 +302,13 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     """
     candidates = {name: _candidates(name, headings) for name in QUANTITIES}
     asked = {name for found in candidates.values() for guess in found for name in guess.channel}
+    boxes = _triads(headings)
+    asked |= {name for box in boxes for name in box.names.values()}
     seen = _seen(log, [one.name for one in headings if one.name in asked], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
+    candidates = _along_axes(_with_signs(candidates, headings, seen), boxes, headings, seen)
     candidates = _beside_turning(candidates, seen)
     guesses: dict[str, Guess] = {}
     rivals: dict[str, tuple[Guess, ...]] = {}
@@ -321,6 +330,83 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
             if others:
                 rivals[name] = (equal[0], *others)
     return Proposal(guesses=guesses, rivals=rivals)
+
+
+def _with_signs(
+    candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: Mapping[str, Channel]
+) -> dict[str, list[Guess]]:
+    """Return the guesses; amounts with the channel of their sign, which is called as they are."""
+    signs: dict[frozenset[str], str] = {}
+    for one in headings:
+        words = frozenset(words_of(one.name))
+        if words & SIGN and not is_told(one.unit):
+            signs[words - SIGN] = one.name
+
+    def completed(guess: Guess) -> Guess:
+        sign = signs.get(frozenset(words_of(guess.channel[0])), "")
+        values = seen[guess.channel[0]].values if sign and guess.channel[0] in seen else np.zeros(0)
+        if not values.size or np.nanmin(values) < 0.0:
+            return guess
+        return replace(_said(guess, f"its sign is in {sign!r}"), sign=sign)
+
+    return {name: [completed(one) for one in found] for name, found in candidates.items()}
+
+
+def _triads(headings: Sequence[Heading]) -> list[Triad]:
+    """Return the channels that are called alike but for x, y and z."""
+    named = map(_with_told_unit, headings)
+    units = {one.name: told.unit for one, told in zip(headings, named, strict=True)}
+    words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
+    bad = REFERENCE | CORNERS
+    return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
+
+
+def _along_axes(
+    candidates: Mapping[str, list[Guess]],
+    boxes: Sequence[Triad],
+    headings: Sequence[Heading],
+    seen: Mapping[str, Channel],
+) -> dict[str, list[Guess]]:
+    """Return the guesses; of boxes whose letters mislead those that their numbers tell."""
+    if not boxes:
+        return dict(candidates)
+    within = {name for box in boxes for name in box.names.values()}
+
+    def best(name: str) -> str:
+        free = [one for one in candidates[name] if not within & set(one.channel)]
+        likely = max(free, key=lambda one: one.confidence, default=None)
+        return likely.channel[0] if likely and likely.confidence > STILL else ""
+
+    speed = best("v_x") or _of_a_triad(candidates["v_x"])
+    found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
+    units = {one.name: _with_told_unit(one).unit.strip() for one in headings}
+    mended = {
+        name: [
+            replace(_said(one, OBLIQUE), confidence=min(one.confidence, HINT))
+            if found.oblique & set(one.channel)
+            else one
+            for one in some
+            if not found.misled & set(one.channel)
+        ]
+        for name, some in candidates.items()
+    }
+    for one in found.axes:
+        near = KNOWN if is_told(units[one.name]) else KNOWN - NO_UNIT_LOSS
+        guess = Guess(
+            channel=(one.name,),
+            confidence=near,
+            unit=units[one.name],
+            factor=one.factor,
+            why=one.why,
+        )
+        mended[one.signal].append(guess)
+    return mended
+
+
+def _of_a_triad(found: Sequence[Guess]) -> str:
+    """Return the channel that is the speed by its letter; "" where there is none."""
+    likely = max(found, key=lambda one: one.confidence, default=None)
+    return likely.channel[0] if likely and likely.confidence > STILL else ""
 
 
 def _rank(guess: Guess) -> tuple[bool, float]:

@@ -104,6 +104,8 @@ class Signal:
     offset : what the channel shows at zero, in SI; it is taken off.
     ratio : angle of the hand wheel over that of the road wheels [-], of steering.
     table : pairs of angles of hand wheel and road wheels [rad], rising, in place of a ratio.
+    sign : channel that has the sign of one that holds amounts: below zero, or 1 of 0 and 1, is
+        negative; empty where there is none.
 
     Raises
     ------
@@ -117,6 +119,7 @@ class Signal:
     offset: float = 0.0
     ratio: float = 1.0
     table: tuple[tuple[float, float], ...] = ()
+    sign: str = ""
 
     def __post_init__(self) -> None:
         if not self.channel or not all(self.channel):
@@ -142,6 +145,11 @@ class Signal:
                     f"not {shown(str(self.table))}"
                 )
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The channels that are read, that of the sign last."""
+        return (*self.channel, self.sign) if self.sign else self.channel
+
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
         """Return the signal of its channels.
 
@@ -149,7 +157,7 @@ class Signal:
         ----------
         parts : each channel in SI, on one clock (n,).
         """
-        plain = Signal(channel=self.channel[:1], unit=self.unit)
+        plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
         if len(parts) == 1 and self == plain:
             return parts[0]
         return filled(
@@ -177,6 +185,19 @@ class Signal:
         below, above = np.minimum(angle - hand[0], 0.0), np.maximum(angle - hand[-1], 0.0)
         road_wheel: Array = inside + first * below + last * above
         return road_wheel
+
+
+def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
+    """Return amounts with the sign that another channel has then, (n,).
+
+    Parameters
+    ----------
+    t : times of the amounts [s], (n,).
+    sign_t, sign : times and values of the other channel, (m,).
+    """
+    last = np.maximum(np.searchsorted(sign_t, t, side="right") - 1, 0)
+    negative = sign < 0.0 if (sign < 0.0).any() else sign > 0.5 * np.nanmax(sign, initial=1.0)
+    return np.where(negative[last], -amounts, amounts)
 
 
 def require_fitting(signals: Mapping[str, Signal], where: str) -> None:

@@ -451,7 +451,7 @@ def seconds(
         raise RecordingError(
             f"{label}: {clock.name} must be a time in every row, {place} {rows[missing]} has none"
         )
-    t = _in_seconds(clock, values)
+    t = in_seconds(clock, values)
     fall = _first_step(t, lambda step: step < 0.0)
     if fall is not None and clock.unit in ("instant", "hhmmss"):
         t = _past_midnight(t)
@@ -571,8 +571,13 @@ def since(t: Array, first: float) -> Array:
     return filled(t.size, lambda part: np.round((t[part] - first) * MICROSECONDS) / MICROSECONDS)
 
 
-def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
-    """Return stamps in seconds; those of the calendar from the first on."""
+def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
+    """Return stamps in seconds, (n,); those of the calendar from the first on.
+
+    Parameters
+    ----------
+    values : (n,) as in the file.
+    """
     first = values[0]
     per_second = PER_SECOND.get(clock.unit, 1.0)
     if clock.unit == "instant":
@@ -583,6 +588,18 @@ def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     if per_second == 1.0:
         return values
     return filled(values.size, lambda part: values[part] / per_second)
+
+
+def started(clock: Clock, cell: str) -> float:
+    """Return the instant that a clock of the calendar counts from [s]; 0 of any other.
+
+    Parameters
+    ----------
+    cell : its first one.
+    """
+    if clock.unit == "instant":
+        return (nanoseconds(cell) or 0) / 1e9
+    return float(_of_digits(np.array([float(cell)]))[0]) if clock.unit == "hhmmss" else 0.0
 
 
 def _of_digits(values: Array) -> Array:

@@ -31,6 +31,7 @@ from models.logs.stamps import (
     no_clock,
     own_clocks,
     seconds,
+    started,
     told_clock,
     typical_rate,
 )
@@ -273,6 +274,12 @@ class TableLog:
         return told
 
     @cached_property
+    def start(self) -> float:
+        """The instant that times of the calendar count from [s]; 0 of others."""
+        head = [] if self.clock is None else self.table.first_rows(self.clock.column)
+        return started(self.clock, head[0]) if self.clock and head else 0.0
+
+    @cached_property
     def _even(self) -> float:
         """The rate of samples [Hz], told or, without a time, of the preamble; 0 where none is."""
         return self.rate or (self.table.rate if self.clock is None else 0.0)
@@ -313,7 +320,7 @@ class TableLog:
     def _listed(self) -> tuple[Listed, ...]:
         kinds = {} if self._run_column is None else {self._run_column: Kind.WORD}
         clocks = {one.column: one for one in (self.clock, *self._own_clocks.values()) if one}
-        cells = self.table.cells(kinds | {k: _kind(one) for k, one in clocks.items()})
+        cells = self.table.cells(kinds | {k: kind_of(one) for k, one in clocks.items()})
         size = cells.rows.size
         for words in cells.words.values():  # each run has a clock of its own
             first = words.codes == 0
@@ -372,9 +379,9 @@ class TableLog:
             why = no_clock(self.names, self.table.units, self.table.first_rows)
             raise RecordingError(f"{self.path}: {why}; columns found: '{some(self.names)}'")
         clocks = {k: self._own_clocks.get(k, clock) for k in places}
-        kinds = {one.column: _kind(one) for one in clocks.values() if one}
+        kinds = {one.column: kind_of(one) for one in clocks.values() if one}
         column = None if clock is None else clock.column
-        timed = clock is None or _kind(clock) is Kind.NUMBER  # asked for as it stands
+        timed = clock is None or kind_of(clock) is Kind.NUMBER  # asked for as it stands
         kinds |= {k: Kind.NUMBER for k in places if timed or k != column}
         cells = self.table.cells(kinds, self._one_run(run))
         label = str(self.path) if run is None else f"{self.path}:{run}"
@@ -412,6 +419,6 @@ class TableLog:
         return self._run_column, found
 
 
-def _kind(clock: Clock) -> Kind:
+def kind_of(clock: Clock) -> Kind:
     """Return how the cells of a clock are read."""
     return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER

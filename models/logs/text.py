@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from codegen.escape import shown
 from models.logs import arrow
+from models.logs.grouped import GroupedLog
+from models.logs.joined import long_log
 from models.logs.log import RecordingError
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
@@ -34,7 +36,7 @@ _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
-def open_text(path: Path) -> TableLog:
+def open_text(path: Path) -> TableLog | GroupedLog[Any]:
     """Return the log in a text file of any dialect, its layout understood.
 
     Raises
@@ -50,7 +52,8 @@ def open_text(path: Path) -> TableLog:
             break
     layout = find_layout(path, head, whole)
     require_few(RecordingError, str(path), len(layout.names), "columns", "columns")
-    return TableLog(table=TextTable(path=path, layout=layout))
+    table = TextTable(path=path, layout=layout)
+    return long_log(table) or TableLog(table=table)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

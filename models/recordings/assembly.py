@@ -22,7 +22,7 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
-from models.logs.signals import BETA, QUANTITIES, SPARED, WHEELS, Signal, quantity_of
+from models.logs.signals import BETA, QUANTITIES, SPARED, WHEELS, Signal, quantity_of, signed
 from models.logs.units import is_told, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels
 from models.recordings.map import AXES, CUT, LogMap
@@ -134,7 +134,10 @@ def _channels(
 
     Turns of wheels become speeds, where there is no v_x that tells their radius.
     """
-    names = list(dict.fromkeys(one for signal in signals.values() for one in signal.channel))
+    asked = [
+        (*signal.channel, *([signal.sign] if signal.sign else [])) for signal in signals.values()
+    ]
+    names = list(dict.fromkeys(one for some in asked for one in some))
     by_name = dict(zip(names, log.read(names, run), strict=True))
     found: dict[str, list[Raw]] = {}
     for ours, signal in signals.items():
@@ -150,6 +153,9 @@ def _channels(
                 factor *= wheel_factor(what, ours, unit, log_map.wheels)
             _require_finite(label, column_of(ours), channel)
             values = scaled(channel.values, factor)
+            if signal.sign:
+                sign = by_name[signal.sign]
+                values = signed(values, channel.t, sign.t, sign.values)
             _require_of_a_car(label, ours, values, channel)
             empty = holes(logged).size if cut else 0
             found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty))

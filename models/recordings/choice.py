@@ -31,6 +31,9 @@ from models.recordings.map import LogMap
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
 
+OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5")
+
+
 class Reading(NamedTuple):
     """How the signals of a log are read, and what of it nobody told."""
 
@@ -93,7 +96,7 @@ def as_listed(
     found = {}
     for name, signal in signals.items():
         channels = []
-        for channel in signal.channel:
+        for channel in signal.asked:
             likely = [channel] if channel in names else bare.get(channel, [])
             if not likely and name == "v_x" and has_wheels(signals):
                 break
@@ -104,7 +107,8 @@ def as_listed(
                 )
             channels += likely
         else:
-            found[name] = replace(signal, channel=tuple(channels))
+            sign = channels.pop() if signal.sign else ""
+            found[name] = replace(signal, channel=tuple(channels), sign=sign)
     return found
 
 
@@ -169,10 +173,25 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
             raise RecordingError(f"{log.path}: column {column} appears more than once")
         if column in names and name != BETA:
             found[name] = Signal(channel=(column,))
+    if log.format in OF_STRUCTS and not found:
+        found = _in_struct(names)
     if not {"Fyf", "Fyr"} & set(names) and set(INVERSE) <= set(names):
         found |= {ours: Signal(channel=(name,)) for name, ours in INVERSE.items()}
     require_fitting(found, f"{log.path}: ")
     return found
+
+
+def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
+    """Return the signals of the struct whose fields bear the most standard names, if it is one."""
+    found: dict[str, dict[str, Signal]] = {}
+    for name in QUANTITIES:
+        for one in names:
+            struct, dot, field = one.rpartition(".")
+            if dot and field == column_of(name) and name != BETA:
+                found.setdefault(struct, {})[name] = Signal(channel=(one,))
+    ranked = sorted(found.values(), key=len, reverse=True)
+    single = len(ranked) == 1 or (len(ranked) > 1 and len(ranked[0]) > len(ranked[1]))
+    return ranked[0] if single else {}
 
 
 def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str, Signal]:
@@ -203,6 +222,7 @@ def listing(names: Sequence[str]) -> str:
 def _taken_text(name: str, signal: Signal) -> str:
     channels = [without_unit(one) for one in signal.channel]
     unit = f" [{signal.unit}]" if signal.unit else ""
+    unit += " with its sign turned" if signal.factor < 0.0 else ""
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
 
 
@@ -283,4 +303,6 @@ def column_word(name: str, proposal: Proposal) -> str:
         return ""
     unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
     channels = " + ".join(without_unit(one) for one in guess.channel)
-    return f'"{column_of(name)}={channels} [{unit}]{ratio}"'
+    sign = f" sign({guess.sign})" if guess.sign else ""
+    ratio += f" *{guess.factor:g}" if guess.factor != 1.0 else ""
+    return f'"{column_of(name)}={channels}{sign} [{unit}]{ratio}"'

@@ -251,8 +251,7 @@ def _signal(table: Table, name: str) -> Signal:
         given["channel"] = (table.text("channel"),)
     else:
         given["channel"] = table.texts("channel")
-    if "unit" in table:
-        given["unit"] = table.text("unit")
+    given |= {key: table.text(key) for key in ("unit", "sign") if key in table}
     for key in ("factor", "offset", "ratio"):
         if key in table:
             given[key] = table.number(key)
@@ -302,8 +301,9 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
 
     "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
     "delta_f=SteerFL + SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a
-    star, an offset in SI behind a minus, a ratio of the steering behind a slash. Of several
-    channels, with blanks about each plus, the mean is taken, of forces the sum.
+    star, an offset in SI behind a minus, a ratio of the steering behind a slash; sign(CHANNEL) of
+    an amount whose sign another channel has. Of several channels, with blanks about each plus, the
+    mean is taken, of forces the sum.
 
     Raises
     ------
@@ -327,6 +327,7 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
 
 
 _CHANGE = re.compile(r"\s+(?P<sign>[/*-])\s*(?P<number>[+-]?[\d.]+(?:e[+-]?\d+)?)$", re.IGNORECASE)
+_SIGN = re.compile(r"\s*(?:\*\s*)?\bsign\((?P<channel>.+)\)(?:\s*\*)?\s*")
 _UNIT = re.compile(r"\s+\[(?P<unit>[^\[\]]*)\]$")
 
 
@@ -345,6 +346,9 @@ def told_channel(text: str) -> Signal:
             raise RecordingError(f"--columns: {shown(found['number'])} is no number") from None
     if found := _UNIT.search(text):
         given["unit"], text = found["unit"].strip(), text[: found.start()]
+    if found := _SIGN.search(text):
+        given["sign"] = found["channel"].strip()
+        text = text[: found.start()] + text[found.end() :]
     try:
         return Signal(channel=tuple(part.strip() for part in text.split(" + ")), **given)
     except RecordingError as error:

@@ -195,6 +195,8 @@ def _meaning(
             guess = proposal.guesses.get(name)
             guessed = name not in known and guess is not None and guess.confidence < 1.0
             told = f" ({guess.confidence:.0%})" if guessed and guess is not None else ""
+            told += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
+            told += f", its sign in {visible(signal.sign)}" if signal.sign else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
             return f"{column_of(name)}: {MEANINGS[name]}{told}{among}"
     for name, guess in proposal.guesses.items():

@@ -311,7 +311,15 @@ def test_a_fault_of_the_dbc_is_told_of_the_dbc(place, fault, selects, tmp_path):
 
 
 GROUP = 'BO_ 2566916606 ESP: 4 Car\n SG_ YawRate : 0|16@1- (0.001,0) [-4|4] "rad/s" Car\n'
-J1939 = 'BA_DEF_ "ProtocolType" STRING ;\nBA_DEF_DEF_ "ProtocolType" "";\nBA_ "ProtocolType" "J1939";\n'
+J1939 = """BA_DEF_ "ProtocolType" STRING ;
+BA_DEF_DEF_ "ProtocolType" "";
+BA_ "ProtocolType" "J1939";
+"""
+
+
+def of_a_truck(folder, more="", sender=0xFE):
+    message = GROUP.replace("2566916606", str(0x98F00900 | sender))
+    return dbc(folder, f'VERSION ""\n\nBU_: Car\n\n{message}{more}')
 
 
 def frames(count, identifier, bus="can0"):
@@ -322,7 +330,7 @@ def frames(count, identifier, bus="can0"):
 @pytest.mark.parametrize("told", ["", J1939])
 def test_frames_of_j1939_are_known_by_their_parameter_group(senders, told, tmp_path):
     """0x18F009FE in the database: priority and sender differ in the log."""
-    base = dbc(tmp_path, 'VERSION ""\n\nBU_: Car\n\n' + GROUP.replace("2566916606", str(0x80000000 | 0x18F009FE)) + told)  # fmt: skip
+    base = of_a_truck(tmp_path, told)
     path = tmp_path / "bus.log"
     lines = [row for one in senders for row in frames(30, one)]
     path.write_text("".join(f"({t:.6f}) {b} {i:08X}#{d.hex().upper()}\n" for t, b, i, d in lines))
@@ -345,7 +353,7 @@ def test_a_parameter_group_with_a_receiver_is_known_whoever_receives():
 
 
 def test_a_long_identifier_of_no_j1939_is_not_taken_for_another(tmp_path):
-    base = dbc(tmp_path, 'VERSION ""\n\nBU_: Car\n\n' + GROUP.replace("2566916606", str(0x80000000 | 0x18F00901)))  # fmt: skip
+    base = of_a_truck(tmp_path, sender=0x01)
     path = tmp_path / "bus.log"
     path.write_text("".join(f"({t:.6f}) {b} 18F0093E#{d.hex()}\n" for t, b, _, d in frames(9, 0)))
     with pytest.raises(RecordingError, match="9 unknown frames"):
@@ -373,7 +381,7 @@ HEADERS = {
 
 @pytest.mark.parametrize("kind", TEXTS)
 def test_frames_in_text_are_read_as_tools_print_them(kind, tmp_path):
-    base = dbc(tmp_path, 'VERSION ""\n\nBU_: Car\n\n' + GROUP.replace("2566916606", str(0x80000000 | 0x18F009FE)))  # fmt: skip
+    base = of_a_truck(tmp_path)
     path = tmp_path / ("bus.csv" if kind in HEADERS else "bus.log")
     rows = [TEXTS[kind](t, i, d) for t, _, i, d in frames(30, 0x18F0093E)]
     path.write_text(HEADERS.get(kind, "") + "\n".join([*rows, ""]))
