@@ -10,7 +10,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from models.logs.joined import open_folder
 from models.logs.log import LogFile, RecordingError
 from models.logs.magic import GZIP, HEAD, format_of
 from models.logs.table import TableLog
@@ -29,6 +28,7 @@ OPENERS = {
     "can": "models.logs.can:open_",
     "text": "models.logs.text:open_text",
 }
+JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
 RATED = ("text", "parquet", "matlab")  # which may lack a time
 
 
@@ -68,18 +68,25 @@ def open_log(
             for one in sorted(path.iterdir()):
                 if one.is_file() and one.name.lower().endswith(ENDINGS):
                     inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
-            return open_folder(path, inside)
+            return _function(JOINED)(path, inside)
         format = "can" if told else format
         if rate and format not in RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
-        module, _, function = OPENERS[format].partition(":")
         told += (rate,) * (format == "matlab")
-        opened: Any = getattr(import_module(module), function)(path, *told)
+        opened: Any = _function(OPENERS[format])(path, *told)
+        if isinstance(opened, TableLog) and opened.may_be_long:
+            opened = _function(LONG)(opened.table) or opened
         more = {"rate": rate} if isinstance(opened, TableLog) else {}
         log: LogFile = replace(opened, mend=mend, clock_name=clock, clock_unit=clock_unit, **more)
         return log
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _function(place: str) -> Any:
+    """Import a function by its place."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
 
 
 def _of_folder(

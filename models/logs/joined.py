@@ -17,7 +17,6 @@ from models.schema import require_few
 # A table with a row for each value: what the columns of names and of values are called.
 NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
 VALUES = ("value", "val", "data", "values", "reading")
-MOST_COLUMNS = 8
 
 
 def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:
@@ -35,7 +34,7 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     logs = {one: log for one, log in opened.items() if not isinstance(log, RecordingError)}
     if not logs:
         why = next((f"; {one}" for one in opened.values()), "")
-        raise RecordingError(f"{path}: is a folder in which no file is a log{why}")
+        raise RecordingError(f"{path}: there is no such file, it is a folder without a log{why}")
     kinds = {tuple(one.name for one in log.headings()) for log in logs.values()}
     if len(logs) > 1 and len(kinds) == 1:
         raise RecordingError(
@@ -80,8 +79,6 @@ def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
 def long_log(table: Table) -> GroupedLog[Any] | None:
     """Return the log in a table with a row for each value: time, name, value; None of any other."""
     bare = ["".join(filter(str.isalpha, one.lower())) for one in table.names]
-    if len(bare) > MOST_COLUMNS:
-        return None
     name = next((bare.index(one) for one in NAMES if one in bare), None)
     value = next((bare.index(one) for one in VALUES if one in bare), None)
     if name is None or value is None or table.numeric[name] or not table.numeric[value]:

@@ -26,6 +26,7 @@ from models.logs.signals import (
     BETA,
     COLUMNS,
     NEEDED,
+    POSE,
     QUANTITIES,
     WHEELS,
     Signal,
@@ -38,6 +39,7 @@ from models.logs.units import (
     ANGLE,
     FORCE,
     HAND_WHEEL,
+    LENGTH,
     RATE,
     SPEED,
     is_told,
@@ -275,7 +277,9 @@ def name_confidence(signal: str, name: str) -> float:
         return KNOWN
     if _with_parts(words_of(_field(name))).union(ends) & rule.never:
         return 0.0
-    if len(ends) > 1 and name[-2:-1] not in "./":  # the R of "M_Mtr_D2_R" is a side, or anything
+    if (
+        len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
+    ):  # the R of "M_Mtr_D2_R" is a side, or anything
         ends = [end for end in ends if len(end) > 1]
     loss = FILTERED_LOSS if words & FILTERED else 0.0
     if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
@@ -300,7 +304,8 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     log : as a format reads it; numbers are read of the channels that are in question.
     run : which of its runs is looked at; None the only one, or the first.
     """
-    candidates = {name: _candidates(name, headings) for name in QUANTITIES}
+    candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
+    posed = _pose(headings)
     asked = {name for found in candidates.values() for guess in found for name in guess.channel}
     boxes = _triads(headings)
     asked |= {name for box in boxes for name in box.names.values()}
@@ -329,7 +334,54 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
             others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
             if others:
                 rivals[name] = (equal[0], *others)
-    return Proposal(guesses=guesses, rivals=rivals)
+    return Proposal(guesses={**guesses, **posed}, rivals=rivals)
+
+
+_PLACE = re.compile(TABLES["pose"]["place"])
+_ANGLE = re.compile(TABLES["pose"]["angle"])
+_TURN = re.compile(TABLES["pose"]["turn"])
+_NO_POSE = set(TABLES["pose"]["never"].split())
+
+
+def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
+    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
+    groups: dict[str, dict[str, Heading]] = {}
+    for one in map(_with_told_unit, headings):
+        words = "_".join(words_of(without_ending(one.name, one.unit)))
+        told = quantities(one.unit) if is_told(one.unit) else (LENGTH, ANGLE)
+        for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
+            found = form.fullmatch(words)
+            of = set((found["of"] or "").split("_")) if found else set()
+            if found and wanted in told and not of & _NO_POSE:
+                key = mark if mark == "h" else mark + found["axis"]
+                groups.setdefault(found["of"] or "", {}).setdefault(key, one)
+                break
+    whole = {
+        name: some
+        for name, some in groups.items()
+        if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some))
+    }
+    measured = [name for name in whole if "odom" not in name] or list(whole)
+    if not measured:
+        return {}
+    some = whole[measured[0]]
+    sure = KNOWN if len(measured) == 1 else HINT
+    why = "" if len(measured) == 1 else "there are several poses"
+    lost = NO_UNIT_LOSS if measured[0] and not is_told(some["x"].unit) else 0.0
+    turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
+    turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
+    channels = {"x": [some["x"].name], "y": [some["y"].name], "heading": turned}
+    units = {
+        "x": some["x"].unit,
+        "y": some["y"].unit,
+        "heading": some["h"].unit if "h" in some else "",
+    }
+    return {
+        name: Guess(
+            channel=tuple(listed), confidence=sure - lost, unit=units[name].strip(), why=why
+        )
+        for name, listed in channels.items()
+    }
 
 
 def _with_signs(

@@ -11,8 +11,6 @@ import numpy as np
 from codegen.escape import shown
 from models.logs.arrow import doubles, whole_numbers, words
 from models.logs.foreign import need, one_line
-from models.logs.grouped import GroupedLog
-from models.logs.joined import long_log
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
@@ -24,7 +22,7 @@ WHAT = "a Parquet file"  # that a file is read as
 BATCH = 1 << 16  # rows that are read at once
 
 
-def open_parquet(path: Path) -> TableLog | GroupedLog[Any]:
+def open_parquet(path: Path) -> TableLog:
     """Return the log in a Parquet file.
 
     Raises
@@ -46,7 +44,7 @@ def open_parquet(path: Path) -> TableLog | GroupedLog[Any]:
             what = f"the cells of {shown(one.path_in_schema)}"
             require_dense(RecordingError, str(path), unpacked, packed, what)
         table = ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
-        return long_log(table) or TableLog(table=table)
+        return TableLog(table=table)
 
 
 @dataclass(frozen=True, kw_only=True)

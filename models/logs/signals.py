@@ -14,12 +14,13 @@ import numpy as np
 from codegen.arrays import Array, filled
 from codegen.escape import shown
 from models.logs.log import RecordingError
-from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED, TURNS, quantities
+from models.logs.units import ACCELERATION, ANGLE, FORCE, LENGTH, RATE, SPEED, TURNS, quantities
 
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
 AXLES = (("wheel_fl", "wheel_fr"), ("wheel_rl", "wheel_rr"))
 WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # turns or speeds, the last of one encoder: for v_x
+POSE = ("x", "y", "heading")  # position and angle from x to y, of which v_x, v_y and r are made
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -31,6 +32,9 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "delta_r": ANGLE,
         "a_y": ACCELERATION,
         "a_x": ACCELERATION,
+        "x": LENGTH,
+        "y": LENGTH,
+        "heading": ANGLE,  # or four channels, of a quaternion x, y, z, w
         "Fyf": FORCE,
         "Fyr": FORCE,
         **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
@@ -52,6 +56,9 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "delta_r": "rear steering angle",
         "a_y": "lateral acceleration",
         "a_x": "longitudinal acceleration",
+        "x": "position",
+        "y": "position",
+        "heading": "heading",
         "Fyf": "front axle force",
         "Fyr": "rear axle force",
         "wheel_fl": "speed of the front left wheel",
@@ -66,9 +73,10 @@ LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
 def told_by(signals: Iterable[str]) -> set[str]:
-    """Return what signals tell, by name; beta tells v_y, wheels tell v_x."""
+    """Return what signals tell, by name; beta tells v_y, wheels v_x, a pose v_x, v_y and r."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
-    return {stands_for.get(name, name) for name in signals}
+    told = {stands_for.get(name, name) for name in signals}
+    return told | {"v_x", "v_y", "r"} if set(POSE) <= told else told
 
 
 def quantity_of(name: str, unit: str) -> str:
@@ -218,6 +226,8 @@ def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
             raise RecordingError(f"{where}signals.{name} can have no ratio or table: no steering")
     if BETA in signals and "v_y" in signals:
         raise RecordingError(f"{where}signals.beta stands in for v_y: give one of them")
+    if 0 < len(set(POSE) & set(signals)) < len(POSE):
+        raise RecordingError(f"{where}x, y and heading are a pose together: give all three")
     if ("Fyf" in signals) != ("Fyr" in signals):
         lonely = "Fyf" if "Fyf" in signals else "Fyr"
         raise RecordingError(f"{where}{lonely} needs its partner, give both Fyf and Fyr or neither")

@@ -38,6 +38,7 @@ from models.logs.stamps import (
 from models.schema import LONGEST_NAME, limits, require_few
 
 RUN = "run"
+LONG = 8  # columns at most of a table with a row for each value
 MOST_WORDS = 10_000  # names of runs in one log
 
 
@@ -272,6 +273,11 @@ class TableLog:
                 f"{shown(', '.join(table.first_rows(column)[:3]))}"
             )
         return told
+
+    @property
+    def may_be_long(self) -> bool:
+        """Whether a row may be one value of a channel that it names."""
+        return len(self.names) <= LONG and not all(self.table.numeric) and RUN not in self.names
 
     @cached_property
     def start(self) -> float:

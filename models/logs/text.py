@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from codegen.escape import shown
 from models.logs import arrow
-from models.logs.grouped import GroupedLog
-from models.logs.joined import long_log
 from models.logs.log import RecordingError
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
@@ -36,7 +34,7 @@ _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
-def open_text(path: Path) -> TableLog | GroupedLog[Any]:
+def open_text(path: Path) -> TableLog:
     """Return the log in a text file of any dialect, its layout understood.
 
     Raises
@@ -53,7 +51,7 @@ def open_text(path: Path) -> TableLog | GroupedLog[Any]:
     layout = find_layout(path, head, whole)
     require_few(RecordingError, str(path), len(layout.names), "columns", "columns")
     table = TextTable(path=path, layout=layout)
-    return long_log(table) or TableLog(table=table)
+    return TableLog(table=table)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,9 +13,17 @@ from codegen.escape import shown
 from models.logs.log import RecordingError
 
 SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
-ACCELERATION, FORCE, TIME = "acceleration", "force", "time"
+ACCELERATION, FORCE, TIME, LENGTH = "acceleration", "force", "time", "length"
 TURNS = "rate of turns"  # of wheels; in rad/s it is called a rate as that of yaw
-SI = {SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "N", TIME: "s"}
+SI = {
+    SPEED: "m/s",
+    ANGLE: "rad",
+    RATE: "rad/s",
+    ACCELERATION: "m/s^2",
+    FORCE: "N",
+    TIME: "s",
+    LENGTH: "m",
+}
 
 TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text("utf-8"))
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.

@@ -22,10 +22,20 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
-from models.logs.signals import BETA, QUANTITIES, SPARED, WHEELS, Signal, quantity_of, signed
+from models.logs.signals import (
+    BETA,
+    QUANTITIES,
+    SPARED,
+    WHEELS,
+    Signal,
+    quantity_of,
+    signed,
+    told_by,
+)
 from models.logs.units import is_told, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels
 from models.recordings.map import AXES, CUT, LogMap
+from models.recordings.pose import with_pose
 from models.recordings.record import (
     LARGEST,
     MINIMUM_SAMPLES,
@@ -44,6 +54,9 @@ FIELDS = {
     "Fyf": "axle_force",
     "Fyr": "axle_force",
     BETA: "delta_f",
+    "x": "t",
+    "y": "t",
+    "heading": "delta_f",
     **dict.fromkeys(WHEELS, "v_x"),
 }
 
@@ -81,13 +94,14 @@ def recording_of(
     headings = log.headings()
     reading = chosen_signals(log, headings, log_map, run)
     signals, learnt = reading.signals, ""
-    if "v_x" in signals:
+    if "v_x" in told_by(signals):
         if has_wheels(signals):
             learnt = _scale_note(log, signals, log_map, run)
         signals = _without_wheels(signals)
     spared = ""
     try:
         parts = _channels(log, label, signals, log_map, run)
+        signals, parts, posed = with_pose(label, signals, parts)
         stretches = _stretches(label, signals, parts, log_map, dt)
     except RecordingError as error:
         needed = {
@@ -97,6 +111,7 @@ def recording_of(
             raise
         signals, spared = needed, f"{', '.join(map(column_of, SPARED))} is left aside: {error}"
         parts = _channels(log, label, signals, log_map, run)
+        signals, parts, posed = with_pose(label, signals, parts)
         stretches = _stretches(label, signals, parts, log_map, dt)
     rolls = ""
     if has_wheels(signals):
@@ -104,7 +119,7 @@ def recording_of(
         stretches = stretches._replace(kept=kept)
     notes = (*_notes(log), *reading.notes, *_hole_notes(parts))
     notes += _gap_notes(stretches.kept)
-    notes += tuple(note for note in (learnt, rolls, spared) if note)
+    notes += tuple(note for note in (*posed, learnt, rolls, spared) if note)
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
         notes += (f"left out: {stretches.short} stretch{several} of less than {_shortest(dt):g} s",)
@@ -149,7 +164,7 @@ def _channels(
             what = f"{label}: {column_of(ours)}"
             what += "" if name == column_of(ours) else f" (channel {name!r})"
             factor = to_si(unit, quantity_of(ours, unit), what)
-            if ours in WHEELS and "v_x" not in signals:
+            if ours in WHEELS and "v_x" not in told_by(signals):
                 factor *= wheel_factor(what, ours, unit, log_map.wheels)
             _require_finite(label, column_of(ours), channel)
             values = scaled(channel.values, factor)

@@ -17,6 +17,7 @@ from models.logs.signals import (
     COLUMNS,
     INSTEAD,
     NEEDED,
+    POSE,
     QUANTITIES,
     SPARED,
     WHEELS,
@@ -117,11 +118,15 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     sure = {name: one for name, one in proposal.signals().items() if name not in told}
     if has_wheels(told):
         sure.pop("v_x", None)
+    if "v_y" in told_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
+        sure = {name: one for name, one in sure.items() if name not in POSE}
     if "v_x" in told_by(told) or "v_x" in proposal.guesses:
         sure = {name: one for name, one in sure.items() if name not in WHEELS}
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
+    if not set(POSE) <= set(found):
+        found = {name: one for name, one in found.items() if name not in POSE}
     return {name: found[name] for name in QUANTITIES if name in found}
 
 
@@ -171,7 +176,7 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
             continue
         if f"{column} (2)" in names:
             raise RecordingError(f"{log.path}: column {column} appears more than once")
-        if column in names and name != BETA:
+        if column in names and name not in (BETA, *POSE):
             found[name] = Signal(channel=(column,))
     if log.format in OF_STRUCTS and not found:
         found = _in_struct(names)
@@ -187,7 +192,7 @@ def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
     for name in QUANTITIES:
         for one in names:
             struct, dot, field = one.rpartition(".")
-            if dot and field == column_of(name) and name != BETA:
+            if dot and field == column_of(name) and name not in (BETA, *POSE):
                 found.setdefault(struct, {})[name] = Signal(channel=(one,))
     ranked = sorted(found.values(), key=len, reverse=True)
     single = len(ranked) == 1 or (len(ranked) > 1 and len(ranked[0]) > len(ranked[1]))

@@ -57,7 +57,7 @@ def test_a_folder_with_a_file_for_each_message_is_one_log(tmp_path, clock):
 
 
 def test_a_folder_of_drives_or_without_a_log_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match="is a folder in which no file is a log"):
+    with pytest.raises(RecordingError, match="it is a folder without a log"):
         open_log(tmp_path)
     for name in ("one", "two"):
         table(tmp_path / f"{name}.csv", ["t", *SIGNALS], T, *SIGNALS.values())
