@@ -23,6 +23,7 @@ SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
 FEWEST = 30  # samples of a piece that is differentiated
 MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
 ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
+ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
 TURN = math.pi / 2.0
 LATEST, LATE = 0.3, 0.01  # [s] that a gyro may be late against a pose, that is taken out of it
 ALIKE = 0.9  # correlation of the two yaw rates from which that is known
@@ -161,7 +162,10 @@ def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
 
 def _unwrapped(name: str, parts: Mapping[str, Raw]) -> Array:
     values = parts[name].values
-    return np.unwrap(values) if name == "heading" else values
+    if name != "heading":
+        return values
+    far = float(np.abs(values).max(initial=0.0))
+    return np.unwrap(values, period=360.0 if far > 2.0 * math.pi + 0.1 else 2.0 * math.pi)
 
 
 class _Piece(NamedTuple):
@@ -228,7 +232,7 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     means = [np.mean(np.exp(1j * (travel - sign * unit * heading))) for sign, unit in ways]
     best = int(np.argmax(np.abs(means) > max(np.abs(means)) - 0.02))
     (sign, unit), mean = ways[best], means[best]
-    if abs(mean) < 0.7:
+    if abs(mean) < ALONG_ALL:
         raise RecordingError(
             f"{label}: the heading must go along with the direction of travel of x and y, it does "
             "not: another channel, or other axes?"
