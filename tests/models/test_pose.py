@@ -190,7 +190,7 @@ def test_of_two_trackers_none_is_taken_and_of_odometry_and_a_tracker_this(tmp_pa
     assert "x" not in named("mocap", "slam").signals()
 
 
-@pytest.mark.parametrize("kind", ["PoseStamped", "Odometry"])
+@pytest.mark.parametrize("kind", ["PoseStamped", "Odometry", "TFMessage"])
 def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
     pytest.importorskip("rosbags")
     from tests.models.logs.test_bag import header, store_of, write
@@ -211,6 +211,13 @@ def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
                 header(store, ns, "map"), "base_link", make["PoseWithCovariance"](at, none),
                 make["TwistWithCovariance"](still, none),
             )  # fmt: skip
+        elif kind == "TFMessage":
+            moved = make["Transform"](vector(at.position.x, at.position.y, 0.1), turn)
+            still = make["Transform"](vector(0.1, 0.0, 0.0), make["Quaternion"](0.0, 0.0, 0.0, 1.0))
+            message = make["TFMessage"]([
+                make["TransformStamped"](header(store, ns, "map"), "base_link", moved),
+                make["TransformStamped"](header(store, ns, "base_link"), "laser", still),
+            ])  # fmt: skip
         else:
             message = make["PoseStamped"](header(store, ns, "map"), at)
         tracked.append((ns, message))
@@ -222,9 +229,9 @@ def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
         )))  # fmt: skip
         drive = make["AckermannDrive"](DELTA[k], 0.0, V_X[k], 0.0, 0.0)
         command.append((ns, make["AckermannDriveStamped"](header(store, ns), drive)))
-    name = "geometry_msgs/msg/PoseStamped" if kind == "PoseStamped" else "nav_msgs/msg/Odometry"
+    package = {"PoseStamped": "geometry_msgs", "Odometry": "nav_msgs", "TFMessage": "tf2_msgs"}
     topics = {
-        "/vicon/car": (name, tracked),
+        "/tf" if kind == "TFMessage" else "/vicon/car": (f"{package[kind]}/msg/{kind}", tracked),
         "/imu": ("sensor_msgs/msg/Imu", box),
         "/ackermann_cmd": ("ackermann_msgs/msg/AckermannDriveStamped", command),
     }
