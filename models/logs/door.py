@@ -68,7 +68,8 @@ def open_log(
             for one in sorted(path.iterdir()):
                 if one.is_file() and one.name.lower().endswith(ENDINGS):
                     inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
-            return _function(JOINED)(path, inside)
+            joined: LogFile = _function(JOINED)(path, inside)
+            return joined
         format = "can" if told else format
         if rate and format not in RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")

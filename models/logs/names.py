@@ -15,7 +15,7 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,16 +92,16 @@ def _spelled(text: str, apart: str = "|") -> str:
 REFERENCE, CORNERS, SOURCES, FILTERED, SIGN = (
     frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
 )
-RULES: Mapping[str, Rule] = {
-    name: Rule(
-        *(
-            frozenset(_spelled(one.get(key, ""), " ").split())
-            for key in ("known", "vague", "never")
-        ),
-        tuple(map(_spelled, one.get("words", ()))),
+
+
+def _rule(one: Mapping[str, Any]) -> Rule:
+    known, vague, never = (
+        frozenset(_spelled(one.get(key, ""), " ").split()) for key in ("known", "vague", "never")
     )
-    for name, one in TABLES["signals"].items()
-}
+    return Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
+
+
+RULES: Mapping[str, Rule] = {name: _rule(one) for name, one in TABLES["signals"].items()}
 PER_WHEEL, HINTS = TABLES["per_wheel"], {k: tuple(v.split()) for k, v in TABLES["hints"].items()}
 SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in TABLES["sides"].items()}
 # German words are written together: "Querbeschl", "Lenkradwinkel", "Sollgierrate".

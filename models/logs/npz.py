@@ -80,7 +80,7 @@ def _numbers(path: Path, member: str, field: str, shape: tuple[int, int]) -> Arr
     found = found[field] if field else found
     if found.dtype.kind in "mM":  # of the calendar, or a duration
         found = found.astype(f"{found.dtype.kind}8[ns]").astype(np.int64) / 1e9
-    return found.reshape(shape).astype(np.float64)
+    return np.asarray(found.reshape(shape), dtype=np.float64)
 
 
 def _load(path: Path, member: str) -> Any:

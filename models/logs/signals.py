@@ -79,6 +79,12 @@ def told_by(signals: Iterable[str]) -> set[str]:
     return told | {"v_x", "v_y", "r"} if set(POSE) <= told else told
 
 
+def has_speed(signals: Iterable[str]) -> bool:
+    """Return whether signals tell v_x without wheels: themselves, or by a pose."""
+    there = set(signals)
+    return "v_x" in there or set(POSE) <= there
+
+
 def quantity_of(name: str, unit: str) -> str:
     """Return what a signal is; of wheels a speed or a rate, as the unit has it."""
     turns = [one for one in quantities(unit) if one in (RATE, TURNS)]

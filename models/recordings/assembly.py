@@ -28,9 +28,9 @@ from models.logs.signals import (
     SPARED,
     WHEELS,
     Signal,
+    has_speed,
     quantity_of,
     signed,
-    told_by,
 )
 from models.logs.units import is_told, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels
@@ -94,7 +94,7 @@ def recording_of(
     headings = log.headings()
     reading = chosen_signals(log, headings, log_map, run)
     signals, learnt = reading.signals, ""
-    if "v_x" in told_by(signals):
+    if has_speed(signals):
         if has_wheels(signals):
             learnt = _scale_note(log, signals, log_map, run)
         signals = _without_wheels(signals)
@@ -164,7 +164,7 @@ def _channels(
             what = f"{label}: {column_of(ours)}"
             what += "" if name == column_of(ours) else f" (channel {name!r})"
             factor = to_si(unit, quantity_of(ours, unit), what)
-            if ours in WHEELS and "v_x" not in told_by(signals):
+            if ours in WHEELS and not has_speed(signals):
                 factor *= wheel_factor(what, ours, unit, log_map.wheels)
             _require_finite(label, column_of(ours), channel)
             values = scaled(channel.values, factor)

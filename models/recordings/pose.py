@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.clock import LONGEST_GAP, Raw, gaps, typical_step
@@ -172,14 +173,14 @@ class _Piece(NamedTuple):
     """A piece without a gap: times and rows (n,), rates of x and y (n, 2), heading (n,), noise."""
 
     t: Array
-    rows: Array
+    rows: NDArray[np.int64]
     step: float
     rates: Array
     heading: Array
     noise: tuple[float, float]
 
 
-def _piece(t: Array, z: Array, rows: Array) -> _Piece:
+def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
     """Return a piece on an even clock, smoothed."""
     step = float((t[-1] - t[0]) / (t.size - 1))
     even = t[0] + step * np.arange(t.size)
