@@ -162,6 +162,7 @@ def along_axes(
     misled: set[str] = set()
     oblique: set[str] = set()
     axes: list[Axis] = []
+    across: list[str] = []
     v = np.abs(grid[speed]) if speed and speed not in asked else None
     for one in usable:
         if one.quantity == SPEED and (forward := _forward(grid, one, v)):
@@ -169,9 +170,7 @@ def along_axes(
             letter, sign = forward
             axes.append(Axis(one.names[letter], "v_x", sign, f"{letter} goes as the speed"))
             v = np.abs(grid[one.names[letter]]) if v is None else v
-            if yaw_rate and lateral:
-                across = [name for key, name in one.names.items() if key != letter]
-                axes += _sideways(grid, across, v, grid[yaw_rate], grid[lateral])
+            across = [name for key, name in one.names.items() if key != letter]
     v = np.abs(grid[speed]) if v is None and speed else v
     if v is None:
         return Found(frozenset(misled), tuple(axes))
@@ -180,7 +179,7 @@ def along_axes(
             rates = [other for other in usable if other.quantity == RATE]
             up = _up({letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()})
             own = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
-            gyro = next(iter(own or (rates if len(rates) == 1 else [])), None)
+            gyro = next(iter(own or rates), None)
             channels = {*one.names.values(), *(gyro.names.values() if gyro else ())}
             if up[0] == "?":
                 oblique |= channels
@@ -188,6 +187,10 @@ def along_axes(
             told = _of_a_box(grid, one, gyro, up, v, yaw_rate, steering)
             misled |= channels if told is not None else set()
             axes += told or []
+    known = {one.signal: one.factor * grid[one.name] for one in axes}
+    known |= {k: grid[one] for k, one in (("r", yaw_rate), ("a_y", lateral)) if one}
+    if across and {"r", "a_y"} <= set(known):
+        axes += _sideways(grid, across, v, known["r"], known["a_y"])
     return Found(frozenset(misled), tuple(axes), frozenset(oblique))
 
 

@@ -279,8 +279,8 @@ def _of_table(path: Path) -> Iterator[_Frame]:
                 identifier = int(word, 10 if decimal and word.isdigit() else 16)
                 rest = row[at["data"] :] if many else row[at["data"]].split()
                 data = bytes.fromhex("".join(one.strip().removeprefix("0x") for one in rest))
-                # SavvyCAN counts microseconds, all others seconds.
-                time = float(cell) * (1.0 if "." in cell else 1e-6)
+                # SavvyCAN counts whole microseconds, all others seconds.
+                time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
                 told = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
                 extended = told in ("true", "1") if told else identifier > SHORT
                 bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"

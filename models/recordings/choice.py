@@ -32,7 +32,7 @@ from models.recordings.map import LogMap
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
 
-OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5")
+OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
 
 
 class Reading(NamedTuple):
@@ -125,8 +125,9 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
-    if not set(POSE) <= set(found):
-        found = {name: one for name, one in found.items() if name not in POSE}
+    posed = set(POSE) <= set(found)  # then it tells the speed, too
+    spare = {"v_x", *WHEELS} - set(told) if posed else set(POSE)
+    found = {name: one for name, one in found.items() if name not in spare}
     return {name: found[name] for name in QUANTITIES if name in found}
 
 

@@ -99,8 +99,8 @@ def test_a_box_that_lies_oblique_is_not_sure():
     assert "oblique" in found.guesses["a_y"].why
 
 
-def velocities(named, values, letters="XYZ"):
-    return [(named(x), "m/s", v) for x, v in zip(letters, values, strict=True)]
+def velocities(named, values, letters="XYZ", unit="m/s"):
+    return [(named(x), unit, v) for x, v in zip(letters, values, strict=True)]
 
 
 @pytest.mark.parametrize("name", ["VelocityX", "Chassis Velocity X", "/cam/twist.twist.linear.x"])
@@ -119,6 +119,23 @@ def test_velocities_of_games_and_cameras_have_z_forward(name, right):
     assert found.guesses["v_y"].channel == (named("X"),)
     assert found.guesses["v_y"].factor == sign and found.is_sure("v_y")
     assert found.signals()["v_y"].factor == sign
+
+
+@pytest.mark.parametrize("steering", [1.0, -1.0])
+def test_a_game_whose_channels_all_have_letters_is_read_in_signs_that_agree(steering):
+    """Forza: x to the right, y up, z forward, in a left-handed system; no gravity."""
+    found = proposed(
+        *velocities("Velocity{}".format, (-V_Y, noise(0.02, 3), V)),
+        *velocities("Acceleration{}".format, (-A_Y, noise(0.1, 4), A_X), unit="m/s^2"),
+        *velocities("AngularVelocity{}".format, (0.1 * R * R, -R, 0.02 * R), unit="rad/s"),
+        ("Speed", "m/s", V),
+        ("Steer", "", steering * DELTA),
+    )
+    assert found.guesses["v_x"].channel[0] in ("VelocityZ", "Speed")
+    for signal, name in (("v_y", "VelocityX"), ("a_y", "AccelerationX"), ("r", "AngularVelocityY")):
+        assert found.guesses[signal].channel == (name,)
+        assert found.guesses[signal].factor == -steering, signal
+    assert found.guesses["a_x"].channel == ("AccelerationZ",)
 
 
 def test_velocities_of_games_without_turning_have_no_v_y():
