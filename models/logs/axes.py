@@ -3,8 +3,8 @@
 Games have x to the right and z forward, a box may lie on its side, cameras look along z. Of three
 channels that are called alike but for x, y and z: the speed is forward; the mean of an acceleration
 is up; about up the yaw rate is measured, and v_x r is the lateral acceleration. The common sign of
-r and a_y is that of the steering, without one that of up. Where letters are as ISO has them (x
-forward, z up) or numbers do not tell, nothing is said.
+r and a_y is that of the steering, without one that of up. Where letters and signs are as ISO has
+them (x forward, z up) or numbers do not tell, nothing is said.
 """
 
 import math
@@ -262,7 +262,8 @@ def _of_a_box(
     about, along = max(pairs, key=lambda pair: abs(pairs[pair]), default=("", ""))
     if abs(pairs.get((about, along), 0.0)) < SURE:
         return None if up[0] in ("", "z") else []
-    if along == "y" and "z" in (about or "z", up[0] or "z"):
+    as_lettered = along == "y" and "z" in (about or "z", up[0] or "z")
+    if as_lettered and (not up[1] or (up[1] > 0.0 and pairs[about, along] > 0.0)):
         return None
     r = turns[about]
     sign = (up[1] or 1.0) if about else 1.0

@@ -441,7 +441,9 @@ def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> 
 
 
 def _all_instants(cells: Sequence[str]) -> bool:
-    return bool(cells) and all(":" in cell or cell.count("-") == 2 for cell in cells)
+    times = (_is_instant(cell) and not _DOT.fullmatch(cell) for cell in cells)
+    marked = (":" in cell or cell.count("-") == 2 for cell in cells)
+    return bool(cells) and (all(marked) or all(times))
 
 
 def _sure(share: float) -> str:

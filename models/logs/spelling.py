@@ -51,7 +51,7 @@ def _split(name: str) -> tuple[str, str]:
     if len(name) > LONGEST_NAME:
         return name, ""
     held = _BRACKETS.fullmatch(name)
-    if held and (is_unit(held[1]) or "[" in name):
+    if held and not held[1].isdigit() and (is_unit(held[1]) or "[" in name):
         return without_unit(name), held[1]
     for mark in (":", " / ", ", ", " in "):
         bare, there, unit = name.rpartition(mark)

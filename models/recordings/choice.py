@@ -5,6 +5,7 @@ where every signal that is needed is sure. What was proposed is said in the reco
 something is not sure, the error says what it may be, and the word that tells it.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -23,6 +24,7 @@ from models.logs.signals import (
     WHEELS,
     Signal,
     require_fitting,
+    signal_name,
     told_by,
 )
 from models.logs.spelling import without_unit
@@ -188,16 +190,20 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
 
 
 def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
-    """Return the signals of the struct whose fields bear the most standard names, if it is one."""
-    found: dict[str, dict[str, Signal]] = {}
-    for name in QUANTITIES:
-        for one in names:
-            struct, dot, field = one.rpartition(".")
-            if dot and field == column_of(name) and name not in (BETA, *POSE):
-                found.setdefault(struct, {})[name] = Signal(channel=(one,))
-    ranked = sorted(found.values(), key=len, reverse=True)
-    single = len(ranked) == 1 or (len(ranked) > 1 and len(ranked[0]) > len(ranked[1]))
-    return ranked[0] if single else {}
+    """Return the signals whose standard names are fields of structs; of two that of the fuller."""
+    found: dict[str, list[str]] = {}
+    for one in names:
+        struct, dot, field = one.rpartition(".")
+        name = signal_name(field)
+        if dot and name and name not in (BETA, *POSE):
+            found.setdefault(name, []).append(struct)
+    count = Counter(struct for structs in found.values() for struct in structs)
+    result = {}
+    for name, structs in found.items():
+        first, *rest = sorted(structs, key=lambda struct: -count[struct])
+        if not rest or count[first] > count[rest[0]]:
+            result[name] = Signal(channel=(f"{first}.{column_of(name)}",))
+    return result
 
 
 def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str, Signal]:

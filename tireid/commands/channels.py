@@ -77,12 +77,13 @@ def run(options: argparse.Namespace) -> int:
     names = [one.name for one in listed]
     proposal = propose(log, log.headings(), chosen)
     by_map = as_listed(log, told.signals, names)
-    signals = likely_signals({**standard_signals(log, names), **by_map}, proposal)
+    sure = {**standard_signals(log, names), **by_map}
+    signals = likely_signals(sure, proposal)
     signals = with_wheels(signals, proposal)
     missing = missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
-    tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
+    tell(channels_text(listed, seen, signals, proposal, frozenset(sure)))
     empty = holes_text(seen, signals)
     if empty:
         cut = "cut out, as is told" if told.holes == CUT else CUT_BY_MAP

@@ -127,6 +127,9 @@ def test_a_struct_of_matlab_whose_fields_are_ours_is_read(tmp_path, depth):
     tree = {"S": inner} if depth == 1 else {"data": {"car": inner, "gps": slow}}
     scipy.savemat(path, tree)
     np.testing.assert_array_equal(read_recording(path).v_x, SIGNALS["vx"])
+    apart = {"t": T, "car": dict(list(SIGNALS.items())[:3]), "cmd": {"delta_f": SIGNALS["delta_f"]}}
+    scipy.savemat(path, {"log": apart})
+    np.testing.assert_array_equal(read_recording(path).delta_f, SIGNALS["delta_f"])
     scipy.savemat(path, {"a": inner, "b": inner})
     with pytest.raises(RecordingError, match="is missing"):
         read_recording(path)
