@@ -24,6 +24,7 @@ from models.logs.clock import (
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
 from models.logs.signals import (
     BETA,
+    POSE,
     QUANTITIES,
     SPARED,
     WHEELS,
@@ -33,7 +34,7 @@ from models.logs.signals import (
     signed,
 )
 from models.logs.units import is_told, to_si
-from models.recordings.choice import chosen_signals, column_of, has_wheels
+from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
 from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.pose import with_pose
 from models.recordings.record import (
@@ -105,11 +106,14 @@ def recording_of(
         stretches = _stretches(label, signals, parts, log_map, dt)
     except RecordingError as error:
         needed = {
-            key: one for key, one in signals.items() if key not in SPARED or key in log_map.signals
+            key: one
+            for key, one in signals.items()
+            if key not in (*SPARED, *POSE) or key in log_map.signals
         }
-        if len(needed) == len(signals):
+        if len(needed) == len(signals) or missing_signals(needed):
             raise
-        signals, spared = needed, f"{', '.join(map(column_of, SPARED))} is left aside: {error}"
+        left = ", ".join(column_of(key) for key in signals if key not in needed)
+        signals, spared = needed, f"{left} is left aside: {error}"
         parts = _channels(log, label, signals, log_map, run)
         signals, parts, posed = with_pose(label, signals, parts)
         stretches = _stretches(label, signals, parts, log_map, dt)
@@ -117,7 +121,9 @@ def recording_of(
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
         stretches = stretches._replace(kept=kept)
-    notes = (*_notes(log), *reading.notes, *_hole_notes(parts))
+    own = "vx is taken from" if posed else "\0"  # which the pose tells
+    notes = (*_notes(log), *(note for note in reading.notes if not note.startswith(own)))
+    notes += _hole_notes(parts)
     notes += _gap_notes(stretches.kept)
     notes += tuple(note for note in (*posed, learnt, rolls, spared) if note)
     if stretches.short:

@@ -127,9 +127,8 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
-    posed = set(POSE) <= set(found)  # then it tells the speed, too
-    spare = {"v_x", *WHEELS} - set(told) if posed else set(POSE)
-    found = {name: one for name, one in found.items() if name not in spare}
+    if not set(POSE) <= set(found):
+        found = {name: one for name, one in found.items() if name not in POSE}
     return {name: found[name] for name in QUANTITIES if name in found}
 
 

@@ -174,8 +174,19 @@ def test_a_pose_can_be_told_and_wants_all_three(tmp_path):
 def test_a_pose_that_is_integrated_from_wheels_is_refused(tmp_path):
     x, y = integral(V_X * np.cos(PSI)), integral(V_X * np.sin(PSI))
     path = table(tmp_path / "log.csv", {**COLUMNS, "x [m]": x, "y [m]": y, "yaw [rad]": PSI})
+    told = LogMap(signals=told_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match=r"never leaves its heading, as one .* from wheels"):
-        read_recording(path)
+        read_recording(path, log_map=told)
+
+
+def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_path):
+    columns = {**COLUMNS, "yaw [rad]": 3.0 * np.sin(T)}
+    found = read_recording(table(tmp_path / "log.csv", columns))
+    assert found.v_y is None and found.a_y is not None
+    assert any("x, y, heading is left aside" in note for note in found.notes)
+    told = LogMap(signals=told_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
+    with pytest.raises(RecordingError, match="must go along with the direction of travel"):
+        read_recording(tmp_path / "log.csv", log_map=told)
 
 
 def test_of_two_trackers_none_is_taken_and_of_odometry_and_a_tracker_this(tmp_path):
