@@ -129,6 +129,14 @@ WHEEL, TURNING, SPEEDS, BOTH, ENCODER, OTHERS = (
 )
 
 
+def _with_corner(word: str) -> tuple[str, ...]:
+    """Return a word, or what it is made of where a corner of the car is written with it."""
+    for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
+        if corner in CORNERS and stem in BOTH:
+            return stem, corner
+    return (word,)
+
+
 def wheel_words(signal: str, words: Sequence[str]) -> bool:
     """Return whether a name is that of the speed of a wheel.
 
@@ -136,7 +144,7 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
     ----------
     signal : one of `WHEELS`.
     """
-    listed = frozenset(words)
+    listed = frozenset(part for word in words for part in _with_corner(word))
     if listed & OTHERS:
         return False
     if signal == WHEELS[-1]:
@@ -273,7 +281,7 @@ def name_confidence(signal: str, name: str) -> float:
     while len(listed) > 1 and listed[-1] in SOURCES:
         listed = listed[:-1]
         ends += ["".join(listed[k:]) for k in range(len(listed))]
-    if rule.known & set(ends[:1]):
+    if rule.known & {ends[0], "".join(listed)}:
         return KNOWN
     if _with_parts(words_of(_field(name))).union(ends) & rule.never:
         return 0.0

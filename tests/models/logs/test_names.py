@@ -426,11 +426,11 @@ def test_the_carriers_of_carmaker_are_road_wheels() -> None:
 
 
 PUBLIC = {  # of files that people published
-    "v_x": ["vCar", "V_GPS", "v_CG"],
-    "r": ["AngRateDown", "imu_gz_rps", "GPS Gyro", "AVz"],
-    "delta_f": ["StrgWhlAng", "StrWhAng", "StrAngle"],
+    "v_x": ["vCar", "V_GPS", "v_CG", "vel_u", "wheel_based_speed"],
+    "r": ["AngRateDown", "imu_gz_rps", "GPS Gyro", "AVz", "r_imu", "Gyro_Yaw", "yawspeed"],
+    "delta_f": ["StrgWhlAng", "StrWhAng", "StrAngle", "StrgAngl", "SteWhlAngl", "RWA"],
     "a_y": ["LtrlAcc", "accy_can", "lat_g", "LatAc"],
-    "a_x": ["InlineAcc", "LgtlAcc"],
+    "a_x": ["InlineAcc", "LgtlAcc", "LINEALG"],
 }
 UNIT = {"v_x": "m/s", "r": "deg/s", "delta_f": "deg", "a_y": "m/s^2", "a_x": "m/s^2"}
 
