@@ -121,13 +121,7 @@ OF_TF = tuple(
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
-    """List the channels of a bag.
-
-    Raises
-    ------
-    RecordingError
-        One line, where it is no such bag or no message in it has numbers.
-    """
+    """List the channels of a bag."""
     with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
         definitions, undefined = _definitions(path, bag)
         topics, rates, skipped = _topics(bag, definitions)

@@ -97,13 +97,7 @@ def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
 
 
 def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
-    """Read the frames of a log that a DBC knows and list their signals.
-
-    Raises
-    ------
-    RecordingError
-        One line, where the log or the DBC cannot be read, or they have no frame in common.
-    """
+    """Read the frames of a log that a DBC knows and list their signals."""
     if dbc is None:
         raise RecordingError(
             f"{path}: holds frames of a bus; give the DBC file that tells their signals, in the "

@@ -143,13 +143,7 @@ class Log(NamedTuple):
 
 
 def gather(path: Path, kind: str, known: Known) -> Log:
-    """Read the frames of a log.
-
-    Raises
-    ------
-    RecordingError
-        Where there are more than is allowed, or the file is cut off.
-    """
+    """Read the frames of a log."""
     if kind == "MDF4":
         return _of_mdf(path, known)
     found: dict[Key, _Gathered] = {}

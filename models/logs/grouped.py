@@ -91,11 +91,6 @@ class GroupedLog(Generic[P]):
         Parameters
         ----------
         missing : what the file does not hold where there are none, for the message.
-
-        Raises
-        ------
-        RecordingError
-            Where there is no channel, or too many.
         """
         if not found:
             why = "".join(f"; {one}" for one in (*said, remedy) if one)

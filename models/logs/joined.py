@@ -25,11 +25,6 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     Parameters
     ----------
     opened : its files, as logs or with why they are none.
-
-    Raises
-    ------
-    RecordingError
-        Where none is a log, or all hold the same channels, which are drives and no messages.
     """
     logs = {one: log for one, log in opened.items() if not isinstance(log, RecordingError)}
     if not logs:

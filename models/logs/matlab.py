@@ -39,11 +39,6 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
     Parameters
     ----------
     rate : of vectors without a time beside them [Hz]; 0 takes that which the file tells.
-
-    Raises
-    ------
-    RecordingError
-        One line, where it is no such file or holds no vector with a time.
     """
     with path.open("rb") as file:
         head = file.read(HEAD_OF_FILE)

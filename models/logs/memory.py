@@ -30,11 +30,6 @@ class ArrayLog:
     clock_unit : of it, where it is numbers; empty are seconds.
     mend : whether times that do not rise are mended, and not refused.
     rate : of the samples [Hz], in place of a time; 0 where none is told.
-
-    Raises
-    ------
-    RecordingError
-        Where there are no columns, their lengths differ, or none is the time.
     """
 
     def __init__(
@@ -127,11 +122,6 @@ class ArrayLog:
         Parameters
         ----------
         run : one of `runs`; None where there are none, or one.
-
-        Raises
-        ------
-        RecordingError
-            Where a column or run is not there, is not numeric, has not one axis, or another length.
         """
         run = one_run(self.path, self.runs(), run)
         chosen(self.path, names, self._arrays)

@@ -19,13 +19,7 @@ LONGEST_TEXTS = 1_000_000  # bytes of names of columns
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
-    """Return the arrays of a file; numbers are read when they are asked for.
-
-    Raises
-    ------
-    RecordingError
-        Where it holds more than is allowed.
-    """
+    """Return the arrays of a file; numbers are read when they are asked for."""
     if not zipfile.is_zipfile(path):
         return _top(path, "", "data")
     with zipfile.ZipFile(path) as file:

@@ -125,11 +125,6 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     Parameters
     ----------
     whole : whether they are all of it.
-
-    Raises
-    ------
-    RecordingError
-        Where it is binary, empty, or has no header.
     """
     encoding = _encoding(path, head)
     text = _decoded(path, head, encoding)

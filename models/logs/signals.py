@@ -120,11 +120,6 @@ class Signal:
     table : pairs of angles of hand wheel and road wheels [rad], rising, in place of a ratio.
     sign : channel that has the sign of one that holds amounts: below zero, or 1 of 0 and 1, is
         negative; empty where there is none.
-
-    Raises
-    ------
-    RecordingError
-        Where a channel is missing or named twice, or a number impossible.
     """
 
     channel: tuple[str, ...]
@@ -215,14 +210,7 @@ def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
 
 
 def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
-    """Refuse signals that are no signals of ours, or that contradict one another.
-
-    Raises
-    ------
-    RecordingError
-        Where a name is unknown, beta stands beside v_y, a ratio is no angle's, or an axle has a
-        force and the other none.
-    """
+    """Refuse signals that are no signals of ours, or that contradict one another."""
     for name, signal in signals.items():
         if name not in QUANTITIES:
             raise RecordingError(

@@ -436,12 +436,6 @@ def seconds(
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
         and what follows where the clock goes back for long is put after the rest; refused else.
     restarts : whether a clock that goes back for long is mended, too: not one of several.
-
-    Raises
-    ------
-    RecordingError
-        Where a stamp is missing, or stamps fall or repeat, which no even clock explains and
-        nothing mends.
     """
     if values.size == 0:
         return Stamps(np.empty(0), ())
@@ -485,11 +479,6 @@ def risen(
     ----------
     t : times [s], (n,).
     rows : (n,) where each is in the file.
-
-    Raises
-    ------
-    RecordingError
-        As `seconds`.
     """
     clock = Clock(0, name, "s", False, "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)

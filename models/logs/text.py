@@ -35,13 +35,7 @@ _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
 def open_text(path: Path) -> TableLog:
-    """Return the log in a text file of any dialect, its layout understood.
-
-    Raises
-    ------
-    RecordingError
-        Where there is no table with a header in it.
-    """
+    """Return the log in a text file of any dialect, its layout understood."""
     head, whole = b"", True
     for part in pieces(path, RecordingError, limit="megabytes"):
         head += part
@@ -122,11 +116,6 @@ class TextTable:
         ----------
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
-
-        Raises
-        ------
-        RecordingError
-            Where a cell is not what its kind asks for, a row is cut, or there is no row.
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         gathered = Gathered(self.path, wanted, self.names, "line", run)

@@ -127,11 +127,6 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     ----------
     unit : as written; where it tells none, SI is meant.
     quantity : of the signal, one of `SI`.
-
-    Raises
-    ------
-    RecordingError
-        Where the unit is of something else, or not known.
     """
     plain = _plain(unit)
     if plain in NO_UNIT:
