@@ -17,9 +17,8 @@ from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
 from models.logs.units import PER_SECOND
 
 REMEDY = (
-    "--rate HZ tells the samples per second, or save vectors and their time, for example "
-    "s = struct('t', x.Time, 'v', x.Data); "
-    "save('log.mat', '-struct', 's')"
+    "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
+    "save('log.mat', '-struct', 's'); or --rate HZ tells the samples per second"
 )
 
 

@@ -78,7 +78,7 @@ class Rule(NamedTuple):
     words: tuple[str, ...]
 
 
-TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text("utf-8"))
+TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
 _WORDS = {name: some.replace("|", " ").split() for name, some in TABLES["words"].items()}
 
 

@@ -25,7 +25,7 @@ SI = {
     LENGTH: "m",
 }
 
-TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text("utf-8"))
+TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
 FACTORS: Mapping[str, Mapping[str, float]] = {
     quantity: {spelling: factor for some, factor in rows for spelling in some.split()}
