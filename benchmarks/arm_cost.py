@@ -1,14 +1,9 @@
 """What exported C costs on Arm processors, measured in QEMU, beside the targets."""
 
 from benchmarks.targets import Targets, show
+from codegen.processor import CROSS_COMPILER, Cost, compiler_version, missing_tools
 from identifier.export.package import build_package
-from identifier.export.processor import (
-    CROSS_COMPILER,
-    Cost,
-    compiler_version,
-    measure,
-    missing_tools,
-)
+from identifier.export.processor import measure
 from identifier.methods import LIVE, REFERENCE, WITHOUT_V_Y, make_method
 from models.vehicle import sedan
 from mpc.export.pair import build_pair
@@ -46,7 +41,7 @@ def print_arm_costs(targets: Targets) -> None:
     costs = {name: measure(package) for name, package in packages.items()}
     for name, found in costs.items():
         for cost in found:
-            run, precision = cost.replay, "float" if cost.single else "double"
+            run, precision = cost.replay, cost.precision
             print(
                 f"{METHODS[name]:22}{cost.processor:12}{precision:9}"
                 f"{cost.flash:8}{cost.ram:7}{run.stack:7}{run.instructions:8}"
@@ -75,8 +70,8 @@ def print_tracker_costs(targets: Targets) -> None:
     pair = build_pair(build_package(make_method(LIVE, car), car))
     print("tracker              processor   precision   flash    RAM  stack  a step  largest")
     for cost in measure_mpc(pair.tracker):
-        run, precision = cost.replay, "float" if cost.single else "double"
-        ram = cost.static_ram + run.state + run.params + run.work
+        run, precision = cost.replay, cost.precision
+        ram = cost.ram
         print(
             f"{'default, axle curves':21}{cost.processor:12}{precision:9}{cost.flash:8}{ram:7}"
             f"{run.stack:7}{run.instructions:9}{run.most_instructions:9}"

@@ -32,11 +32,12 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
+from codegen.processor import PROCESSORS, missing_tools, replay
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.band import RANGES, SPEEDS, normal_quantile, ranges_of
 from identifier.axle.curve import unit_matrix
 from identifier.export.package import build_package, synthetic_samples
-from identifier.export.processor import PROCESSORS, missing_tools, replay_on
+from identifier.export.processor import recording_program
 from identifier.run import identify
 from identifier.tire_model import AXLES
 from identifier.verdict import calibrated, within_band
@@ -244,7 +245,7 @@ def c_cost(targets: Targets) -> None:
         package = build_package(method, car, start, with_band=with_band)
         samples = synthetic_samples(package.specialized)
         name = package.specialized.name
-        ran = replay_on(PROCESSORS[0], name, package.files, samples, single=True)
+        ran = replay(recording_program(name, package.files, samples), PROCESSORS[0], single=True)
         cost.append(ran.instructions)
     plain, banded = cost
     print(f"  {PROCESSORS[0].name}, float: {plain} instructions a step, {banded} with the band")

@@ -6,7 +6,7 @@ Every run draws a car, conditions of driving with errors of its sensors, and a n
 designed three times: with leakage and gains up to where the certificate proves nothing more
 (theta < 1), with a projection of W at any gain, and with a leakage that has a dead zone; law,
 integrator, sampling and input source are drawn too.
-Each design is asked as `tireid check --monte-carlo DRIVES` asks: its certificate states bounds for
+Each design is asked: its certificate states bounds for
 the declared conditions, and it identifies DRIVES random drives within them, with inputs held over a
 sample, noisy sensors, and every second time with resumed weights. Whether it passes for its margins
 makes no difference: what is stated as proven must hold.
@@ -27,19 +27,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.monte_carlo import Beginning, Observed, bound_rows, monte_carlo
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.driving import Driving, natural_driving
+from identifier.methods import certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS, Gains
 from identifier.paper.network import Network
 from identifier.stability import Certificate
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.loop import direction_matrix
-from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from models.vehicle import Vehicle
-from tireid.commands.certificate_table import bound_rows, certificate_of
 
 SEED, PROCESSES = 5, 2
 DRAWN = ("integral", "integral", "instantaneous", "pi_lead")
@@ -212,15 +212,15 @@ def designs(
     certificate = None
     while certificate is None or "error_bound" not in stated(certificate):
         design = with_leakage(rng, vehicle, random_design(rng, network, driving))
-        certificate = certificate_of(design, vehicle)
+        certificate = certify(design, vehicle)
     yield design, certificate
     design = with_projection(rng, random_design(rng, network, driving, rng.uniform(0.5, 20.0)))
-    yield design, certificate_of(design, vehicle)
+    yield design, certify(design, vehicle)
     certificate = None
     while certificate is None or "error_bound" not in stated(certificate):
         leaking = with_leakage(rng, vehicle, random_design(rng, network, driving))
         design = with_dead_zone(rng, vehicle, leaking)
-        certificate = certificate_of(design, vehicle)
+        certificate = certify(design, vehicle)
     yield design, certificate
 
 
@@ -241,7 +241,7 @@ def driven(
     count: int,
     rng: np.random.Generator,
 ) -> Observed:
-    """Run the drives of `tireid check --monte-carlo`, with the weights that it begins with.
+    """Run random drives, every second one with weights as large as are proven.
 
     Parameters
     ----------

@@ -47,11 +47,11 @@ from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
 from identifier.doctor import Finding
-from models.recordings import Recording, Repair
+from models.recordings import Recording, Repair, check_against_vehicle
 from models.vehicle import Vehicle
 
-CARS = 3  # of each class; on half of their drives a lane change, on half a slalom
-CLEAN = 25  # drives of each class without a fault
+CARS = 1  # of each class; every other of all drives a slalom, the rest a lane change
+CLEAN = 12  # drives of each class without a fault
 WORSE, SMALL = 1.2, 5.0  # times the error without the fault; % that is good whatever that was
 LATE = (0.07, 0.12)  # s, of the inertial unit
 SIZES = {  # by code, of "factor" with the channel: what it is, limit, and factor to its unit
@@ -111,7 +111,8 @@ def learnt_error(log: Recording, told: Vehicle, exact: Recording) -> float:
     exact : the drive without noise or fault, with true forces.
     """
     try:
-        model = ti.identify(blind(log), told).freeze()
+        check_against_vehicle(log, told)
+        model = ti.identify(blind(log), told, check=False).freeze()  # the doctor was asked
         return max(force_error(model, exact))
     except (ArithmeticError, ValueError):
         return math.inf
@@ -291,10 +292,10 @@ def _repairs(outcomes: list[Outcome], targets: Targets) -> None:
     for key, some in (
         ("as_good_unrepaired", [good(force.faulty, force.clean) for force in forces]),
         ("as_good_by_right", [good(force.right, force.clean) for force in forces]),
-        ("harmed", harmed),
     ):
         targets.record(f"force/{key}", 100.0 * float(np.mean(some)), "%")
         show(f"logs, {key.replace('_', ' ')}", f"{100.0 * float(np.mean(some)):.1f} %")
+    targets.at_most("logs that a sure repair made worse", float(sum(harmed)), 0, "", "force/harmed")
     share = 100.0 * float(np.mean(fine))
     targets.at_least("repaired logs as good as clean ones", share, 95.0, "%", "force/as_good")
 
@@ -346,7 +347,7 @@ def main() -> int:
     parser.add_argument("--no-recordings", action="store_true", help="drives of the plant only")
     options, targets = parser.parse_args(), Targets("doctor")
     first = options.first
-    jobs = [(kind, first + k) for kind in CLASSES for k in range(options.cars)]
+    jobs = [(kind, first + i + k) for i, kind in enumerate(CLASSES) for k in range(options.cars)]
     clean = [(kind, first + 500 + k) for kind in CLASSES for k in range(options.clean)]
     with ProcessPoolExecutor(PROCESSES) as pool:
         outcomes = []

@@ -2,8 +2,8 @@
 
 A planted fault is named where a finding of its code and channel is the first or the second. On a
 drive without a fault any finding that matters is an alarm, by `ti.diagnose`, as a user gets it: on
-the whole minute, and on its halves and its middle, half a minute each, of which one may well hold
-no brisk corner. That a half has too few corners to be judged is said of it rightly.
+the whole minute, and on its halves, of which one may well hold no brisk corner. That a half has too
+few corners to be judged is said of it rightly.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,7 +24,7 @@ NAMED = 2  # first or second
 PROCESSES = 2
 QUIET = "straight"  # what a half of a drive may be called
 RECORDED = {"carmaker": CARMAKER, "dart": DART, "dart_imu": DART}
-WHOLE, PARTS = "whole", ("first half", "second half", "middle")
+WHOLE, PARTS = "whole", ("first half", "second half")
 Right = tuple[tuple[str, str], ...]  # codes and channels of findings that are right, "" for any
 
 
@@ -70,9 +70,8 @@ def parts_of(log: Recording) -> dict[str, Recording]:
     n = len(log)
     places = {
         WHOLE: slice(0, n),
-        **dict(zip(PARTS, (slice(0, n // 2), slice(n // 2, n), slice(n // 4, 3 * n // 4)),
-                   strict=True)),
-    }  # fmt: skip
+        **dict(zip(PARTS, (slice(0, n // 2), slice(n // 2, n)), strict=True)),
+    }
     return {name: log.taken(place) for name, place in places.items()}
 
 

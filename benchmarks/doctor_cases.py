@@ -111,8 +111,6 @@ KINDS: Mapping[str, tuple[Plant, float, float, bool]] = {
     "offset a_y": (_offset("a_y", ""), 0.2, 1.0, True),
     "offset delta_f": (_offset("delta_f", ""), 0.4 * DEGREE, 2.0 * DEGREE, True),
     "factor v_x": (_factor("v_x"), 0.05, 0.3, True),
-    "factor v_y": (_factor("v_y"), 0.1, 0.5, True),
-    "factor r": (_factor("r"), 0.05, 0.3, True),
     "factor delta_f": (_factor("delta_f"), 0.1, 0.4, True),
     "factor a_y": (_factor("a_y"), 0.05, 0.3, True),
     "delay v_y": (_late("v_y"), 0.03, 0.2, False),

@@ -41,7 +41,7 @@ from models.faults import SensorFault
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-CARS, CLEAN = 4, 25  # of each class
+CARS, CLEAN = 3, 12  # of each class
 
 
 class Outcome(NamedTuple):

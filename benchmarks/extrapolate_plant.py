@@ -7,11 +7,11 @@ import numpy as np
 
 from benchmarks.answers import force_error
 from benchmarks.extrapolate_recorded import BEHIND, TEXTBOOK, key_of
+from benchmarks.floor import axle_structure, fit_floor
 from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive
 from benchmarks.targets import Targets, show
-from identifier.baselines import fit_floor, structure_of
+from identifier.axle import AxleIdentifier
 from identifier.compare.course import Course
-from identifier.compare.floors import STRUCTURES
 from identifier.method import Method
 from identifier.methods import LIVE, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse
@@ -45,7 +45,7 @@ def maneuvers(targets: Targets) -> None:
         recordings = _drives(np.random.default_rng(seed))
         course = Course(vehicle=car, recordings=recordings, min_speed=slowest)
         row = {name: _learnt_on_first(name, course, seed) for name in (LIVE, REFERENCE)}
-        structure = structure_of(make_method(STRUCTURES["axle units"], car), car)
+        structure = axle_structure(AxleIdentifier.for_vehicle(car), car)
         for label, fitted in (("floor", recordings[:1]), ("best of all", recordings)):
             model = fit_floor(structure, fitted, rng=np.random.default_rng(seed))
             row[label] = course.replays(model)

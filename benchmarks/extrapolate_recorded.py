@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.floor import axle_structure, fit_floor
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, show
 from codegen.arrays import Array
-from identifier.axle import AxleModel
-from identifier.baselines import StiffnessRls, dugoff_ekf, magic_formula_ekf
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.baselines import magic_formula_ekf
 from identifier.compare.course import (
     Course,
     Shares,
@@ -26,7 +27,6 @@ from identifier.compare.course import (
     where_learnt_and_elsewhere,
 )
 from identifier.compare.study import Comparison, Frozen, run_comparison
-from identifier.compare.sweep import best_candidate
 from identifier.method import Method
 from identifier.methods import LIVE, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse, axle_rms
@@ -37,19 +37,13 @@ from models.vehicle import Vehicle
 RUNS = {"hard": "slalom1_14_5ms", "mild": "experiment2_40kmh"}
 REAL_RUNS = ("ramp_steer02", "free_10_02_28", "free_10_12_05")
 SEEDS = 10
-STARTS = 3  # of each floor, as `tireid compare` has it
-DESIGNS = 200  # of each method, tuned in hindsight on the real car
 BRISK = "ramp_steerneg025"  # of the real car, too
 SLOW = ("free_10_01_01", "rubber_12_37_59")  # forces below 1 N rms, of which half is not motion
 TILES = "tape_tiles_steer_neg03"  # another floor: nothing learnt elsewhere knows its friction
 BEHIND = 1.0 / 0.9  # the default over any other method: none is better by more than 10 %
-BASELINES = ("linear", "stiffness_rls", "magic_formula_ekf", "dugoff_ekf", REFERENCE)
-BEST = "magic_formula_ekf"  # of the baselines on the real car, which is a target
-FLOOR = "axle units"
+BASELINES = ("linear", "magic_formula_ekf", REFERENCE)
 TEXTBOOK: dict[str, Callable[[Vehicle], Method]] = {
     "magic_formula_ekf": partial(magic_formula_ekf, textbook=True),
-    "dugoff_ekf": partial(dugoff_ekf, textbook=True),
-    "stiffness_rls": partial(StiffnessRls.for_vehicle, textbook=True),
 }
 AXLES = ("front", "rear")
 LIMITS = {("hard", "hard"): (9.0, 5.0), ("hard", "mild"): (15.0, 15.0)}  # front, rear [%]
@@ -74,10 +68,11 @@ def carmaker(targets: Targets) -> None:
     """
     drives = {n: read_recording(DATA / "carmaker.csv.gz", run=run) for n, run in RUNS.items()}
     runs = tuple(drives.values())
-    found = _compare((LIVE,), CARMAKER, runs, starts=STARTS)
+    found = _compare((LIVE,), CARMAKER, runs)
     others = [_compare((LIVE,), car, runs) for car in told_cars()[1:]]
     every = [one.trials[LIVE].frozen for one in (found, *others)]
-    floors, course = found.floors[FLOOR], found.course
+    course = found.course
+    floors = _floors(course)
     print(f"CarMaker, effective vehicle, {LIVE} [% of rms force]")
     for learnt, first in drives.items():
         for unseen, other in drives.items():
@@ -197,7 +192,7 @@ def dart(targets: Targets) -> None:
     runs = tuple(read_recording(DATA / "dart.csv.gz", run=run) for run in REAL_RUNS)
     found = _compare((LIVE, *BASELINES), DART, runs)
     print("Real 1:10 car, frozen, on the other runs: both axles [% of rms force]")
-    rows = {"floor": _compare((LIVE,), DART, runs, starts=STARTS).floors[FLOOR]}
+    rows: dict[str, Frozen] = {"floor": _floors(found.course)}
     for name, trial in found.trials.items():
         if trial.frozen is None or trial.diverged_at:
             show(name, "diverged")
@@ -220,7 +215,6 @@ def dart(targets: Targets) -> None:
     targets.record("dart/best_baseline", best)
     label = f"real car: mean over the six, against {best}"
     targets.at_most(label, means[LIVE], means[best], key="dart/mean_against_best")
-    _in_hindsight(targets, runs)
 
 
 def side_by_side(targets: Targets) -> None:
@@ -306,36 +300,24 @@ def _courses() -> dict[str, tuple[Vehicle, tuple[Recording, ...]]]:
     }
 
 
-def _in_hindsight(targets: Targets, runs: tuple[Recording, ...]) -> None:
-    """Show what the best of random designs has, chosen on the runs that it is judged on."""
-    found = _compare((LIVE, BEST), DART, runs, designs=DESIGNS)
-    for name, candidates in found.sweeps.items():
-        best = best_candidate(candidates)
-        assert best is not None and best.shares.other is not None
-        show(f"{name}: best of {DESIGNS} designs, in hindsight", f"{best.shares.other:.1f} %")
-        targets.record(f"dart/{name}/in_hindsight", best.shares.other, "%")
-
-
 def _compare(
     names: tuple[str, ...],
     vehicle: Vehicle,
     recordings: tuple[Recording, ...],
     *,
     seed: int = 0,
-    starts: int = 0,
-    designs: int = 0,
 ) -> Comparison:
-    """Compare as `tireid compare` does, in this process."""
-    return run_comparison(
-        names,
-        vehicle,
-        recordings,
-        seed=seed,
-        designs=designs,
-        starts=starts,
-        workers=1,
-        progress=lambda _: None,
-    )
+    """Compare as `tireid compare` does."""
+    return run_comparison(names, vehicle, recordings, seed=seed, progress=lambda _: None)
+
+
+def _floors(course: Course) -> Frozen:
+    """Return the errors of the axle identifier's curves fitted to the true forces of each drive."""
+    structure = axle_structure(AxleIdentifier.for_vehicle(course.vehicle), course.vehicle)
+    return {
+        one.name: course.replays(fit_floor(structure, [one], rng=np.random.default_rng(0)))
+        for one in course.recordings
+    }
 
 
 def _elsewhere(course: Course, frozen: Frozen) -> tuple[list[float], tuple[float, float]]:

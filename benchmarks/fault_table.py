@@ -31,7 +31,7 @@ from benchmarks.targets import Targets, keeps, show
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle, sedan
 
-CARS = 5  # of each class
+CARS = 2  # of each class
 RUNS = {"slalom": "slalom1_14_5ms", "sine": "experiment2_40kmh"}
 TWICE, SMALL = 2.0, 5.0  # times the error without the fault; % that is good whatever that was
 LABELS = {  # by the first part of the key of a case; its size follows

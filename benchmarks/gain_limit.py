@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.limits import integral_limit
 from benchmarks.random_drives import FORCE_UNIT
 from benchmarks.steady_cornering import Corner, loop_at, random_corner
 from benchmarks.targets import Targets, keeps
@@ -22,7 +23,6 @@ from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network, Weights
 from identifier.run import identify
-from identifier.stability.limits import integral_limit
 from identifier.stability.loop import INTEGRAL, INTEGRATORS, Loop
 from identifier.stability.margins import gain_margin
 from identifier.stability.operation import estimated_input_feedback, minimal_decay

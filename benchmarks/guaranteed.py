@@ -9,7 +9,7 @@ known slip or not, with exact signals, as the band says nothing of sensors. Half
 band is meant over the known slip, and set over the largest error of the frozen model there, as
 `bounds_monte_carlo` sets bounds over the largest error that was observed; and over the rms error.
 Beside it stand the same with a bound that is told and true, the least that a curve keeps in the
-drive that taught and in those that are asked, and the recursive outer ellipsoid over the polytope.
+drive that taught and in those that are asked.
 Last, where the recordings of CarMaker are there, each run is asked of what the other taught.
 `RESERVE` was chosen on seeds below 1000.
 """
@@ -30,8 +30,7 @@ from benchmarks.recorded_cars import CARMAKER, DATA
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.ellipsoid import outer_ellipsoid
-from identifier.axle.guarantee import Doubt, ForceBound, Strips, least_bound, prior_box
+from identifier.axle.guarantee import ForceBound, Strips, least_bound, prior_box
 from identifier.run import History, identify
 from identifier.verdict import guaranteed
 from identifier.verdict.guaranteed import strips_of
@@ -56,14 +55,11 @@ class Asked(NamedTuple):
 
 
 class Car(NamedTuple):
-    """A car: its class, its drives by kind of bound, the CPU seconds that a guarantee took, and the
-    width of the outer ellipsoid over that of the polytope.
-    """
+    """A car: its class, its drives by kind of bound, the CPU seconds that a guarantee took."""
 
     group: str
     drives: dict[str, list[Asked]]
     seconds: float
-    ellipsoid: float
 
 
 def learnt(log: Recording, car: Vehicle) -> History:
@@ -131,25 +127,6 @@ def true_bound(run: History, drives: list[Recording]) -> ForceBound:
     return ForceBound(error=(front, rear))
 
 
-def ellipsoid_over_polytope(run: History, model: AxleModel) -> float:
-    """Return the width of the ellipsoid's band over that of the polytope, median over slip."""
-    frozen, guarantee = run.freeze(), model.guarantee
-    assert isinstance(frozen, AxleModel) and guarantee is not None
-    strips = strips_of(frozen, run.recording)
-    assert strips is not None
-    slip = np.linspace(0.1, 1.0, 10)[:, None] * model.known_slip
-    units = np.tanh(slip[..., None] / np.array(model.ladder))
-    low, high = guarantee.limits(units, Doubt.none(len(slip)))
-    ratios = []
-    for axle in range(2):
-        outer = outer_ellipsoid(strips, axle, guarantee.bound, model.ladder)
-        assert outer is not None
-        inner, wide = outer.reach(units[:, axle])
-        wide = wide - inner + 2.0 * guarantee.bound.error[axle]
-        ratios.append(wide / (high - low)[:, axle])
-    return float(np.median(ratios))
-
-
 def short_straight(vehicle: Vehicle, rng: np.random.Generator) -> Beginning:
     """Return how a drive that is asked begins.
 
@@ -183,7 +160,7 @@ def plant_case(job: tuple[str, int, int]) -> Car | None:
     models = {"estimated": model, "told": told}
     each = [asked(models, one, STRAIGHT) for one in exact]
     found = {bound: [one[bound] for one in each] for bound in models}
-    return Car(kind, found, seconds, ellipsoid_over_polytope(run, model))
+    return Car(kind, found, seconds)
 
 
 def carmaker_cases() -> dict[str, Asked]:
@@ -235,7 +212,6 @@ def report(cars: list[Car], recorded: dict[str, Asked], targets: Targets) -> Non
                 targets.record(f"{key}/outside", outside)
                 targets.record(f"{key}/over_largest", largest)
     targets.record("seconds", float(np.median([car.seconds for car in cars])), "s")
-    targets.record("ellipsoid_over_polytope", float(np.median([car.ellipsoid for car in cars])))
     for name, one in recorded.items():
         for axle, ratio in zip(("front", "rear"), one.over_largest, strict=True):
             targets.record(f"recorded/{name}/{axle}/over_largest", float(ratio))

@@ -28,6 +28,15 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.hostile_designs import HIDDEN, INPUTS, INTEGRATORS, LAWS, UNIT, Case, random_cases
+from benchmarks.monte_carlo import (
+    Beginning,
+    Drives,
+    driven,
+    first_weights,
+    largest_norms,
+    measured,
+    within,
+)
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, Driving
@@ -38,15 +47,6 @@ from identifier.paper.network import Network
 from identifier.stability import Certificate, certify
 from identifier.stability.checks import bound_checks, drift_check, dynamics_checks
 from identifier.stability.loop import direction_matrix
-from identifier.stability.monte_carlo import (
-    Beginning,
-    Drives,
-    driven,
-    first_weights,
-    largest_norms,
-    measured,
-    within,
-)
 from identifier.stability.operation import (
     declared_signals,
     largest_steering_rate,

@@ -30,7 +30,7 @@ import numpy as np
 from benchmarks.targets import Targets, keeps, show
 from models.recordings import Recording
 from models.vehicle import sedan
-from tireid.driving import sample_recording
+from tireid.driving.learn import sample_recording
 
 DT = 0.01  # s
 LASTS = {"60_s": 60.0, "1_h": 3600.0, "10_h": 36000.0}  # s

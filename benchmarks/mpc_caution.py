@@ -39,8 +39,9 @@ from models.vehicle import Vehicle, sedan
 from mpc.loop.sensing import cornering_limit
 from mpc.path import Path, iso_3888_1, slalom, steady_speed
 from tireid.commands.drive_case import conditions_of, make_setup
-from tireid.driving import Conditions, SpeedWish, learning_drive, run_drive
-from tireid.driving.runs import FROZEN
+from tireid.driving.learn import learning_drive
+from tireid.driving.runs import FROZEN, Conditions, run_drive
+from tireid.driving.setup import SpeedWish
 from tireid.learning import identify
 
 CLASSES = ("compact", "sedan")
@@ -127,7 +128,6 @@ def conditions(case: Case) -> Conditions:
     setup = make_setup(
         path,
         vehicle=car,
-        plant="double-track",
         mu=1.0,
         drops=[(place, WET)] if wet else [],
         wish=SpeedWish(None, speed),

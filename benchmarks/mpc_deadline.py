@@ -16,10 +16,11 @@ import numpy as np
 from benchmarks.mpc_stress import DELAY, PERIOD, PROBLEM, stress, tires
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
-from identifier.export.processor import missing_tools
+from codegen.processor import Replay, missing_tools, replay
 from mpc.export.package import MpcPackage, build_mpc_package
-from mpc.export.processor import Replay, replay_on_processor
-from mpc.realtime.instance import input_type, params_type
+from mpc.export.processor import PROCESSOR, vectors_program
+from mpc.realtime.instance import c_types
+from mpc.tires import TireStructure
 
 STEPS = 200  # of each tire
 SEED = 1  # another than that of `mpc_stress`
@@ -28,11 +29,11 @@ CAPS = {"network": 16, "lagging curve": 10}  # iterations, with 5 and 7 states
 TOLERANCES = {"exported": None, "never met": "1e-30F"}
 
 
-def measured_in(recorded: bytes, n_weights: int) -> list[Array]:
+def measured_in(recorded: bytes, structure: TireStructure) -> list[Array]:
     """Return every input of `Stress.recorded`: 4 numbers of the car, then the road (86,)."""
     told, inputs = np.dtype((float, 3)).itemsize, []
-    told_params = params_type(n_weights, single=False).itemsize
-    size, at = input_type(PROBLEM.horizon, single=False).itemsize, 0
+    types = c_types(structure, PROBLEM.horizon, single=False)
+    told_params, size, at = types["params"].itemsize, types["input"].itemsize, 0
     while at < len(recorded):
         does = np.frombuffer(recorded, count=1, offset=at)[0]
         at += told + (told_params if does else 0)
@@ -78,7 +79,8 @@ def replayed(
         "src/tireid_mpc_tables.h": changed,
         "tests/tireid_mpc_vectors.h": as_vectors(inputs),
     }
-    return replay_on_processor(package._replace(files=files), single=True, steps=len(inputs))
+    program = vectors_program(package._replace(files=files), steps=len(inputs))
+    return replay(program, PROCESSOR, single=True)
 
 
 def main(*, keep: bool = False) -> int:
@@ -102,7 +104,7 @@ def main(*, keep: bool = False) -> int:
         key = name.replace(" ", "_")
         targets.record(f"{key}/cap", cap, "")
         targets.record(f"{key}/beyond", beyond, "%")
-        inputs = measured_in(came.recorded, choice[0].weights.size)
+        inputs = measured_in(came.recorded, choice[0].structure)
         package = build_mpc_package(choice[0], PROBLEM, period=PERIOD, delay=DELAY)
         for kind, tolerance in TOLERANCES.items():
             run = replayed(package, inputs, cap, tolerance)

@@ -31,11 +31,12 @@ from benchmarks.mpc_cases import drive_with, options_of
 from benchmarks.targets import Targets, keeps, show
 from identifier.compare.work import spread
 from models.vehicle import sedan
-from mpc.handover import Learner
+from mpc.handover.learner import Learner
 from mpc.loop.sensing import cornering_limit
 from mpc.path import Path, iso_3888_1, slalom, steady_speed
 from tireid.commands.drive_case import conditions_of, make_setup
-from tireid.driving import Conditions, Run, SpeedWish
+from tireid.driving.runs import Conditions, Run
+from tireid.driving.setup import SpeedWish
 
 TIRES = ("linear", "frozen", "learning", "oracle")
 GAPS = {"slalom 24 m": 24.0, "slalom 30 m": 30.0, "slalom 36 m": 36.0}  # of the cones [m]
@@ -107,7 +108,6 @@ def conditions(case: Case) -> Conditions:
     setup = make_setup(
         path,
         vehicle=None,
-        plant="double-track",
         mu=DRY,
         drops=[(case.place, WET)],
         wish=SpeedWish(None, speed),

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.mpc_cases import Case, options_of
 from benchmarks.targets import Targets, keeps
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from mpc.path import BUILT_IN
 from mpc.problem import Problem, tracking_errors
 from tireid.commands.drive_case import conditions_of

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, Protocol
 import casadi as ca
 import numpy as np
 
+from benchmarks.converged import build_errors, iterated, prepare_solution, solve
 from benchmarks.mpc_double_lane_change import PROBLEM, SPEED
 from codegen import load_library
 from codegen.arrays import Array
-from mpc.converged import build_errors
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
 from mpc.realtime.instance import FLAGS, tracker_source
@@ -172,13 +172,13 @@ class Ours:
 
     def step(self, x0: Array, kappa: Array) -> Answer:
         """Return the plan from a state, on the curvature of the stages."""
-        self.tracker.shift()
+        self.tracker.instance.shift()
         if self.prepared:
-            self.ahead.append(self.tracker.prepare_solution(kappa, SPEED))
+            self.ahead.append(prepare_solution(self.tracker, kappa, SPEED))
         if self.converged:
-            told = self.tracker.solve_converged(x0, kappa, SPEED)
+            told = iterated(self.tracker, x0, kappa, SPEED)
         else:
-            told = self.tracker.solve(x0, kappa, SPEED)
+            told = solve(self.tracker, x0, kappa, SPEED)
         return Answer(told.plan_x, told.plan_u, told.solve_time_s, told.status != Status.OK)
 
 

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.converged import build_errors
 from benchmarks.mpc_double_lane_change import (
     PROBLEM,
     SPEED,
@@ -36,7 +37,6 @@ from benchmarks.mpc_double_lane_change import (
 from benchmarks.mpc_peers import CondensedDaqp, Ours, Peer, hpipm, ipopt
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
-from mpc.converged import build_errors
 from mpc.tires.tire import PredictionTire
 
 ROUNDS = 5

@@ -26,12 +26,11 @@ from benchmarks.mpc_cases import options_of
 from benchmarks.targets import Targets, keeps
 from identifier.compare.work import spread
 from identifier.tire_model import TireModel
-from mpc.handover import Learner
+from mpc.handover.learner import Learner
 from mpc.handover.rules import Verdict
-from mpc.loop import ToldScores, told_scores
+from mpc.loop.record import ToldScores, told_scores
 from tireid.commands.drive_case import conditions_of, frozen_tires
-from tireid.driving import Conditions, run_drive
-from tireid.driving.runs import FROZEN, FULL, IMU, LEARNING, SENSORS
+from tireid.driving.runs import FROZEN, FULL, IMU, LEARNING, SENSORS, Conditions, run_drive
 
 PATHS = ("iso-3888-2", "course")
 FRICTIONS = (1.0, 0.5)

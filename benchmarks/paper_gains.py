@@ -19,6 +19,7 @@ import numpy as np
 
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
+from identifier.methods import certify
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.paper_study import (
@@ -35,7 +36,6 @@ from identifier.paper_study import (
 )
 from models.recordings import Recording
 from models.vehicle import sedan
-from tireid.commands.certificate_table import certificate_of
 
 DESIGNS = 1500
 SEED, OTHER_SEED = 8, 9  # of the designs; the other shows how far the counts are chance
@@ -158,7 +158,7 @@ def main(designs: int = DESIGNS, *, keep: bool = False) -> int:
             targets.at_most(
                 "gains of identifier.paper_study that are not the calmest", not same, 0, ""
             )
-    certificate = certificate_of(paper_design("instantaneous", 0), sedan())
+    certificate = certify(paper_design("instantaneous", 0), sedan())
     margin = certificate["gain_sampled"].margin
     assert margin is not None
     targets.record("instantaneous/loop_gain_over_its_limit", 1.0 / margin)

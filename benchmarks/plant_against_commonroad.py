@@ -6,7 +6,7 @@ drives step steers and a slalom with both at 20 m/s on dry and on slippery road,
 and writes the figure OUT/plant_against_commonroad.png. The multi-body car has 29 states and its own
 authors; both get the same parameters (its BMW 320i), tires, steering and speed controller.
 The first table is against the program as published, the second with its two contradictions removed
-(see `mpc.cars.bmw_equations`): what remains is the difference of the models.
+(see `benchmarks.commonroad_multibody`): what remains is the difference of the models.
 The lateral velocity passes through zero near this speed, so that its error in percent of its own
 rms says little; the table gives it as an angle of side slip too. It does not decide about passing.
 Targets: steady values against either, transients against the repaired program.
@@ -20,14 +20,13 @@ from typing import NamedTuple
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.commonroad_multibody import drive
+from benchmarks.commonroad_bmw import CommonRoadTire, bmw, bmw_320i, bmw_parameters
+from benchmarks.commonroad_multibody import MultiBody, drive
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from models.friction import Friction
 from models.maneuvers import Maneuver, Slalom, StepSteer
 from models.plant import Driver, Plant
-from mpc.cars.bmw import CommonRoadTire, bmw, bmw_320i, bmw_parameters
-from mpc.cars.bmw_equations import MultiBody
 
 SPEED = 20.0  # [m/s]
 ONSET = 0.5  # [s]
@@ -85,7 +84,7 @@ def compare(name: str, maneuver: Maneuver, scale: float, *, repaired: bool) -> C
         maneuver, speed=SPEED, friction=Friction(scale=scale)
     )
     plant = {"a_y": run.a_y, "r": run.r, "v_y": run.v_y}
-    equations = MultiBody(bmw(), repaired=repaired)
+    equations = MultiBody(repaired=repaired)
     reference = drive(equations, parameters, maneuver, speed=SPEED, driver=DRIVER)
     steady = {}
     if isinstance(maneuver, StepSteer):

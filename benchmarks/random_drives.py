@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from benchmarks.monte_carlo import Drives, residuals
 from codegen.arrays import Array
-from identifier.stability.monte_carlo import Drives, residuals
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 

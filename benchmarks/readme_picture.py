@@ -5,7 +5,8 @@ from tempfile import TemporaryDirectory
 
 from tireid.commands.demo_parts import LANE_CHANGE, drive_story
 from tireid.commands.demo_story import run_story
-from tireid.figures import figure_png, side_by_side_figure
+from tireid.figures.forces import side_by_side_figure
+from tireid.figures.style import figure_png
 
 FILM = "drive.webp"
 DOCS = Path(__file__).resolve().parents[1] / "docs"

@@ -12,14 +12,14 @@ import sys
 import numpy as np
 from scipy.linalg import eigvals
 
-from benchmarks.targets import Targets, keeps
-from identifier.paper.laws import DrivingError
-from identifier.stability.limits import (
+from benchmarks.limits import (
     critical_frequency,
     instantaneous_euler_limit,
     integral_euler_limit,
     integral_limit,
 )
+from benchmarks.targets import Targets, keeps
+from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, growth_rate
 from identifier.stability.margins import gain_margin
 

@@ -4,13 +4,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
 from codegen.arrays import Array
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.stability.loop import regressor_gains
-from identifier.stability.operation import jacobian_feedback
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -20,6 +20,21 @@ class Corner(NamedTuple):
 
     vehicle: Vehicle
     recording: Recording
+
+
+def jacobian_feedback(*, W: ArrayLike, V_x: ArrayLike, s: ArrayLike, K: ArrayLike) -> Array:
+    """J_f K = W (I - Λ) V_x K of the present network [1/s], (2, 2).
+
+    Parameters
+    ----------
+    W : (2, n_h) output weights, force unit U.
+    V_x : (n_h, 2) d(V x_bar)/dx, with the scales of the input in it [s/m, s/rad].
+    s : (n_h,) hidden units.
+    K : (2, 2) of (6) for forces in U.
+    """
+    W, V_x, s, K = np.asarray(W), np.asarray(V_x), np.asarray(s), np.asarray(K)
+    feedback: Array = (W * (1.0 - s**2)) @ V_x @ K
+    return feedback
 
 
 def random_corner(rng: np.random.Generator, *, duration: float, dt: float = 0.01) -> Corner:

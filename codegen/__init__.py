@@ -4,7 +4,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from codegen.batch import BatchScan
     from codegen.compiler import (
         CompilationError,
         build_library,
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from codegen.scan import Scan, Stepper
 
 __all__ = [
-    "BatchScan",
     "CompilationError",
     "Scan",
     "Stepper",
@@ -24,7 +22,7 @@ __all__ = [
     "find_compiler",
     "load_library",
 ]
-_HOMES = {"BatchScan": "batch", "Scan": "scan", "Stepper": "scan"}  # all others: compiler
+_HOMES = {"Scan": "scan", "Stepper": "scan"}  # all others: compiler
 
 
 def __getattr__(name: str) -> Any:

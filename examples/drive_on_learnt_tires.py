@@ -14,11 +14,14 @@ from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import Drive, cornering_limit, drive, inertial_unit
+from mpc.loop.drive import drive
+from mpc.loop.record import Drive
+from mpc.loop.sensing import cornering_limit, inertial_unit
 from mpc.path import iso_3888_2, steady_speed
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.figures import drive_errors_figure, save_figure
+from tireid.figures.drive import drive_errors_figure
+from tireid.figures.style import save_figure
 
 EXPECTED_BELOW = 0.5
 SHARE = 0.9  # of the lateral acceleration that the tires can give

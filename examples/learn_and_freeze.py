@@ -13,7 +13,8 @@ from identifier.run import identify
 from models.maneuvers import DoubleLaneChange, Slalom
 from models.plant import Plant
 from models.vehicle import sedan
-from tireid.figures import prediction_figure, save_figure
+from tireid.figures.forces import prediction_figure
+from tireid.figures.style import save_figure
 
 EXPECTED_BELOW = 1.0  # kN
 RATE_LIMIT = np.radians(30.0)  # rad/s

@@ -7,7 +7,7 @@ the same code; they differ in the `Method` that is handed over.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeGuard, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.setup import AXLE_FORCE, HALF_BAND, Block, Port, Setup
 from identifier.tire_model import Reached, TireModel
-from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -184,12 +183,7 @@ class Method(ABC):
         return (AXLE_FORCE,)
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: nothing, where a method does not say more.
-
-        Parameters
-        ----------
-        driving : how hard it is driven; None takes what the method was designed for.
-        """
+        """Return what is proven of it: nothing, where a method does not say more."""
         del vehicle, driving
         return Certificate()
 
@@ -202,20 +196,6 @@ class Method(ABC):
         """
         del history
         return Certificate()
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has; empty: nothing."""
-        return {}
-
-    def tuned(self, values: Mapping[str, float]) -> Self:
-        """Return the method with other numbers.
-
-        Parameters
-        ----------
-        values : by name of its `tunables`; empty leaves it as it is.
-        """
-        return with_numbers(self, values)
 
     def numbers(self) -> dict[str, Any]:
         """Return all that was chosen, as plain data: gains, network, the rest and the seed.
@@ -251,22 +231,11 @@ class Method(ABC):
         del vehicle, state
         return ()
 
-    def road_push(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
-
-        What learning did not take for a force of the tires; None where a method takes all for one.
-
-        Parameters
-        ----------
-        state : carried values by port at n + 1 instants, of a run.
-        """
-        del state
-        return None
-
     def beside_force(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what an accelerometer showed beside the forces of the tires, (n,) [weights].
+        """Return what a run found to be no force of the tires, to the left (n,) [weights].
 
-        Bias, and the roll of the body, as far as they were found; None where a method finds none.
+        What a banked road pushes; without a v_y what the accelerometer shows beside forces: bias,
+        and the roll of the body. None where a method takes all for a force.
 
         Parameters
         ----------

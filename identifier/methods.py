@@ -1,24 +1,22 @@
-"""Every method by its name: the default, the better laws, the paper's laws and the baselines.
+"""Every method by its name: the default, the paper's laws, the baselines and what is installed.
 
 A factory takes the vehicle and the seed of initial weights, where there are random ones, and
-returns a method whose numbers follow from the vehicle alone.
+returns a method whose numbers follow from the vehicle alone. An installed distribution adds methods
+by entry points of the group `tireid.methods`: a name, and a factory. Built-in names are taken.
 """
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.model import AxleModel
 from identifier.baselines import (
-    ExtendedStateObserver,
-    ForceEkf,
     HorizonEstimator,
     LaggedEkf,
     LinearBaseline,
-    StiffnessRls,
     Washout,
-    dugoff_ekf,
     joint_ekf,
     linear_kf,
     magic_formula_ekf,
@@ -31,13 +29,11 @@ from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
 from identifier.paper.network import NetworkModel
-from identifier.regression import RegressionIdentifier
 from identifier.tire_model import TireModel
 from models.rules import require_kind
 from models.vehicle import Vehicle
 
 Factory = Callable[[Vehicle, int], Method]
-REGRESSIONS = ("kreisselmeier", "kreisselmeier_newton", "rls", "concurrent")
 DEFAULT = "fit"  # on logs
 LIVE = "axle"  # the default in a car, sample by sample
 WITHOUT_V_Y = "inertial"  # the default where a log has no lateral velocity
@@ -46,10 +42,6 @@ REFERENCE = "integral"  # the paper's law, which times are compared with
 
 def _paper(law: str) -> Factory:
     return lambda vehicle, seed: PaperIdentifier.for_vehicle(vehicle, law=law, seed=seed)
-
-
-def _regression(law: str) -> Factory:
-    return lambda vehicle, seed: RegressionIdentifier.for_vehicle(vehicle, law=law, seed=seed)
 
 
 def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
@@ -64,16 +56,11 @@ METHODS: Mapping[str, Factory] = {
     DEFAULT: _seedless(FitMethod.for_vehicle),
     LIVE: _seedless(AxleIdentifier.for_vehicle),
     WITHOUT_V_Y: _seedless(InertialIdentifier.for_vehicle),
-    **{law: _regression(law) for law in REGRESSIONS},
     **{law: _paper(law) for law in VARIANTS},
     "linear": _seedless(LinearBaseline.for_vehicle),
-    "stiffness_rls": _seedless(StiffnessRls.for_vehicle),
     "magic_formula_ekf": _seedless(magic_formula_ekf),
     "textbook_ekf": _seedless(partial(magic_formula_ekf, textbook=True)),
     "lagged_ekf": _seedless(LaggedEkf.for_vehicle),
-    "dugoff_ekf": _seedless(dugoff_ekf),
-    "eso": _seedless(ExtendedStateObserver.for_vehicle),
-    "ekf_force": _seedless(ForceEkf.for_vehicle),
     "linear_kf": _seedless(linear_kf),
     "joint_ekf": _seedless(joint_ekf),
     "washout": _seedless(Washout.for_vehicle),
@@ -93,14 +80,23 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
 }
 
 
+GROUP = "tireid.methods"
+
+
+@cache
+def _installed() -> dict[str, EntryPoint]:
+    """Return what other distributions add, by name."""
+    return {one.name: one for one in entry_points(group=GROUP) if one.name not in METHODS}
+
+
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
 
     Parameters
     ----------
-    name : one of `METHODS`.
+    name : one of `methods`.
     """
-    return name in (*REGRESSIONS, *VARIANTS)
+    return name in VARIANTS
 
 
 def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
@@ -108,17 +104,27 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
 
     Parameters
     ----------
-    name : one of `METHODS`.
+    name : one of `methods`.
     seed : seed of the initial weights, where there are random ones.
 
     Raises
     ------
     ValueError
-        Where the name is unknown.
+        Where the name is unknown, or what is installed under it makes no method.
     """
-    if name not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, not {name!r}")
-    return METHODS[name](vehicle, seed)
+    if name in METHODS:
+        return METHODS[name](vehicle, seed)
+    if name not in _installed():
+        raise ValueError(f"method must be one of {', '.join(methods())}, not {name!r}")
+    point = _installed()[name]
+    try:
+        method = point.load()(vehicle, seed)
+    except Exception as error:  # of another's code
+        reason = " ".join(str(error).split())
+        raise ValueError(f"method {name} ({point.value}) cannot be made: {reason}") from error
+    if not isinstance(method, Method):
+        raise ValueError(f"method {name} ({point.value}) is a {type(method).__name__}, no Method")
+    return method
 
 
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
@@ -139,8 +145,8 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
 
 
 def methods() -> tuple[str, ...]:
-    """Return the names of all methods, the default first."""
-    return tuple(METHODS)
+    """Return the names of all methods, the default first, those of other distributions last."""
+    return (*METHODS, *_installed())
 
 
 def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
@@ -149,7 +155,6 @@ def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = No
     Parameters
     ----------
     method : a method, or its name as of `methods`.
-    driving : how hard it is driven; None takes what the method was designed for.
 
     Raises
     ------

@@ -279,12 +279,7 @@ class OnnxModel(TireModel):
         return tuple(read_network(self.content, self.inputs).name_in())
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs.
-
-        Parameters
-        ----------
-        dt : sampling interval of what is replayed [s]; it is not looked at.
-        """
+        """Return what a replay needs."""
         del dt
         return Setup(
             scan=_scan(self.content, self.inputs, self.slip_sign),
@@ -296,13 +291,7 @@ class OnnxModel(TireModel):
         )
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression.
-
-        Parameters
-        ----------
-        alpha : slip angles (2,) [rad], the wheels straight ahead.
-        v_x : longitudinal speed [m/s].
-        """
+        """Return the steady axle forces (2,) [N] as a CasADi expression."""
         return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
 
     def force_expression(
@@ -313,9 +302,6 @@ class OnnxModel(TireModel):
         Parameters
         ----------
         slip : empty.
-        x : [v_y, r] (2,).
-        delta : angle of the front wheels [rad].
-        v_x : longitudinal speed [m/s], positive.
         """
         del slip, least_lag
         return self._static_force(x, delta, v_x), ca.MX(0, 1)
@@ -338,12 +324,7 @@ class OnnxModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":
-        """Return the model that `to_dict` describes.
-
-        Parameters
-        ----------
-        source : name of the file, for errors.
-        """
+        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             return cls(

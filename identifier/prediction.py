@@ -4,15 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from codegen.arrays import Array
-from identifier.reproducibility import (
-    AxleRmse,
-    MotionError,
-    axle_rms,
-    counted_samples,
-    motion_error,
-)
+from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.tire_model import UNCALIBRATED, TireModel
 from identifier.verdict import RoadFriction, Verdict, judge_prediction
+from identifier.verdict.motion import MotionError, motion_error
 from models.recordings import Recording
 
 

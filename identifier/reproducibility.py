@@ -9,7 +9,6 @@ them, and any other recording too. There are two measures, and they answer diffe
   It asks whether what they say is right.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +18,6 @@ from codegen.arrays import Array, blocks
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
-from models.vehicle import Vehicle
 
 
 class NeverDrivesError(RecordingError):
@@ -77,96 +75,6 @@ class Reproduction:
     past_against_online: AxleRmse | None
     past_against_truth: AxleRmse | None
     after_against_truth: AxleRmse | None
-
-
-# What forces explain of the motion: the question where no true force is known.
-#
-# Newton over a window of T seconds, no derivative of a noisy signal in it: the mean of
-# (F_f + F_r)/m is [v_y(t + T) - v_y(t)]/T + the mean of v_x r, which is the lateral acceleration;
-# the mean of (l_f F_f - l_r F_r)/I_z is [r(t + T) - r(t)]/T, the yaw acceleration.
-
-WINDOW = 0.2  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotionError:
-    """What forces miss of the measured motion, root mean square of means over `WINDOW`.
-
-    The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
-    small the forces are right, where it is large they need not be wrong.
-
-    Parameters
-    ----------
-    lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
-    """
-
-    lateral: float
-    yaw: float
-    lateral_rms: float
-    yaw_rms: float
-
-    @property
-    def explained(self) -> tuple[float | None, float | None]:
-        """Share of the mean square of both that the forces explain; None where it stands still."""
-        pairs = (self.lateral, self.lateral_rms), (self.yaw, self.yaw_rms)
-        lateral, yaw = (1.0 - (e / size) ** 2 if size > 0.0 else None for e, size in pairs)
-        return lateral, yaw
-
-
-def motion_error(
-    force: Array, recording: Recording, vehicle: Vehicle, counted: NDArray[np.bool_]
-) -> MotionError | None:
-    """Return what axle forces miss of the measured motion; None where no window counts.
-
-    Parameters
-    ----------
-    force : lateral axle forces (n, 2) [N], frame of the body.
-    counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
-    """
-    n = round(WINDOW / recording.dt)
-    if recording.t.size <= n:
-        return None
-    m, I_z, l_f, l_r = vehicle.bicycle[:4]
-    T = n * recording.dt
-
-    def mean(signal: Array) -> Array:
-        """Mean over each window, by the trapezoidal rule."""
-        steps = 0.5 * (signal[1:] + signal[:-1])
-        windows: Array = np.lib.stride_tricks.sliding_window_view(steps, n).mean(axis=1)
-        return windows
-
-    squares, count = np.zeros(4), 0
-    for part in blocks(recording.t.size - n):
-        some = slice(part.start, part.stop + n)
-        whole = np.lib.stride_tricks.sliding_window_view(counted[some], n + 1).all(axis=1)
-        whole &= recording.within_a_stretch(part.start + np.arange(whole.size), n)
-        F, r = force[some], recording.r[some]
-        a_y = _mean_acceleration(recording, some, n, mean)
-        r_dot = (r[n:] - r[:-n]) / T
-        lateral, yaw = mean((F[:, 0] + F[:, 1]) / m), mean((l_f * F[:, 0] - l_r * F[:, 1]) / I_z)
-        with np.errstate(over="ignore", invalid="ignore"):
-            powers = [np.sum(s[whole] ** 2) for s in (a_y - lateral, r_dot - yaw, a_y, r_dot)]
-        squares, count = squares + powers, count + int(np.count_nonzero(whole))
-    if not count:
-        return None
-    missed_lateral, missed_yaw, lateral_rms, yaw_rms = map(float, np.sqrt(squares / count))
-    return MotionError(
-        lateral=missed_lateral, yaw=missed_yaw, lateral_rms=lateral_rms, yaw_rms=yaw_rms
-    )
-
-
-def _mean_acceleration(
-    recording: Recording, some: slice, n: int, mean: Callable[[Array], Array]
-) -> Array:
-    """Return the lateral acceleration over windows of n steps: without a v_y by accelerometer."""
-    v_y = recording.logged_v_y
-    if v_y is None:
-        return mean(recording.needed("a_y")[some])
-    change = v_y[some][n:] - v_y[some][:-n]
-    acceleration: Array = change / (n * recording.dt) + mean(
-        recording.v_x[some] * recording.r[some]
-    )
-    return acceleration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -29,7 +29,7 @@ from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
     from identifier.axle.band import BandCalibration, SpreadByRange
-    from identifier.axle.guarantee import Doubt, Guarantee
+    from identifier.axle.guarantee import Guarantee
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -441,7 +441,6 @@ class TireModel(ABC):
         Parameters
         ----------
         recording : its signals are the input.
-        level : share of cases that the band shall hold, above 0 and below 1.
         """
         del recording, level
         return None
@@ -454,7 +453,6 @@ class TireModel(ABC):
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
-        level : share of cases that the band shall hold, above 0 and below 1.
         v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
         """
         del alpha, level, v_x
@@ -525,28 +523,6 @@ class TireModel(ABC):
     @property
     def guarantee(self) -> "Guarantee | None":
         """Weights that the drive left possible; None where nobody asked, or none are of curves."""
-        return None
-
-    def with_guarantee(self, guarantee: "Guarantee") -> "TireModel":
-        """Return the model with its guaranteed band; as it is where it can carry none.
-
-        Parameters
-        ----------
-        guarantee : weights that are possible.
-        """
-        del guarantee
-        return self
-
-    def signals_of(self, recording: Recording) -> "tuple[Array, Doubt] | None":
-        """Return what a guarantee reads of a drive: units of the curves (n, 2, k), and doubt.
-
-        None where forces are no curves of slip.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
-        del recording
         return None
 
     def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:

@@ -9,7 +9,6 @@ EXTRAS = {
     "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
     "cluster": ("dask", "distributed"),
     "fleet": ("pyarrow", "dask", "distributed", "fsspec", "duckdb"),
-    "commonroad": ("commonroad-vehicle-models",),
 }
 
 

@@ -197,11 +197,7 @@ def _runge_kutta(f: ca.Function, p: Ports) -> tuple[ca.SX, ca.SX, ca.SX]:
         if ahead is not None:
             x, X = p.x + ahead * p.dt * k, eye + ahead * p.dt * rates_x[-1]
             U = ahead * p.dt * rates_u[-1]
-    return (
-        p.x + p.dt * _average(rates),
-        eye + p.dt * _average(rates_x),
-        p.dt * _average(rates_u),
-    )
+    return (p.x + p.dt * _average(rates), eye + p.dt * _average(rates_x), p.dt * _average(rates_u))
 
 
 def _average(k: list[ca.SX]) -> ca.SX:

@@ -54,11 +54,6 @@ class Cost:
     progress : share of the speed that is not made good along the path, at 0.1.
     steering_rate : input, at 0.5 rad/s; it alone must be positive.
     terminal : factor on all errors at the end of the horizon.
-
-    Raises
-    ------
-    ValueError
-        Where a weight is negative or not finite, or steering_rate zero.
     """
 
     e_y: float = 3.0
@@ -96,12 +91,8 @@ class Cost:
 def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
     """Return y (7,), SI.
 
-    Parameters
-    ----------
-    x : [e_y, e_psi, v_y, r, δ, ...], SX.
-    kappa : curvature of the path [1/m].
-    v_x : longitudinal speed [m/s].
-    s_dot : speed along the path [m/s].
+    x : [e_y, e_psi, v_y, r, δ, ...], SX.   kappa : curvature of the path [1/m].
+    v_x : longitudinal speed [m/s].   s_dot : speed along the path [m/s].
     """
     per_speed = 1 / v_x
     return ca.vertcat(
@@ -112,11 +103,7 @@ def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
 def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
     """Return H = C' diag(q) C (n_x, n_x) and h = C' diag(q) y (n_x,), C = ∂y/∂x.
 
-    Parameters
-    ----------
-    y : errors (7,), SX.
-    x : state (n_x,), SX symbol.
-    q : weights (7,).
+    y : errors (7,), SX.   x : state (n_x,), SX symbol.   q : weights (7,).
     """
     C = ca.jacobian(y, x)
     weighted = C.T @ ca.diag(q)
@@ -168,11 +155,6 @@ class Problem:
     ----------
     horizon : number of stages N.
     dt : length of a stage [s].
-
-    Raises
-    ------
-    ValueError
-        Where the horizon is not at least 2 or dt not positive and finite.
     """
 
     horizon: int = 40
@@ -184,9 +166,6 @@ class Problem:
         if not self.horizon >= 2:
             raise ValueError(f"horizon must be at least 2, it is {self.horizon}")
         require_positive(ValueError, dt=self.dt)
-
-
-# What the tracker takes for possible, and what it does where it cannot plan.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,11 +188,6 @@ class Guards:
     hold_time : how long an old plan is followed [s].
     fall_back_e_y : deviation [m] that is worth as much as the acceleration.
     fall_back_acceleration : lateral, to come back by [m/s²].
-
-    Raises
-    ------
-    ValueError
-        Where a bound is not positive and finite, or hold_time negative.
     """
 
     e_y: float = 5.0

@@ -13,11 +13,11 @@ from tests.c_reference.write import FOLDER, reference
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = (
-    *("identifier/export/c", "identifier/export/c_fmu", "identifier/export/target", "mpc/c"),
-    *("mpc/export/c", "mpc/export/pair", "mpc/export/target"),
+    *("codegen/target", "identifier/export/c", "identifier/export/c_fmu"),
+    *("identifier/export/target", "mpc/c", "mpc/export/c", "mpc/export/pair", "mpc/export/target"),
     *("tests/identifier/export", "tests/mpc/export"),
 )
-ARM = "identifier/export/target/board.c"  # for a compiler of its own
+ARM = "codegen/target/board.c"  # for a compiler of its own
 HERE = [
     str(path.relative_to(ROOT))
     for folder in FOLDERS
@@ -49,6 +49,13 @@ def test_there_is_c_to_look_at():
 def test_every_file_compiles_as_it_lies_without_a_warning(file, single, compiler):
     answer = compiled(compiler, file, single)
     assert (answer.returncode, answer.stderr) == (0, ""), file
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_what_is_replayed_of_a_tracker_compiles_too(compiler):
+    words = ["-Impc/export/target", "@compile_flags.txt", "-Werror", "-fsyntax-only"]
+    answer = run(compiler, *words, "codegen/target/replay.c")
+    assert (answer.returncode, answer.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -17,11 +17,18 @@ Documented = ast.FunctionDef | ast.ClassDef
 SHAPE_OR_UNIT = r"\(.*\)|\[.+\]|`\w[\w.]*`"
 
 
-def documented_parameters(docstring: str) -> dict[str, str]:
-    """What is said under "Parameters" of a numpy-style docstring, by name in order."""
+def documented_parameters(docstring: str, *, inner: bool = False) -> dict[str, str]:
+    """What is said under "Parameters" of a numpy-style docstring, by name in order.
+
+    Outside the interface entries of a function stand below its summary, three spaces apart.
+    """
     found = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", docstring, re.M | re.S)
     said: dict[str, str] = {}
     names: list[str] = []
+    if inner and not found:
+        entry = r"(?:^|   )([\w*]+(?:, [\w*]+)*) : (.*?)(?=   [\w*]+(?:, [\w*]+)* : |$)"
+        for one in re.finditer(entry, docstring, re.M):
+            said |= dict.fromkeys(one[1].replace("*", "").split(", "), one[2])
     for line in found.group(1).splitlines() if found else []:
         head = re.match(r"^([\w*]+(?:, [\w*]+)*) : (.*)", line)
         if head:
@@ -115,7 +122,9 @@ def complaints(source: str, offered: set[str]) -> list[str]:
         if docstring is None:
             wrong += [f"{node.name} has no docstring"] * public
             continue
-        documented, actual = documented_parameters(docstring), actual_parameters(node)
+        inner = isinstance(node, ast.FunctionDef) and not public
+        documented = documented_parameters(docstring, inner=inner)
+        actual = actual_parameters(node)
         if list(documented) != [name for name in actual if name in documented]:
             wrong.append(
                 f"{node.name} documents {list(documented)}, its parameters are {list(actual)}"
@@ -171,6 +180,12 @@ def ratio(above: float, below: float):
 def silent():
     pass
 
+def product(width, height):
+    """Return the product.
+
+    width : of the thing [m].   length : of the thing [m].
+    """
+
 def volume(width: float, samples: Array, weights: ArrayLike | None):
     """Return the volume.
 
@@ -203,10 +218,12 @@ class Corner(NamedTuple):
         "area documents ['width', 'depth'], its parameters are ['width', 'height']",
         "ratio documents ['below', 'above'], its parameters are ['above', 'below']",
         "silent has no docstring",
+        "product documents ['width', 'length'], its parameters are ['width', 'height']",
         "volume says neither the shape nor the unit of samples",
         "Box says neither the shape nor the unit of corners",
     ]
-    assert complaints(source, set()) == complaints(source, offered)[:2]
+    inner = [line for line in complaints(source, offered) if "documents" in line]
+    assert complaints(source, set()) == inner
 
 
 def missing_names(page: str) -> set[str]:

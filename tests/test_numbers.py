@@ -36,7 +36,10 @@ TO_RECORD = {
     "export_cost",
     "guaranteed",
     "learn_and_extrapolate",
+    "long_logs",
     "mpc_caution",
+    "mpc_speed",
+    "mpc_without_v_y",
     "road_friction",
     "sensor_faults",
 }

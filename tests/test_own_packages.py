@@ -10,9 +10,9 @@ SEDAN = "import tireid as ti; print(ti.sedan().name)"
 SPAWNED = """
 import dataclasses
 import tireid as ti
-from identifier.compare.work import spread
-with spread(2) as work:
-    print(*(found["name"] for found in work(dataclasses.asdict, [ti.sedan()])))
+from identifier.compare.work import fresh_processes
+with fresh_processes(2) as pool:
+    print(*(found["name"] for found in pool.map(dataclasses.asdict, [ti.sedan()])))
 """
 
 

@@ -53,7 +53,7 @@ def test_every_package_that_is_imported_is_declared():
                 elif isinstance(node, ast.ImportFrom) and node.module:
                     imported.add(node.module.split(".")[0])
     declared = {name.replace("-", "_") for name, _ in wanted(PROJECT["optional-dependencies"])}
-    declared |= {"vehiclemodels", "PIL"}  # of commonroad-vehicle-models and pillow
+    declared.add("PIL")  # of pillow
     assert "pillow" in declared
     known = set(sys.stdlib_module_names) | declared
     own = {"codegen", "models", "identifier", "mpc", "tireid"}

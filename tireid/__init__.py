@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from models.vehicle import Vehicle, sedan
     from mpc import path as paths
     from tireid import errors
-    from tireid.driving import drive, sample_recording
+    from tireid.driving.learn import sample_recording
+    from tireid.driving.runs import drive
     from tireid.exporting import export
     from tireid.figures.forces import inputs_figure as plot
     from tireid.learning import identify, replay
@@ -56,7 +57,7 @@ _HOMES = {
     "certify": ("identifier.methods", "certify"),
     "diagnose": ("identifier.doctor", "diagnose"),
     "errors": ("tireid.errors", ""),
-    "drive": ("tireid.driving", "drive"),
+    "drive": ("tireid.driving.runs", "drive"),
     "export": ("tireid.exporting", "export"),
     "identify": ("tireid.learning", "identify"),
     "make_method": ("identifier.methods", "make_method"),
@@ -67,7 +68,7 @@ _HOMES = {
     "read_recording": ("models.recordings", "read_recording"),
     "read_repaired": ("models.recordings", "read_repaired"),
     "replay": ("tireid.learning", "replay"),
-    "sample_recording": ("tireid.driving", "sample_recording"),
+    "sample_recording": ("tireid.driving.learn", "sample_recording"),
     "sedan": ("models.vehicle", "sedan"),
 }
 __all__ = [

@@ -60,8 +60,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return 0, 1 where a check fails, 2 where its input was bad, 3 where its answer
     is not valid, 74 where only standard output could not be written.
 
-    Parameters
-    ----------
     arguments : words after `tireid`; None takes those of the process.
     """
     try:
@@ -97,16 +95,15 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
-    from codegen import CompilationError
-    from identifier.export import compiled, processor
-    from mpc.converged import NotConvergedError
+    from codegen import CompilationError, processor
+    from identifier.export import compiled
     from mpc.realtime import instance
     from tireid.exporting import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
         *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
-        *(processor.ReplayError, NotConvergedError, SelfTestError),
+        *(processor.ReplayError, SelfTestError),
     )
 
 

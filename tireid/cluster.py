@@ -30,16 +30,7 @@ class ClusterError(TireidError, OSError):
 def cluster(address: str) -> Iterator[Map]:
     """Yield a `map` whose work is done by the workers of a Dask scheduler; its order is any.
 
-    Parameters
-    ----------
     address : of the scheduler, as in "tcp://host:8786".
-
-    Raises
-    ------
-    ClusterError
-        Where the scheduler or a worker does not answer, or a worker has another version of tireid.
-    ImportError
-        Where Dask is not installed; the message says how to install it.
     """
     try:
         dask: Any = importlib.import_module("distributed")

@@ -16,30 +16,19 @@ from identifier.verdict.verdict import Objection
 from models.recordings import LogMap, Recording, Repair
 from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
+from tireid import report as page
 from tireid.output import text_table
-from tireid.report import (
-    Block,
-    Headline,
-    Paragraph,
-    Report,
-    Section,
-    Table,
-    Tone,
-    printed,
-    write_report,
-)
 from tireid.reports.common import READ, REPORT, drawing, origin
 
 HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
     "acceleration_sensor_x": "accelerometer ahead of the c.g.",
-    "center_of_gravity": "center of gravity told too far back",
+    "center_of_gravity": "center of gravity stated too far back",
     "clock": "clock jumps",
     "clock_unit": "clock in ms",
     "copied": "computed, not measured",
     "dropout": "drops to zero",
     "factor": "scaled",
-    "frozen": "frozen",
     "held": "repeats old values",
     "jitter": "samples late at random",
     "lag": "low-passed",
@@ -56,10 +45,10 @@ NAMES = {  # of findings by their code, where the code is not the word
 }
 
 GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
+OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --repair."""
     parser.add_argument(
         "--repair",
         nargs="?",
@@ -97,12 +86,6 @@ def size_text(finding: Finding) -> str:
 
 
 def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
-    """Return a diagnosis as lines of text.
-
-    Parameters
-    ----------
-    unseen : whether what the log cannot tell stands below.
-    """
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
@@ -111,7 +94,7 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
 
 
-def tone_of(diagnosis: Diagnosis) -> Tone:
+def tone_of(diagnosis: Diagnosis) -> page.Tone:
     """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
     if not diagnosis.healthy:
         return "bad"
@@ -120,32 +103,34 @@ def tone_of(diagnosis: Diagnosis) -> Tone:
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
     """Return what was found as warnings of a report."""
-    return [printed(f"the log: {one.text}") for one in diagnosis.findings]
+    return [page.printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
 def diagnosis_section(
-    diagnosis: Diagnosis, more: Sequence[Block] = (), heading: str = "Is the log right?"
-) -> Section:
+    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Is the log right?"
+) -> page.Section:
     """Return the section of a report that holds a diagnosis."""
     rows = finding_rows(diagnosis)
-    blocks: list[Block] = [
-        Paragraph(text="What is wrong with the log, or with what is told of its car, asked of the "
-                  "log alone. ± is one standard deviation.")
-    ]  # fmt: skip
+    blocks: list[page.Block] = [
+        page.Paragraph(
+            text="What is wrong with the log, or with what is declared of its car, by the log "
+            "alone. ± is one standard deviation."
+        )
+    ]
     if rows:
-        blocks.append(Table(caption="What was found.", header=list(HEADER), rows=rows))
-        blocks += [Paragraph(text=printed(one.text)) for one in diagnosis.findings]
+        blocks.append(page.Table(caption="What was found.", header=list(HEADER), rows=rows))
+        blocks += [page.Paragraph(text=page.printed(one.text)) for one in diagnosis.findings]
     else:
-        blocks.append(Paragraph(text="Nothing was found."))
-    blocks += [Paragraph(text=printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen]
-    return Section(heading=heading, blocks=[*blocks, *more])
+        blocks.append(page.Paragraph(text="Nothing was found."))
+    blocks += [
+        page.Paragraph(text=page.printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen
+    ]
+    return page.Section(heading=heading, blocks=[*blocks, *more])
 
 
 def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     """Return what was found, and what of it was taken out, as lines of text.
 
-    Parameters
-    ----------
     path : of --repair, None where it was not asked for.
     """
     lines = [diagnosis_text(diagnosis, unseen=False)]
@@ -163,14 +148,19 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
 def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdict:
     """Return a verdict that does not pass over what the doctor is sure of.
 
-    A unit, a sign or a ratio that is surely wrong refuses the answer; a sure size is noted.
-
-    Parameters
-    ----------
-    repair : that was taken out of it before: nothing of that speaks against the answer.
+    A unit, a sign, a ratio or a factor of v_x that is surely wrong refuses the answer; another sure
+    size is noted. Nothing that `repair` took out of the log speaks against it.
     """
     left = [] if repair else [one for one in diagnosis.findings if one.sure]
-    said = [Objection("doctor", None, f"doctor: {one.text}", one.code in GROSS) for one in left]
+    said = [
+        Objection(
+            "doctor",
+            None,
+            f"doctor: {one.text}",
+            one.code in GROSS or (one.code, one.channel) == OF_ALL_FORCES,
+        )
+        for one in left
+    ]
     ordered = sorted([*verdict.findings, *said], key=lambda one: not one.refuses)
     return replace(verdict, findings=tuple(ordered)) if said else verdict
 
@@ -187,37 +177,37 @@ def write_doctor_report(
 ) -> None:
     """Write the report of a diagnosis.
 
-    Parameters
-    ----------
     after : that of the repaired log, None where nothing was repaired.
     """
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
     sections = [
         diagnosis_section(diagnosis),
-        Section(heading="What the tires say", blocks=[drawn]),
+        page.Section(heading="What the tires say", blocks=[drawn]),
     ]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))
     count = len(diagnosis.findings)
     numbers = [
-        Headline(
+        page.Headline(
             str(count),
             f"finding{'s' * (count != 1)} in the log or the car's file",
             tone_of(diagnosis),
         ),
-        Headline(str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"),
+        page.Headline(
+            str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"
+        ),
     ]
     if after is not None:
         left = str(len(after.findings))
-        numbers.append(Headline(left, "left after the repair", tone_of(after)))
-    report = Report(
+        numbers.append(page.Headline(left, "left after the repair", tone_of(after)))
+    report = page.Report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",
         numbers=numbers,
         warnings=diagnosis_warnings(diagnosis),
         sections=[*sections, origin(command, vehicle, [recording])],
     )
-    write_report(folder / REPORT, report)
+    page.write_report(folder / REPORT, report)
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:

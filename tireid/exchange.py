@@ -25,12 +25,6 @@ class ClaimedError(TireidError, OSError):
     """Another process holds the claim."""
 
     def refusal(self, doing: str) -> str:
-        """Return what to tell of it.
-
-        Parameters
-        ----------
-        doing : what the other run does, as "is writing out".
-        """
         return (
             f"another run of tireid {doing}: wait for it, or choose another folder "
             f"(where there is none, delete {self})"
@@ -50,13 +44,7 @@ def _renameat2() -> Any:
 
 
 def exchange(one: Path, other: Path) -> bool:
-    """Let two folders change places in one step; return whether the system could.
-
-    Raises
-    ------
-    OSError
-        Where they cannot be renamed.
-    """
+    """Let two folders change places in one step; return whether the system could."""
     function = _renameat2()
     if function is None:
         return False
@@ -76,17 +64,6 @@ def claim(path: Path) -> Iterator[None]:
     The system lets go of it when the process ends, however it ends. Where it locks no files (not on
     Unix, or on a disk that cannot), the file itself is the claim, and outlives a process that is
     killed.
-
-    Parameters
-    ----------
-    path : the file; its folder exists.
-
-    Raises
-    ------
-    ClaimedError
-        Where another process holds it.
-    OSError
-        Where it cannot be made.
     """
     held = _locked(path)
     try:

@@ -10,16 +10,17 @@ from typing import NamedTuple
 
 from codegen import find_compiler
 from codegen.errors import TireidError
+from codegen.processor import Cost, with_figures
 from codegen.writing import write_file
 from identifier.export.package import Package, build_package, readme
-from identifier.export.processor import Cost, figures_text, measure, with_figures
+from identifier.export.processor import figures_text, measure
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import continuing
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
 from mpc.export.pair import build_pair, frozen_start
-from mpc.export.processor import measure_mpc, mpc_figures_text, time_here, with_mpc_figures
+from mpc.export.processor import measure_mpc, mpc_figures_text, time_here
 from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
 from tireid.progress import Progress
@@ -49,13 +50,7 @@ class Exported:
     told: tuple[str, ...]
 
     def __str__(self) -> str:
-        lines = []
-        for cost in self.costs:
-            kind = "float" if cost.single else "double"
-            lines.append(
-                f"{cost.processor}, {kind}: {cost.replay.instructions} instructions a step, "
-                f"{cost.flash} B flash, {cost.ram} B RAM, {cost.replay.stack} B stack"
-            )
+        lines = [f"{cost.processor}, {cost.precision}: {cost.words}" for cost in self.costs]
         wrote = f"wrote {self.folder}/, hash {self.package.about['hash']}"
         step = self.package.specialized
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
@@ -72,6 +67,7 @@ def export(
     source: Run | TireModel | Method,
     folder: str | PathLike[str],
     *,
+    start: TireModel | None = None,
     vehicle: Vehicle | None = None,
     name: str = "tireid",
     single: bool = False,
@@ -90,6 +86,7 @@ def export(
     source : a run, whose method goes on from its end; a tire model, from which the method that
         made it goes on; or a method, which begins afresh. From a fit the axle identifier goes on.
     folder : to write.
+    start : model that a method begins with; None begins afresh.
     vehicle : the car; None takes that of the run or the model, for a method the sedan.
     name : prefix of every symbol.
     single : float unless the build says double.
@@ -112,9 +109,6 @@ def export(
         Where it cannot be written.
     """
     target = Path(folder)
-    if not overwrite and target.is_dir() and any(target.iterdir()):
-        raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
-    start: TireModel | None = None
     if isinstance(source, Run):
         method, car = source.method, vehicle or source.vehicle
         try:
@@ -128,69 +122,18 @@ def export(
         method = continuing(source, car)
     else:
         method, car = source, vehicle or sedan()
-    return export_method(
-        method,
-        car,
-        start,
-        target,
-        name=name,
-        single=single,
-        with_a_y=with_a_y,
-        band=band,
-        fmu=fmu,
-        onnx=onnx,
-        mpc=mpc,
-        caution=caution,
-        overwrite=overwrite,
-    )
-
-
-def export_method(
-    method: Method,
-    vehicle: Vehicle,
-    start: TireModel | None,
-    folder: Path,
-    *,
-    name: str,
-    single: bool,
-    with_a_y: bool,
-    band: bool,
-    fmu: bool,
-    onnx: bool,
-    mpc: bool,
-    caution: float,
-    overwrite: bool,
-) -> Exported:
-    """Write a method as C.
-
-    Parameters
-    ----------
-    start : model to begin with; None begins afresh.
-    single : float unless the build says double.
-    with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
-    band : half the width of the band around each force is an output too, calibrated as `start` is.
-    fmu : also FMUs 2.0 and 3.0.
-    caution : of that tracker, from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where what is asked for cannot be made of the method.
-    OSError
-        Where the folder cannot be written.
-    """
     parts = [word for word, on in (("mpc", mpc), ("fmu", fmu), ("onnx", onnx)) if on]
     lasts = {title: seconds for title, seconds, wanted in PARTS if wanted in ("", *parts)}
     with (
         Progress("export", lasts, long=True) as progress,
-        output_folder(folder, force=overwrite) as scratch,
+        output_folder(target, force=overwrite) as scratch,
     ):
         package = build_package(
-            method, vehicle, start, name=name, single=single, with_a_y=with_a_y, with_band=band
+            method, car, start, name=name, single=single, with_a_y=with_a_y, with_band=band
         )
         if onnx:  # what cannot be made is refused before costs are measured
             progress.begin(NETWORK)
-            _write_onnx(scratch, method, vehicle, package, start, band=band)
+            _write_onnx(scratch, method, car, package, start, band=band)
         if mpc:
             frozen_start(package)  # likewise
         costs = measure(package, progress.begin(COSTS))
@@ -211,18 +154,10 @@ def export_method(
                     version,
                 )
                 progress.step(2)
-    return Exported(folder=folder, package=package, costs=tuple(costs), told=tuple(told))
+    return Exported(folder=target, package=package, costs=tuple(costs), told=tuple(told))
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:
-    """Write a package.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    figures : what it costs, as Markdown.
-    costs : what it costs, for the JSON file.
-    """
     manifest = f"{package.specialized.name}.json"
     texts = {**package.files, "README.md": readme(package, figures)}
     _write_texts(folder, {**texts, manifest: with_figures(texts[manifest], costs)})
@@ -252,24 +187,13 @@ def _write_onnx(
     export_onnx(model, folder / f"{package.specialized.name}.onnx", with_band=band)
 
 
-# With `mpc`: the tracker beside the identifier, and a car driven by both.
-
 TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
 
 
 def write_tracker(folder: Path, package: Package, *, single: bool, caution: float) -> list[str]:
     """Write the tracker and what joins it with the identifier; return what to say about it.
 
-    Parameters
-    ----------
-    folder : where the identifier lies in a folder of that name.
-    single : whether float is the default precision.
-    caution : of the tracker, from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where what the method learns cannot be handed over, or there is no C compiler.
+    single : whether float is the default precision.   caution : of the tracker, from 0 to 1.
     """
     try:
         pair = build_pair(package, single=single, caution=caution)
@@ -279,23 +203,15 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     costs, times = measure_mpc(tracker), time_here(tracker)
     manifest = f"{tracker.name}.json"
     texts = {**tracker.files, "README.md": mpc_readme(tracker, mpc_figures_text(costs, times))}
-    texts[manifest] = with_mpc_figures(texts[manifest], costs)
+    texts[manifest] = with_figures(texts[manifest], costs)
     _write_texts(folder, pair.files)
     _write_texts(folder / TRACKER, texts)
     return [
-        *(
-            f"{cost.processor}, {'float' if cost.single else 'double'}: {tracker.name} takes "
-            f"{cost.replay.instructions} instructions a step, {cost.flash} B flash, "
-            f"{cost.replay.state + cost.replay.params + cost.replay.work} B RAM, "
-            f"{cost.replay.stack} B stack"
-            for cost in costs
-        ),
+        *(f"{one.processor}, {one.precision}: {tracker.name} takes {one.words}" for one in costs),
         f"this machine: {tracker.name} takes {times.median:.0f} us a step, hash "
         f"{tracker.about['hash']}",
     ]
 
-
-# The self-test of an exported package, compiled and run as an embedded engineer would.
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
 
@@ -313,17 +229,7 @@ class Verdict(NamedTuple):
 
 
 def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
-    """Compile and run the self-test of a package; None where there is no C compiler.
-
-    Parameters
-    ----------
-    single : whether to compute in float.
-
-    Raises
-    ------
-    SelfTestError
-        Where it does not compile or does not pass.
-    """
+    """Compile and run the self-test of a package; None where there is no C compiler."""
     compiler = find_compiler()
     if compiler is None:
         return None

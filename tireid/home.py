@@ -24,13 +24,7 @@ class OwnPackages:
 
 
 def find_own_packages() -> None:
-    """Look for the packages in the folder that holds tireid, before all other folders.
-
-    Raises
-    ------
-    ImportError
-        Where another module has such a name already; one line that says which.
-    """
+    """Look for the packages in the folder that holds tireid, before all other folders."""
     for name in PACKAGES:
         place = _place(sys.modules.get(name))
         if place and os.path.realpath(place) != os.path.realpath(f"{HOME}/{name}"):

@@ -112,17 +112,7 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
 
 
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
-    """Return a drive with its v_y, or with that which the inertial identifier estimates.
-
-    Parameters
-    ----------
-    tire : where it can go on learning from it, it begins with it.
-
-    Raises
-    ------
-    RecordingError
-        Where there is no a_y to estimate from.
-    """
+    """Return a drive with its v_y, or with that which the inertial identifier estimates."""
     if recording.v_y is not None:
         return recording
     design = InertialIdentifier.for_vehicle(tire.vehicle, dt=recording.dt)

@@ -37,6 +37,10 @@ class OutputError(TireidError, ValueError):
     """The output folder cannot be used; the message says why and what to do."""
 
 
+class NotEmptyError(OutputError, FileExistsError):
+    """The output folder holds what an earlier run wrote, and is not to be replaced."""
+
+
 class Written(NamedTuple):
     """What a marker lists: size and SHA-256 of files, and folders, by path."""
 
@@ -45,17 +49,7 @@ class Written(NamedTuple):
 
 
 def require_free(path: Path, *, force: bool) -> None:
-    """Refuse to replace a file that is there.
-
-    Parameters
-    ----------
-    force : whether what is there may be replaced.
-
-    Raises
-    ------
-    OutputError
-        Where there is something and it may not.
-    """
+    """Refuse to replace a file that is there."""
     if path.exists() and not force:
         raise OutputError(f"{path} exists: choose another, or add --force to replace it")
 
@@ -64,17 +58,10 @@ def require_free(path: Path, *, force: bool) -> None:
 def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
     """Yield an empty folder that becomes `target` when all went well; else `target` is as before.
 
-    Parameters
-    ----------
-    target : the folder that the user asked for; a link is followed.
-    force : replace a folder that an earlier run wrote; never one that holds anything else.
+    What may not be replaced is refused before anything is computed. Where `target` comes to hold
+    something else meanwhile, it is left alone, and the message says where the results are.
 
-    Raises
-    ------
-    OutputError
-        Before anything is computed, where `target` is not a folder that may be replaced, or
-        another run is about to write it; at the end, where it has become such a folder meanwhile:
-        then it is left alone, and the message says where the results are.
+    force : replace a folder that an earlier run wrote; never one that holds anything else.
     """
     final = resolved(target)
     _require_replaceable(target, final, force)
@@ -132,8 +119,9 @@ def _require_replaceable(target: Path, final: Path, force: bool) -> None:
             "choose another folder"
         )
     if any(final.iterdir()) and not force:
-        raise OutputError(
-            f"{target} is not empty: choose another folder, or add --force to replace"
+        raise NotEmptyError(
+            f"{target} is not empty: choose another folder, or add --force to replace (in Python, "
+            "overwrite=True replaces it)"
         )
 
 
@@ -184,13 +172,7 @@ def _read_marker(folder: Path) -> Written | None:
 
 
 def foreign(folder: Path) -> str | None:
-    """Return the first thing below a folder that is not as a run of tireid wrote it, or None.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be read.
-    """
+    """Return the first thing below a folder that is not as a run of tireid wrote it, or None."""
     written = _read_marker(folder) or Written({}, frozenset())
 
     def first(inside: Path) -> str | None:
@@ -297,8 +279,6 @@ def _discard(folder: Path) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write data as indented JSON; a number that is not finite becomes null.
 
-    Parameters
-    ----------
     data : dictionaries, lists, numbers, strings and None.
     """
     write_file(path, json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
@@ -317,11 +297,14 @@ def _finite(data: Any) -> Any:
 def write_csv(path: Path, columns: Mapping[str, Array]) -> None:
     """Write columns of equal length as CSV with a header: time with 15 digits, others with nine.
 
-    Parameters
-    ----------
     columns : name with unit, to values (n,).
     """
     write_long_csv(path, [columns])
+
+
+def axle_columns(pattern: str, values: Array) -> dict[str, Array]:
+    """Return columns of both axles (n, 2) by a name in which {} is f in front and r at the rear."""
+    return {pattern.format(axle): values[:, i] for i, axle in enumerate("fr")}
 
 
 ROWS = 4096  # that are put into words at once
@@ -364,17 +347,7 @@ def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
 
 
 def require_curves(kind: str) -> None:
-    """Refuse a kind of file for curves that cannot be written here.
-
-    Parameters
-    ----------
-    kind : "csv" or "parquet".
-
-    Raises
-    ------
-    ValueError
-        Where it is Parquet, and pyarrow is not installed.
-    """
+    """Refuse a kind of file for curves that cannot be written here."""
     if kind == "parquet":
         _parquet()
 
@@ -388,13 +361,7 @@ def _parquet() -> tuple[Any, Any]:
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:
-    """Return rows of cells as lines of text, each column as wide as its widest cell.
-
-    Parameters
-    ----------
-    rows : cells; a row may be shorter than others.
-    align : of each column, `<` left or `>` right; columns without are left.
-    """
+    """Return rows of cells as lines of text, each column as wide as its widest cell."""
     count = max((len(row) for row in rows), default=0)
     sides = align.ljust(count, "<")
     widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(count)]

@@ -101,13 +101,7 @@ def plan(
 
 
 def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
-    """Return how the double-track car of the vehicle drives a plan; none where it has no tires.
-
-    Raises
-    ------
-    PlanError
-        Where that car does not keep on its wheels.
-    """
+    """Return how the double-track car of the vehicle drives a plan; none where it has no tires."""
     tires = found.tires
     chassis = tires.vehicle.chassis
     if chassis is None or chassis.tire is None:

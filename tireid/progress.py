@@ -172,12 +172,7 @@ class Progress:
             _print(_wiped())
 
     def begin(self, part: str) -> "Progress":
-        """Go on with a part; return what takes its share.
-
-        Parameters
-        ----------
-        part : one of the parts; what comes before it is done.
-        """
+        """Go on with a part; return what takes its share."""
         names = list(self._parts)
         self._before = sum(self._parts[name] for name in names[: names.index(part)]) / self._whole
         self._weight, self._name = self._parts[part] / self._whole, part
@@ -188,12 +183,7 @@ class Progress:
         return self
 
     def step(self, of: int, text: str = "") -> None:
-        """Count one of several equal steps of the part.
-
-        Parameters
-        ----------
-        of : steps of the part.
-        """
+        """Count one of several equal steps of the part."""
         self._done += 1
         self(min(self._done / max(of, 1), 1.0), text)
 
@@ -209,8 +199,6 @@ class Progress:
     def within(self, first: float, last: float) -> Callable[[float], None]:
         """Return who is told the share that is done of a piece of the part.
 
-        Parameters
-        ----------
         first, last : shares of the part at which the piece begins and ends, 0 to 1.
         """
         return lambda share: self(first + (last - first) * share)
@@ -218,8 +206,6 @@ class Progress:
     def __call__(self, share: float, text: str = "") -> None:
         """Tell it where it is time.
 
-        Parameters
-        ----------
         share : done of the part, 0 to 1.
         """
         now = time.perf_counter()

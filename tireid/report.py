@@ -22,89 +22,7 @@ SIGNATURES = {  # of files, by their kind
     b"RIFF": "webp",
     b"<?xml": "svg+xml",
 }
-STYLE = """
-:root { color-scheme: light; }
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 2rem 1.25rem 4rem; max-width: 54rem;
-  background: #fff; color: #1a1a1a;
-  font: 1rem/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .5rem; }
-h2 { font-size: 1.3rem; line-height: 1.3; margin: 2.6rem 0 .6rem; padding-top: .8rem;
-  border-top: 1px solid #ddd; }
-h3 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
-p { margin: .7rem 0; max-width: 44rem; overflow-wrap: break-word; }
-p.summary { font-size: 1.1rem; color: #444; }
-dl.numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .8rem;
-  margin: 1.4rem 0; }
-dl.numbers div { padding: .7rem .9rem; background: #f6f5f2; border-radius: 6px; }
-dl.numbers dt { font-size: .85rem; line-height: 1.35; color: #444; }
-dl.numbers dd { margin: 0 0 .15rem; font-size: 1.35rem; font-weight: 600; line-height: 1.25;
-  font-variant-numeric: tabular-nums; }
-dl.numbers div { display: flex; flex-direction: column; }
-dl.numbers dt { order: 1; }
-dl.numbers div.good { background: #dff1e4; box-shadow: inset 0 0 0 2px #2f7d4f; }
-dl.numbers div.good dd { color: #1d5c37; }
-dl.numbers div.doubt { background: #fdecc8; box-shadow: inset 0 0 0 2px #b35c00; }
-dl.numbers div.doubt dd { color: #8a4600; }
-dl.numbers div.bad { background: #b3261e; }
-dl.numbers div.bad dd, dl.numbers div.bad dt { color: #fff; }
-td .bad { color: #b3261e; font-weight: 600; }
-.unknown, .refused { color: #767676; }
-.struck { color: #767676; text-decoration: line-through; }
-dl.numbers div.refused dd { color: #767676; }
-dl.numbers dd.pair { font-size: 1.1rem; }
-dl.numbers small, td small { display: block; font-weight: 400; white-space: normal; }
-dl.numbers small { font-size: .8rem; line-height: 1.3; }
-ul.warnings { margin: 1.2rem 0; padding: .7rem 1rem .7rem 2rem; border-left: 4px solid #b35c00;
-  background: #fdf3e7; border-radius: 0 6px 6px 0; }
-ul.warnings li { overflow-wrap: break-word; }
-ul.warnings li.bad { color: #b3261e; font-weight: 600; }
-ul.refusals { border-color: #b3261e; background: #fdeceb; }
-p.fine { padding: .5rem 1rem; border-left: 4px solid #2f7d4f; background: #eef6f0; }
-details { margin: 2.6rem 0; border-top: 1px solid #ddd; }
-details > summary { cursor: pointer; padding-top: .8rem; }
-details > summary h2 { display: inline; border: 0; margin: 0; padding: 0; }
-nav { margin: 1.5rem 0; padding: .8rem 1.2rem; background: #f6f5f2; border-radius: 6px; }
-nav ol { margin: 0; padding-left: 1.4rem; }
-a { color: #00588c; text-decoration: none; }
-a:hover { text-decoration: underline; }
-figure { margin: 1.6rem 0; }
-figure img { display: block; width: 100%; height: auto; }
-figcaption { margin-top: .5rem; font-size: .9rem; color: #444; max-width: 44rem; }
-figcaption b { color: #1a1a1a; }
-figcaption i.read { display: block; color: #5b5b5b; }
-a.enlarge { display: block; cursor: zoom-in; }
-a.close { display: none; }
-figure:target { position: fixed; inset: 0; z-index: 9; margin: 0; padding: 3rem 1rem 1rem;
-  background: #fff; overflow: auto; }
-figure:target div.scroll { overflow: visible; }
-figure:target img { width: 100%; min-width: 75rem; }
-figure:target figcaption { max-width: none; }
-figure:target a.enlarge { cursor: default; }
-figure:target a.close { display: block; position: fixed; top: .6rem; right: 1rem; z-index: 10;
-  padding: .35rem .9rem; background: #00588c; color: #fff; border-radius: 6px; }
-figure.table figcaption { margin: 0 0 .5rem; }
-div.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums;
-  border-top: 2px solid #1a1a1a; border-bottom: 2px solid #1a1a1a; }
-th, td { padding: .35rem .8rem; text-align: left; vertical-align: top; }
-thead th { border-bottom: 1px solid #1a1a1a; vertical-align: bottom; }
-tbody tr + tr td { border-top: 1px solid #e6e6e6; }
-table.verbatim td { overflow-wrap: anywhere; }
-td:first-child { min-width: 8rem; }
-td.number, th.number { text-align: right; }
-td.number { white-space: nowrap; }
-@media screen and (max-width: 36rem) { body { padding: 1.2rem .9rem 3rem; }
-  h1 { font-size: 1.5rem; }
-  dl.numbers { grid-template-columns: 1fr 1fr; } dl.numbers dd { font-size: 1.15rem; }
-  th, td { padding: .3rem .5rem; } }
-@media print { @page { margin: 18mm 16mm; } body { padding: 0; max-width: none; font-size: 10pt; }
-  h2 { break-after: avoid; } figure, tr { break-inside: avoid; } div.scroll { overflow: visible; }
-  details > * { display: block; } a.close { display: none !important; }
-  figure:target { position: static; } figure:target img { min-width: 0; }
-  figure img { width: auto; max-width: 100%; max-height: 115mm; }
-  nav { background: none; border: 1px solid #ddd; } a { color: inherit; } }
-"""
+STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 # What something is worth. Of a headline: good (green), doubt (amber), bad (red). Of a number:
 # unknown (grey), of a refused answer refused (grey) or, where its own axle is, struck through.
@@ -136,12 +54,7 @@ RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def printed(text: str) -> str:
-    """Return a text of our own with Greek letters and raised exponents in place of ASCII.
-
-    Parameters
-    ----------
-    text : plain text; never a name from a file, which stays as it is.
-    """
+    """Return a text of our own with Greek letters and raised exponents in place of ASCII."""
     words = re.compile(rf"\b({'|'.join(LETTERS)})(?=\d?\b)")
     greek = words.sub(lambda found: LETTERS[found[1]], text)
     raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(RAISED), greek)
@@ -174,11 +87,6 @@ class Table:
     ----------
     rows : cells by row; numbers are given four digits, None and what is not finite becomes a dash.
     verbatim : whether cells are to be read letter by letter, as commands are.
-
-    Raises
-    ------
-    ValueError
-        Where a row has more or fewer cells than the header.
     """
 
     caption: str
@@ -202,13 +110,6 @@ class Picture:
     Parameters
     ----------
     image : the SVG, PNG, GIF or WebP itself, or the path of its file.
-
-    Raises
-    ------
-    ValueError
-        Where the image is none of them.
-    OSError
-        Where its file cannot be read.
     """
 
     image: bytes | Path
@@ -301,7 +202,7 @@ def report_html(report: Report) -> str:
         '<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{html(title)}</title>",
-        f"<style>{STYLE}</style>",
+        f"<style>\n{STYLE}</style>",
         "</head>",
         "<body>",
         f"<h1>{html(title)}</h1>",
@@ -314,12 +215,7 @@ def report_html(report: Report) -> str:
 
 
 def write_report(path: Path, report: Report) -> None:
-    """Write a report; the file is complete or as it was before.
-
-    Parameters
-    ----------
-    path : the HTML file.
-    """
+    """Write a report; the file is complete or as it was before."""
     write_atomically(path, report_html(report))
 
 

@@ -136,13 +136,9 @@ class Run:
         OSError
             Where it cannot be written.
         """
-        target = Path(folder)
-        if not overwrite and target.is_dir() and any(target.iterdir()):
-            raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
-        verdict, tire = self.verdict, self.tire
-        with output_folder(target, force=overwrite) as scratch:
-            tire.save(scratch / "weights.json", valid=verdict.valid)
-            write_json(scratch / "verdict.json", verdict.to_dict())
+        with output_folder(Path(folder), force=overwrite) as scratch:
+            self.tire.save(scratch / "weights.json", valid=self.verdict.valid)
+            write_json(scratch / "verdict.json", self.verdict.to_dict())
 
     def __repr__(self) -> str:
         return f"<Run of {type(self.method).__name__} over {self.recording!r}>"

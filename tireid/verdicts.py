@@ -29,8 +29,6 @@ def marked_number(verdict: Verdict, number: Number | None) -> Marked:
 
     Grey are all numbers of an answer that is not valid, struck those of the axle that refuses it.
 
-    Parameters
-    ----------
     number : one of them; None leaves its place empty.
     """
     if number is None:
@@ -43,12 +41,6 @@ def marked_number(verdict: Verdict, number: Number | None) -> Marked:
 
 
 def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
-    """Return a verdict as lines of text.
-
-    Parameters
-    ----------
-    numbers : whether the table of what was learnt stands above it.
-    """
     rows = [
         [title, *(cell for axle in AXLES for cell in _cells(by_axle.get(axle)))]
         for title, by_axle in numbers_by_title(verdict).items()
@@ -78,8 +70,6 @@ def _each(verdicts: Mapping[str, Verdict], what: str) -> str:
 def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
     """Return what is found on several recordings, as lines of text.
 
-    Parameters
-    ----------
     verdicts : on the default method, by the name of the recording that it learnt on.
     """
     return _each(verdicts, "default learnt on")
@@ -126,8 +116,7 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
     """Return stiffness, grip and relaxation length of both axles, as numbers of a report."""
     return [
         Headline(
-            [marked_number(verdict, by_axle[axle]) for axle in AXLES],
-            f"{title}, front / rear",
+            [marked_number(verdict, by_axle[axle]) for axle in AXLES], f"{title}, front / rear"
         )
         for title, by_axle in numbers_by_title(verdict).items()
         if len(by_axle) == len(AXLES)
@@ -137,8 +126,6 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
 def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
     """Return on how many recordings the default is valid, as a number of a report, if any.
 
-    Parameters
-    ----------
     verdicts : on the default method, by the name of the recording that it learnt on.
     """
     if not verdicts:
@@ -186,25 +173,13 @@ def verdict_section(verdict: Verdict) -> Section:
 
 
 def warn_of_stored(path: Path | str) -> None:
-    """Say on standard error where a stored model was found not valid when it was learnt.
-
-    Raises
-    ------
-    FrozenModelError
-        Where the file is no such model; one line that names it.
-    """
+    """Say on standard error where a stored model was found not valid when it was learnt."""
     for said in stored_warning(path):
         complain(f"warning: {said.text}")
 
 
 def stored_warning(path: Path | str) -> list[Marked]:
-    """Return what speaks against a stored model that was found not valid when it was learnt.
-
-    Raises
-    ------
-    FrozenModelError
-        Where the file is no such model; one line that names it.
-    """
+    """Return what speaks against a stored model that was found not valid when it was learnt."""
     if stored_verdict(path) is not False:
         return []
     text = f"{path} was found not valid when it was learnt: see its summary.json"

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-RLS, CURVE = "regression.json", "curve.json"
+CURVE = "curve.json"
 WORDS = ""  # in place of a file: the words of the command are mutated
 
 
@@ -44,7 +44,7 @@ def _door(name: str, share: float, words: str, mutated: str = "") -> Door:
 
 IDENTIFY = "identify log.csv --vehicle car.toml --out out"
 LOGGER = IDENTIFY.replace("log.csv", "logger.csv")
-COMPARE = "compare log.csv --vehicle car.toml --floor 0 --jobs 1 --out out --method"
+COMPARE = "compare log.csv --vehicle car.toml --out out --method"
 PREDICT = "predict --out out"
 PLAN = "plan --area 60x12 --speed 12 --time 1.5 --out out"
 FILTER = "--method magic_formula_ekf"
@@ -57,7 +57,6 @@ DOORS = (
     _door("identify csv.gz", 4, IDENTIFY.replace(".csv", ".csv.gz"), "log.csv.gz"),
     _door("identify parquet", 4, IDENTIFY.replace(".csv", ".parquet"), "log.parquet"),
     _door("identify csv, paper", 4, f"{IDENTIFY} --paper --no-check", "log.csv"),
-    _door("identify csv, rls", 2, f"{IDENTIFY} --method rls --no-check", "log.csv"),
     _door("identify csv, filter", 2, f"{IDENTIFY} {FILTER} --no-check", "log.csv"),
     _door("identify replay", 3, f"{IDENTIFY} --replay other.csv", "other.csv"),
     _door("compare csv", 4, f"{COMPARE} axle linear", "log.csv"),
@@ -98,7 +97,6 @@ DOORS = (
     _door("export network", 4, "export --out out --weights network.json", "network.json"),
     _door("identify axle", 6, f"{IDENTIFY} --weights axle.json", "axle.json"),
     _door("identify network", 4, f"{IDENTIFY} --paper --weights network.json", "network.json"),
-    _door("identify regression", 2, f"{IDENTIFY} --method rls --weights regression.json", RLS),
     _door("identify curve", 2, f"{IDENTIFY} {FILTER} --weights curve.json", CURVE),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
@@ -111,7 +109,7 @@ DOORS = (
     _door("predict car", 3, f"{PREDICT} axle.json log.csv --vehicle sedan.toml", "sedan.toml"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
-    _door("fleet learn, begun", 1, f"{FLEET} --weights axle.json", "axle.json"),
+    _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),
     # networks of the user's own
     _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
     _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),
@@ -120,7 +118,9 @@ DOORS = (
     # paths
     _door("drive path", 10, f"{DRIVE} --tires linear", "path.csv"),
     # words
-    _door("words of identify", 6, f"{IDENTIFY} --freeze 4 5 --columns r=r --seed 1 --method rls"),
+    _door(
+        "words of identify", 6, f"{IDENTIFY} --freeze 4 5 --columns r=r --seed 1 --method integral"
+    ),
     _door(
         "words of check",
         6,
@@ -133,7 +133,7 @@ DOORS = (
         "check --vehicle car.toml --phase-margin 60 --noise-v-x 0.1 --tune out.toml",
     ),
     _door("words of export", 3, "export --out out --name mine --method integral --single"),
-    _door("words of compare", 3, f"{COMPARE} axle linear --sweep 0 --seed 0"),
+    _door("words of compare", 3, f"{COMPARE} axle linear --seed 0"),
     _door(
         "words of drive",
         6,

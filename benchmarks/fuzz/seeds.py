@@ -27,8 +27,8 @@ SPEED, DURATION = 20.0, 6.0  # m/s and s
 FRONT = ("name", "mass", "yaw_inertia", "l_f", "l_r")  # of a vehicle file without a chassis
 FROZEN = {  # file of weights, and the method that learnt it
     "axle.json": "axle",
+    "fit.json": "fit",
     "network.json": "integral",
-    "regression.json": "rls",
     "curve.json": "magic_formula_ekf",
 }
 DESIGNS = {"integral.toml": "integral", "lead.toml": "pi_lead"}

@@ -4,7 +4,7 @@ import random
 
 from benchmarks.fuzz.hostile import NUMBERS, text
 
-COUNTS = ("--jobs", "--sweep", "--floor", "--monte-carlo", "--seeds", "--laps")
+COUNTS = ("--jobs", "--seeds", "--laps")
 FEW = (
     "-1",
     "0",
@@ -99,7 +99,6 @@ MORE = (
     *(
         "--fault all:noisy:0:1:inf",
         "--delay 1e9",
-        "--plant drift",
         "--bandwidth 1e-300",
         "--slip 1e-300",
         "--friction 1e300",
@@ -119,7 +118,6 @@ MORE = (
         "--tires",
         "--film mp4",
         "--scheduler tcp://[",
-        "--monte-carlo 2",
     ),
 )
 

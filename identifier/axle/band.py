@@ -287,7 +287,6 @@ class BandSpread(NamedTuple):
         Parameters
         ----------
         factor : f, (k, 2).
-        level : share of cases that it shall hold.
         """
         wide = np.sqrt(factor**2 * self.scaled + np.maximum(factor, 1.0) ** 2 * self.held)
         return np.asarray(normal_quantile(level) * wide)

@@ -122,9 +122,7 @@ def slope_step(
     ----------
     a_y : of the accelerometer [m/s²], or NaN.
     motion : m = L(dv_y/dt + v_x r)/g [-].
-    first : 1 at a restart, else 0.
     on : 1 where the car drives, else 0; at rest all stays as it is.
-    learns : 1 where learning runs, else 0.
     """
     there = ca.fabs(a_y) < numbers.largest
     felt = ca.if_else(there, a_y * (1 / GRAVITY), motion)

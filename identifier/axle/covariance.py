@@ -39,12 +39,7 @@ class Spread(NamedTuple):
 
 
 def triangle(q: int) -> list[tuple[int, int]]:
-    """Return the places of the upper triangle, by rows.
-
-    Parameters
-    ----------
-    q : size of the matrix.
-    """
+    """Return the places of the upper triangle, by rows."""
     return list(combinations_with_replacement(range(q), 2))
 
 
@@ -74,7 +69,6 @@ def unpacked(packed: Array, q: int) -> Array:
     Parameters
     ----------
     packed : D on the diagonal, U above it, by rows, (k, q (q + 1)/2).
-    q : size of the matrices.
     """
     F = np.zeros((len(packed), q, q))
     F[:, *np.array(triangle(q)).T] = packed
@@ -90,7 +84,6 @@ def per_variance(prior: Array, n: int, widest: float) -> Array:
     Parameters
     ----------
     prior : covariance before the first sample, (2, q, q).
-    n : number of weights.
     widest : limit over the prior's [-].
     """
     variances = np.einsum("aii->ai", prior)
@@ -118,7 +111,6 @@ def factors_of(packed: list[Any], q: int) -> Factors:
     Parameters
     ----------
     packed : q (q + 1)/2 entries.
-    q : size of the matrix.
     """
     by_place = dict(zip(triangle(q), packed, strict=True))
     D = [by_place.pop((i, i)) for i in range(q)]

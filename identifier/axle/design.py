@@ -38,28 +38,12 @@ from identifier.driving import Driving, natural_driving
 from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
-from identifier.tuning import Range, ranges_around
 from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 
 
 # What a search may vary of it, and what the number is multiplied and divided by.
-TUNED: Mapping[str, float] = {
-    "regression.bandwidth": 2.0,
-    "regression.memory": 4.0,
-    "regression.error": 3.0,
-    "regression.relative_error": 3.0,
-    "regression.correlation_time": 3.0,
-    "prior.sd_shape": 2.0,
-    "prior.sd_stiffness": 2.0,
-    "prior.compliance": 3.0,
-    "prior.sd_compliance": 3.0,
-    "prior.sway_share": 3.0,
-    "prior.sd_sway_share": 3.0,
-    "sway.frequency": 1.5,
-    "change.threshold": 2.0,
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,22 +144,12 @@ class AxleIdentifier(Method):
         )
 
     def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of the curves that a run of it taught.
-
-        Parameters
-        ----------
-        history : of this method.
-        """
+        """Return what is proven of the curves that a run of it taught."""
         return Certificate(properties=certified_along(self, history))
 
     def possible_tires(self) -> HalfSpaces:
         """Return the weights that the curve of a tire can have, within the bounds."""
         return prior_box(self.bounds, self.ladder)
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return ranges_around(self, TUNED)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -187,7 +161,6 @@ class AxleIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -255,11 +228,6 @@ class AxleIdentifier(Method):
         Parameters
         ----------
         start : as of `setup`; without a calibration errors are taken to be as learning is told.
-
-        Raises
-        ------
-        ValueError
-            Where stored weights are those of another structure.
         """
         setup = self.setup(vehicle, start)
         stored = None if start is None else self._resumed(start).calibration
@@ -356,7 +324,7 @@ class AxleIdentifier(Method):
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)
 
-    def road_push(self, state: Mapping[str, Array]) -> Array | None:
+    def beside_force(self, state: Mapping[str, Array]) -> Array | None:
         """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
 
         Parameters

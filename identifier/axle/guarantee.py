@@ -138,12 +138,7 @@ class HalfSpaces(NamedTuple):
     b: Array
 
     def both(self, other: "HalfSpaces") -> "HalfSpaces":
-        """Return what holds where this and the other do.
-
-        Parameters
-        ----------
-        other : half-spaces of as many weights.
-        """
+        """Return what holds where this and the other do."""
         return HalfSpaces(np.vstack([self.A, other.A]), np.concatenate([self.b, other.b]))
 
 
@@ -218,10 +213,6 @@ def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, floa
 
     The least e + 1.5 τ mean(ρ) is taken, a linear program: what error explains as well is not taken
     for lateness, which says nothing of slow forces.
-
-    Parameters
-    ----------
-    axle : 0 front, 1 rear.
     """
     y, h, rate = strips.y[:, axle], strips.h[:, axle], strips.rate[:, axle]
     n = h.shape[1]
@@ -237,12 +228,7 @@ def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, floa
 
 
 def vertices(among: HalfSpaces) -> Array | None:
-    """Return the vertices (k, n) of a bounded polytope; None where it has no inside.
-
-    Parameters
-    ----------
-    among : its half-spaces.
-    """
+    """Return the vertices (k, n) of a bounded polytope; None where it has no inside."""
     from scipy.spatial import HalfspaceIntersection
 
     A, b = among
@@ -267,10 +253,6 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
     """Return the vertices (k, n) of the weights that a drive leaves to an axle.
 
     None where no curve keeps the bound: then it is violated.
-
-    Parameters
-    ----------
-    axle : 0 front, 1 rear.
     """
     allowed = bound.allowed(strips.beyond, strips.rate)[:, axle]
     return vertices(box.both(strip_sides(strips.y[:, axle], strips.h[:, axle], allowed)))
@@ -368,12 +350,7 @@ class Guarantee:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], n: int) -> Self:
-        """Return the guarantee that `to_dict` describes.
-
-        Parameters
-        ----------
-        n : number of weights of an axle.
-        """
+        """Return the guarantee that `to_dict` describes."""
         pairs = []
         for name in (*PAIRS, "corners"):
             if not isinstance(data[name], list) or len(data[name]) != 2:
@@ -420,7 +397,6 @@ def force_rate(
     units : tanh(x/α_j) of both axles (k, 2, n).
     curves : weights of front and rear, (m, n) each [static axle loads].
     dt : sampling interval [s].
-    stretches : samples that follow one another without a gap.
     """
     rate = np.zeros(units.shape[:2])
     for part in stretches:
@@ -461,7 +437,6 @@ def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice
     slip : lagged x (k, 2) [rad].
     driven : largest of the drive that taught (2,), positive [rad].
     dt : sampling interval [s].
-    stretches : samples that follow one another without a gap.
     """
     beyond = np.zeros_like(slip)
     for part in stretches:
@@ -494,7 +469,6 @@ def along_acceleration(v_x: Array, turning: Array, dt: float, stretches: Iterabl
     v_x : forward speed (k,) [m/s].
     turning : v_y r (k,) [m/s²].
     dt : sampling interval [s].
-    stretches : samples that follow one another without a gap.
     """
     along = np.zeros_like(v_x)
     for part in stretches:

@@ -122,7 +122,6 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
     Parameters
     ----------
     u : its input now, which is also its output at a restart.
-    first : 1 at a restart, else 0.
     """
     f = first * u + (1 - first) * (v + numbers.half * u)
     return f, numbers.e * f + numbers.half * u
@@ -282,7 +281,6 @@ def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) 
     Parameters
     ----------
     q : squared error over its variance, (2,).
-    learns : 1 where learning runs, else 0.
     """
     q = smaller(q, LARGEST_Q)
     fast = state.fast + learns * numbers.fast * (q - state.fast)

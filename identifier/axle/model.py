@@ -172,12 +172,7 @@ class AxleModel(TireModel):
         return 0.0 if self.vehicle.has_downforce else self.reference_speed
 
     def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
         force: Array = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
         return force
 
@@ -185,10 +180,6 @@ class AxleModel(TireModel):
         """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
 
         Standard deviation of the force over that of the prior.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,), not zero.
         """
         T, n = unit_matrix(alpha, self.ladder), len(self.ladder)
         ratio = [
@@ -212,13 +203,7 @@ class AxleModel(TireModel):
     def with_calibration(
         self, calibration: BandCalibration | None, force_missed: Array | None = None
     ) -> "AxleModel":
-        """Return the model, its band calibrated.
-
-        Parameters
-        ----------
-        calibration : None takes errors to be as learning is told.
-        force_missed : of the drive that taught, (2,); None where nobody looked.
-        """
+        """Return the model, its band calibrated."""
         return replace(self, calibration=calibration, force_missed=force_missed)
 
     @property
@@ -240,13 +225,6 @@ class AxleModel(TireModel):
 
         Without a calibration errors are taken to be as learning is told.
 
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        level : share of cases that the band shall hold, above 0 and below 1.
-        v_x : speed [m/s], a number or (k,), positive; None takes errors at that of the drive that
-            taught, of forces under static loads.
-
         Raises
         ------
         ValueError
@@ -266,10 +244,6 @@ class AxleModel(TireModel):
 
         White noise of the drive's own sensors is in it, as far as the lag lets it pass; it is zero
         where the forces read zero.
-
-        Parameters
-        ----------
-        level : share of samples that the band shall hold, above 0 and below 1.
         """
         slip, noise = self.lagged_slip(recording), sensor_noise(recording, self.vehicle)
         half = np.zeros_like(slip)
@@ -288,7 +262,6 @@ class AxleModel(TireModel):
         ----------
         slip : of front and rear axle [rad], (n, 2).
         v_x : speeds [m/s], positive, (n,).
-        level : share of cases that the band shall hold, above 0 and below 1.
         """
         both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
         return np.column_stack(both)
@@ -297,10 +270,6 @@ class AxleModel(TireModel):
         """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
 
         Of the steady forces, without noise of the drive's sensors.
-
-        Parameters
-        ----------
-        level : share of cases that the band shall hold, above 0 and below 1.
         """
         speed = np.maximum(recording.v_x, self.min_speed)
         return self.half_band_along(self.lagged_slip(recording), speed, level)
@@ -407,11 +376,6 @@ class AxleModel(TireModel):
         """Return least and largest steady force at slip angles under static loads, (k, 2) [N].
 
         None: none is stated.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        rate : of the force, static axle loads per second (k,).
         """
         if self.guarantee is None:
             return None
@@ -433,10 +397,6 @@ class AxleModel(TireModel):
         stands = recording.v_x < self.min_speed
         low[stands], high[stands] = np.nan, np.nan
         return low * self._loads, high * self._loads
-
-    def with_guarantee(self, guarantee: Guarantee) -> "AxleModel":
-        """Return the model with its guaranteed band."""
-        return replace(self, guarantee=guarantee)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
         """Return units times load and cos δ over a drive, (n, 2, ladder), and what opens a band.
@@ -594,12 +554,7 @@ class AxleModel(TireModel):
         return replace(self, tells_v_y=False)
 
     def at_friction(self, ratio: float) -> "AxleModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
-
-        Parameters
-        ----------
-        ratio : friction over that of the drive that taught, positive [-].
-        """
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
         require_positive(ValueError, ratio=ratio)
         n = len(self.ladder)
         unit = np.concatenate([np.full(n, ratio), np.ones(3)])
@@ -626,7 +581,6 @@ class AxleModel(TireModel):
 
         Parameters
         ----------
-        alpha : slip angles (2,) [rad], the wheels straight ahead.
         v_x : longitudinal speed [m/s]; looked at where the car has downforce.
         """
         at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)
@@ -641,9 +595,6 @@ class AxleModel(TireModel):
         ----------
         slip : lagged slip (2,) [rad].
         x : [v_y, r] (2,), as the sensors read them while learning.
-        delta : angle of the front wheels [rad].
-        v_x : longitudinal speed [m/s], positive.
-        least_lag : time under which no lag falls [s].
         """
         return lagged_force(
             Car(*car_numbers(self.vehicle).T),
@@ -675,12 +626,7 @@ class AxleModel(TireModel):
         return self.setup(recording.dt).output(recording, "lagged_slip")
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs.
-
-        Parameters
-        ----------
-        dt : sampling interval of what is replayed [s].
-        """
+        """Return what a replay needs."""
         return Setup(
             scan=_frozen_scan(doublings(self.ladder), pressed=self.vehicle.has_downforce),
             carry={
@@ -730,12 +676,7 @@ class AxleModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":
-        """Return the model that `to_dict` describes.
-
-        Parameters
-        ----------
-        source : name of the file, for errors.
-        """
+        """Return the model that `to_dict` describes."""
         _require_plausible(data, source)
         try:
             if list(data["edges"]) != list(EDGES):

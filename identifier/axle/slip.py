@@ -114,7 +114,6 @@ def sensitivity(
     h : numbers of the step.
     compliance : s [m], (2,).
     alpha : slip angle now [rad], (2,).
-    first : 1 at a restart, else 0.
     sway_before : ∂α/∂k at the last sample [rad].
     sway_now : ∂α/∂k now [rad].
     wheelbase : L [m].

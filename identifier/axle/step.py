@@ -99,7 +99,6 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
 
     Parameters
     ----------
-    steps : doublings between the units.
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
@@ -174,12 +173,7 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
 
 
 def build_frozen(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
-    """Return the frozen model as a step: weights in, axle_force [N], slips [rad] out, (2,).
-
-    Parameters
-    ----------
-    steps : doublings between the units.
-    """
+    """Return the frozen model as a step: weights in, axle_force [N], slips [rad] out, (2,)."""
     f = forward(steps, pressed=pressed)
     return ca.Function(
         _name("axle_frozen", steps, pressed=pressed),
@@ -300,7 +294,6 @@ def build_step(
 
     Parameters
     ----------
-    steps : doublings between the units, the structure.
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is told, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
@@ -376,10 +369,6 @@ def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
     told : standard deviation that y is told to have (2,), without what the slow mean of squared
     errors adds.
     watched : whether kept weights come back, and by how much they follow the learnt ones.
-
-    Parameters
-    ----------
-    steps : doublings between the units, the structure.
     """
     n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)
@@ -504,50 +493,6 @@ def _recent_force(
     force = last + learns * numbers.smooth * (y - last)
     peak = larger(ca.fabs(force), last_peak * numbers.decay)
     return force, ca.if_else(learns, peak, last_peak)
-
-
-# The same regression with weights that stay: what a drive tells of them, to be added up.
-
-EVIDENCE_CARRY = ("gate", "sway", "slip", "sensitivity", "filters", "peak", "bank")
-
-
-def build_evidence(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
-    """Return the step that tells the regression at given weights, and learns nothing.
-
-    Outputs, rows front and rear: h (2, q), zero but for the offset where there is no force to learn
-    from; y (2,), what h'[w, own] shall be where the regression is replaced by its tangent at the
-    given numbers; R (2,) its variance; learns, 1 or 0.
-
-    Parameters
-    ----------
-    steps : doublings between the units.
-    """
-    f = forward(steps, pressed=pressed)
-    n, ports = len(steps) + 1, dict(f.ports)
-    h, y, next_state = _regression(f, ports)
-    y, next_state["bank"] = _without_bank(f, ports, y)
-    numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
-    ports["peak"] = ca.SX.sym("peak", 2)
-    force, next_state["peak"] = _recent_force(ports, numbers, y, ports["peak"], f.gated.learns)
-    next_state["filters"] = ca.horzcat(next_state["filters"], force)
-    next_state |= f.next_state
-    y_hat = ca.sum2(ports["W"] * h[:, :n])
-    seen = ca.horzcat(h[:, :-1] * (next_state["peak"] >= numbers.least_force), h[:, -1])
-    tangent = ca.sum2(seen * ca.horzcat(ports["W"], ports["own"]))
-    return ca.Function(
-        _name("axle_evidence", steps, pressed=pressed),
-        list(ports.values()),
-        [
-            *(next_state[name] for name in EVIDENCE_CARRY),
-            seen,
-            y - y_hat + tangent,
-            _deviation(f, numbers, y_hat) ** 2 * numbers.samples,
-            f.gated.learns,
-        ],
-        list(ports),
-        [*(f"{name}_next" for name in EVIDENCE_CARRY), "h", "y", "R", "learns"],
-        {"cse": True},
-    )
 
 
 def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:

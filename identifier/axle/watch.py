@@ -134,7 +134,6 @@ def watched(
     q : of the learnt weights, front and rear (2,).
     q_kept : of the kept ones (2,).
     dt : sampling interval [s].
-    learns : 1 where learning runs, else 0.
     moving : 1 where there are forces that tell weights apart, else 0.
     """
     share, time = learns * numbers.gain, learns * dt

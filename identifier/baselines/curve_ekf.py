@@ -1,13 +1,10 @@
-"""The parameters of a tire curve by an extended Kalman filter; they freeze to that curve.
-
-Magic Formula: B, C, D per axle. Dugoff: stiffness per axle and the friction of the road.
-"""
+"""B, C, D of a Magic Formula per axle by an extended Kalman filter; they freeze to that curve."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
@@ -20,7 +17,6 @@ from identifier.baselines.ports import LAG_DESCRIBED, OVER, axle_loads
 from identifier.method import Method, resumed
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, around
 from models.bicycle import BicycleParameters
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
@@ -39,85 +35,50 @@ LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
 OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
 
 
-class Parametrization(NamedTuple):
-    """How θ makes the parameters of a curve.
-
-    kinds : of each θ: STIFFNESS, SHAPE or FRICTION.
-    decode(bicycle parameters, prior friction, loads (2,), θ) -> parameters (2, n).
-    encode(vehicle, prior friction, parameters (2, n)) -> θ.
-    """
-
-    kinds: tuple[int, ...]
-    decode: Callable[[BicycleParameters, Any, Any, Any], Any]
-    encode: Callable[[Vehicle, float, Array], Array]
+SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
+KINDS = (STIFFNESS, STIFFNESS, SHAPE, SHAPE, FRICTION, FRICTION)  # of each θ of the curve
+MAGIC = CURVES["magic_formula"]
 
 
-def _stated(p: BicycleParameters) -> Any:
-    return ca.vertcat(p.C_f, p.C_r)
-
-
-def _decode_magic(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
-    """θ: log stiffness, logit shape, log friction; front and rear each."""
-    slope = _stated(p) * ca.exp(theta[0:2])  # B C D, which data tell sooner than B
+def decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
+    """Return B, C, D (2, 3) of θ: log stiffness, logit shape, log friction; front and rear each."""
+    slope = ca.vertcat(p.C_f, p.C_r) * ca.exp(theta[0:2])  # B C D, which data tell sooner than B
     C = 1 + 1 / (1 + ca.exp(-theta[2:4] - LOGIT))
     D = friction * loads * ca.exp(theta[4:6])
     return ca.horzcat(slope / (C * D), C, D)
 
 
-def _encode_magic(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
+def encoded(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
+    """Return the θ that `decoded` makes such parameters of, (6,)."""
     B, C, D = parameters.T
     stated, loads = np.array(vehicle.bicycle)[4:], np.array(vehicle.axle_loads)
     shape = np.log((C - 1.0) / (2.0 - C)) - LOGIT
     return np.concatenate([np.log(B * C * D / stated), shape, np.log(D / (friction * loads))])
 
 
-def _decode_dugoff(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
-    """θ: log stiffness front and rear, log friction of the road, which both axles share."""
-    del loads
-    mu = friction * ca.exp(theta[2])
-    return ca.horzcat(_stated(p) * ca.exp(theta[0:2]), ca.vertcat(mu, mu))
-
-
-def _encode_dugoff(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
-    C, mu = parameters.T
-    stated = np.array(vehicle.bicycle)[4:]
-    return np.append(np.log(C / stated), np.log(mu.mean() / friction))
-
-
-PARAMETRIZATIONS: Mapping[str, Parametrization] = {
-    "magic_formula": Parametrization(
-        (STIFFNESS, STIFFNESS, SHAPE, SHAPE, FRICTION, FRICTION), _decode_magic, _encode_magic
-    ),
-    "dugoff": Parametrization((STIFFNESS, STIFFNESS, FRICTION), _decode_dugoff, _encode_dugoff),
-}
-SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
-
-
 OWN = 4  # unknowns beside those of the curve: ln σ/σ₀ (2,), δ₀ and b over their spreads
 OWN_PRIOR = ("relaxation_length", "steering_spread", "v_y_spread")
 
 
-def filtered_tire(curve: str, textbook: bool) -> FilteredTire:
+def filtered_tire(textbook: bool) -> FilteredTire:
     """Return what makes the forces of a curve by θ = [curve, ln σ/σ₀, δ₀ and b over spreads].
 
     Prior: friction [-], then those of `OWN_PRIOR` where it is not the textbook's.
 
     Parameters
     ----------
-    curve : "magic_formula" or "dugoff".
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
-    kinds, decode, _ = PARAMETRIZATIONS[curve]
-    n, model = len(kinds), CURVES[curve]
+    n = len(KINDS)
 
     def slip(p: BicycleParameters, known: Any, theta: Any, v_x: Any, x: Any, u: Any) -> Any:
         if textbook:
-            return model.slip(p, v_x, x, u)
-        return measured_slip(model, p, known[2:4] * theta[n + 2 :], v_x, x, u)
+            return MAGIC.slip(p, v_x, x, u)
+        return measured_slip(MAGIC, p, known[2:4] * theta[n + 2 :], v_x, x, u)
 
     def force(p: BicycleParameters, known: Any, theta: Any, slip: Any, u: Any) -> Any:
         loads = axle_loads(p, GRAVITY)
-        return model.force(decode(p, known[0], loads, theta[:n]), loads, slip, u)
+        return MAGIC.force(decoded(p, known[0], loads, theta[:n]), loads, slip, u)
 
     def lag(known: Any, theta: Any) -> Any:
         return known[1] * ca.exp(theta[n : n + 2])
@@ -129,25 +90,23 @@ def filtered_tire(curve: str, textbook: bool) -> FilteredTire:
         lag=None if textbook else lag,
         unknowns=n + own,
         prior=1 + prior,
-        follows=False,
     )
 
 
 @cache
-def _scan(curve: str, textbook: bool) -> Scan:
-    tire = filtered_tire(curve, textbook)
-    return Scan(build_step(f"{curve}_ekf", tire), carry=tire.carry, over=OVER)
+def _scan(textbook: bool) -> Scan:
+    tire = filtered_tire(textbook)
+    return Scan(build_step("magic_formula_ekf", tire), carry=tire.carry, over=OVER)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurveEkf(Method):
-    """Tire parameters that walk at random, slowly, in the coordinates of `PARAMETRIZATIONS`.
+    """Tire parameters that walk at random, slowly, in the coordinates of `decoded`.
 
     With them the lag of the tire and the zeros of both sensors, which the default learns too.
 
     Parameters
     ----------
-    curve : "magic_formula" or "dugoff".
     walk : of every parameter [1/√s].
     v_y_noise : standard deviation of measured v_y [m/s].
     r_noise : standard deviation of the measured yaw rate [rad/s].
@@ -170,10 +129,9 @@ class CurveEkf(Method):
     Raises
     ------
     ValueError
-        Where the curve is unknown or a number not positive.
+        Where a number is not positive.
     """
 
-    curve: str
     walk: float
     v_y_noise: float
     r_noise: float
@@ -194,16 +152,12 @@ class CurveEkf(Method):
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.curve not in PARAMETRIZATIONS:
-            raise ValueError(f"curve must be one of {list(PARAMETRIZATIONS)}, not {self.curve!r}")
         filtered = ("walk", *NOISE, "friction", *SPREADS, *OWN_PRIOR, "relaxation_spread")
         names = (*filtered, "dt", "learning_speed", "min_speed")
         require_positive(ValueError, **{name: getattr(self, name) for name in names})
 
     @classmethod
-    def for_vehicle(
-        cls, vehicle: Vehicle, *, curve: str, dt: float = 0.01, textbook: bool = False
-    ) -> Self:
+    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> Self:
         """Return the filter for a car: for a sedan noise of 0.02 m/s and 0.002 rad/s.
 
         Disturbances stand for what the curve misses, for a natural time at once: 8 % of g without
@@ -212,14 +166,11 @@ class CurveEkf(Method):
 
         Parameters
         ----------
-        curve : "magic_formula" or "dugoff".
         dt : sampling interval [s].
-        textbook : without lag and offsets.
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
         missed = 1.0 if textbook else 0.5
         return cls(
-            curve=curve,
             walk=0.0075 / math.sqrt(time),
             v_y_noise=0.004 * speed,
             r_noise=0.001 / time,
@@ -234,18 +185,6 @@ class CurveEkf(Method):
         )
 
     @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        factors = {"walk": 10.0, "v_y_noise": 4.0, "r_noise": 4.0}
-        factors |= {"v_y_disturbance": 5.0, "r_disturbance": 5.0, "friction": 1.5}
-        factors |= {"stiffness_spread": 3.0, "friction_spread": 3.0}
-        if SHAPE in PARAMETRIZATIONS[self.curve].kinds:
-            factors |= {"shape_spread": 3.0}
-        if not self.textbook:
-            factors |= dict.fromkeys((*OWN_PRIOR, "relaxation_spread"), 3.0)
-        return {name: around(getattr(self, name), factor) for name, factor in factors.items()}
-
-    @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return PORTS if self.textbook else (*PORTS, *LAG_DESCRIBED)
@@ -258,25 +197,13 @@ class CurveEkf(Method):
         return "lag of the tires and offsets of the sensors are learnt, as by the default"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is the prior.
-        start : a frozen curve of the same kind to begin with; None begins with the prior.
-
-        Raises
-        ------
-        ValueError
-            Where the stored model is of another kind.
-        """
-        kinds, _, encode = PARAMETRIZATIONS[self.curve]
-        theta, own = np.zeros(len(kinds)), np.zeros(0 if self.textbook else OWN)
+        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
+        theta, own = np.zeros(len(KINDS)), np.zeros(0 if self.textbook else OWN)
         if start is not None:
-            refusal = f"the stored model is not a curve {self.curve!r}"
-            stored = resumed(start, CurveModel, refusal, curve=self.curve)
+            refusal = "the stored model is not a curve 'magic_formula'"
+            stored = resumed(start, CurveModel, refusal, curve="magic_formula")
             with np.errstate(invalid="ignore", divide="ignore"):  # judged below
-                theta = encode(vehicle, self.friction, stored.parameters)
+                theta = encoded(vehicle, self.friction, stored.parameters)
             if not np.isfinite(theta).all():
                 raise ValueError(
                     "a curve to begin with must have positive stiffness and friction and a shape "
@@ -287,7 +214,7 @@ class CurveEkf(Method):
         prior = () if self.textbook else OWN_PRIOR
         noise = [self.v_y_noise, self.r_noise, *[self.v_y_noise / self.learning_speed] * lags]
         return Setup(
-            scan=_scan(self.curve, self.textbook),
+            scan=_scan(self.textbook),
             carry={
                 "estimate": np.concatenate([np.zeros(2 + lags), theta, own]),
                 "P": np.diag([*noise, *self.spread]) ** 2,
@@ -309,14 +236,14 @@ class CurveEkf(Method):
     @property
     def spread(self) -> Array:
         """Standard deviations of the unknowns θ at first, (n,) [-]."""
-        of_curve = [getattr(self, SPREADS[kind]) for kind in PARAMETRIZATIONS[self.curve].kinds]
+        of_curve = [getattr(self, SPREADS[kind]) for kind in KINDS]
         own = [] if self.textbook else [self.relaxation_spread, self.relaxation_spread, 1.0, 1.0]
         return np.array([*of_curve, *own])
 
     @property
     def limit(self) -> Array:
         """What the unknowns θ stay within, (n,) [-]."""
-        of_curve = [LIMITS[kind] for kind in PARAMETRIZATIONS[self.curve].kinds]
+        of_curve = [LIMITS[kind] for kind in KINDS]
         own = [] if self.textbook else [LAG_LIMIT, LAG_LIMIT, *OFFSET_LIMITS]
         return np.array([*of_curve, *own])
 
@@ -327,12 +254,11 @@ class CurveEkf(Method):
         ----------
         theta : unknowns, (n,).
         """
-        kinds, decode, _ = PARAMETRIZATIONS[self.curve]
-        n, loads = len(kinds), ca.DM(vehicle.axle_loads)
-        values = decode(vehicle.bicycle, self.friction, loads, ca.DM(theta[:n]))
+        n, loads = len(KINDS), ca.DM(vehicle.axle_loads)
+        values = decoded(vehicle.bicycle, self.friction, loads, ca.DM(theta[:n]))
         curve = CurveModel(
             vehicle=vehicle,
-            curve=self.curve,
+            curve="magic_formula",
             parameters=np.array(ca.DM(values)),
             min_speed=self.min_speed,
         )
@@ -346,12 +272,7 @@ class CurveEkf(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve with the carried parameters, lag and offsets.
-
-        Parameters
-        ----------
-        state : estimate, which ends with θ.
-        """
+        """Return the curve with the carried parameters, lag and offsets."""
         return self.model(vehicle, state["estimate"].ravel()[-self.limit.size :])
 
     def _own_of(self, stored: CurveModel) -> Array:
@@ -364,24 +285,6 @@ class CurveEkf(Method):
         )
 
 
-# Dugoff's tire, stiffness per axle and friction of the road by an extended Kalman filter.
-
-
-def dugoff_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
-    """Return the method for a car.
-
-    Parameters
-    ----------
-    vehicle : the car; its stiffness is the prior.
-    dt : sampling interval [s].
-    textbook : without lag and offsets.
-    """
-    return CurveEkf.for_vehicle(vehicle, curve="dugoff", dt=dt, textbook=textbook)
-
-
-# B, C and D of a Magic Formula per axle, learnt by an extended Kalman filter.
-
-
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
     """Return the method for a car.
 
@@ -389,6 +292,5 @@ def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = Fa
     ----------
     vehicle : the car; its stiffness B C D is the prior.
     dt : sampling interval [s].
-    textbook : without lag and offsets.
     """
-    return CurveEkf.for_vehicle(vehicle, curve="magic_formula", dt=dt, textbook=textbook)
+    return CurveEkf.for_vehicle(vehicle, dt=dt, textbook=textbook)

@@ -251,12 +251,7 @@ class CurveModel(TireModel):
                 )
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs.
-
-        Parameters
-        ----------
-        dt : sampling interval of what is replayed [s].
-        """
+        """Return what a replay needs."""
         return Setup(
             scan=curve_scan(self.curve, lagged=self.lagged),
             carry=unlagged() if self.lagged else {},
@@ -280,12 +275,7 @@ class CurveModel(TireModel):
         return (*TireModel.facts(self), *((lag,) if self.lagged else ()))
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression.
-
-        Parameters
-        ----------
-        alpha : slip angles (2,) [rad], the wheels straight ahead.
-        """
+        """Return the steady axle forces (2,) [N] as a CasADi expression."""
         del v_x
         return self._force(alpha, 0.0)
 
@@ -296,11 +286,7 @@ class CurveModel(TireModel):
 
         Parameters
         ----------
-        slip : lagged slip (2,) where `lagged`, else empty [rad].
         x : [v_y, r] (2,), as the sensors read them while learning.
-        delta : angle of the front wheels [rad].
-        v_x : longitudinal speed [m/s], positive.
-        least_lag : time under which no lag falls [s].
         """
         p, u = self.vehicle.bicycle, ca.vertcat(delta, 0)
         alpha = measured_slip(CURVES[self.curve], p, self.offset, v_x, x, u)
@@ -330,12 +316,7 @@ class CurveModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "CurveModel":
-        """Return the model that `to_dict` describes.
-
-        Parameters
-        ----------
-        source : name of the file, for errors.
-        """
+        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             curve = table.text("curve")

@@ -47,7 +47,6 @@ from identifier.baselines.without_v_y import (
 from identifier.method import Method
 from identifier.setup import COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, ranges_around
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 
@@ -327,10 +326,6 @@ class HorizonEstimator(Method):
         well. The trajectory that is likeliest together with its tires makes tires too stiff where
         much of the motion may be chance, so less of the yaw rate's is. A longer window, or more
         steps, errs no less there.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
         """
         window = max(vehicle.froude_time, 2.0 * dt)
         joint = joint_ekf(vehicle, dt=dt)
@@ -354,11 +349,6 @@ class HorizonEstimator(Method):
         return True
 
     @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return ranges_around(self, {f"filter.{name}": 4.0 for name in self.filter.tunables})
-
-    @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return OWN_PORTS
@@ -369,18 +359,7 @@ class HorizonEstimator(Method):
         return f"{self.filter.remark}; solves for the last {self.samples} samples at each"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is the prior.
-        start : a frozen curve of Dugoff to begin with; None begins with the prior.
-
-        Raises
-        ------
-        ValueError
-            Where the stored model is of another kind.
-        """
+        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
         joint, N = self.filter.setup(vehicle, start), self.samples
         z, P = joint.carry["estimate"], joint.carry["P"]
         return Setup(
@@ -398,10 +377,5 @@ class HorizonEstimator(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters.
-
-        Parameters
-        ----------
-        state : estimate, which ends with θ.
-        """
+        """Return the curve of Dugoff with the carried parameters."""
         return self.filter.frozen(vehicle, state)

@@ -10,32 +10,21 @@ distance. x follows it all the way, unless slip lags: α' would remember it. Sou
 State Estimation, 2006, sections 5.1 and 13.2.
 """
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache
-from typing import Any, NamedTuple, Self
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from codegen import Scan
 from identifier.baselines.ports import (
     LAG_PORTS,
     OVER,
-    axle_loads,
     lag_symbols,
     lagged_slip,
     motion_rate,
     sample_ports,
 )
-from identifier.method import Method
-from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
-from identifier.tire_model import TireModel
-from identifier.tuning import Range, around
+from identifier.setup import AXLE_FORCE, COVARIANCE, Port
 from models.bicycle import BicycleParameters
-from models.rules import require_positive
-from models.vehicle import GRAVITY, Vehicle
 
 CARRY = ("estimate", "P", "before", "running")
 CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")
@@ -56,8 +45,7 @@ class FilteredTire(NamedTuple):
     force(bicycle parameters, prior, θ, slip (2,), u) -> axle forces (2,) [N].
     lag(prior, θ) -> σ (2,) [m]; None: the force reads α, nothing lags.
     unknowns, prior : sizes of θ and of whatever else it reads.
-    follows : whether the force told is that of the corrected θ (a signal), else that of the θ
-        carried into the sample (a model, which then freezes to the same force).
+    The force told is that of the θ carried into the sample, to which a model freezes.
     """
 
     slip: Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
@@ -65,7 +53,6 @@ class FilteredTire(NamedTuple):
     lag: Callable[[Any, Any], Any] | None
     unknowns: int
     prior: int
-    follows: bool
 
     @property
     def carry(self) -> tuple[str, ...]:
@@ -123,13 +110,12 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     P_afresh += ca.diag(unsteady**2)
     following = ca.if_else(going, corrected, afresh)
     theta_next = ca.fmin(ca.fmax(following[2 + lags :], -limit), limit)
-    output_theta = theta_next if tire.follows else theta
     last = lag_symbols()
     lag_next: tuple[Any, ...] = ()
     if tire.lag is not None:
         told_slip = lagged_slip(last, alpha_now, s.speed * dt, tire.lag(known, theta))
         lag_next = (told_slip, alpha_now, ca.if_else(s.moving, 1, 0))
-    axle_force = tire.force(p, known, output_theta, told_slip, s.u)
+    axle_force = tire.force(p, known, theta, told_slip, s.u)
     return ca.Function(
         name,
         [
@@ -190,133 +176,3 @@ def correct(
     keep[:, :2] -= gain
     after = keep @ P @ keep.T + gain @ R @ gain.T  # Joseph
     return estimate + move, (after + after.T) / 2
-
-
-# Extended Kalman filter with axle forces as random walks: a signal estimator.
-#
-# θ = [F_f, F_r]/F_z, in static axle loads.   Source of the idea: Ray, "Nonlinear state and tire
-# force estimation for advanced vehicle control", IEEE Trans. Control Systems Technology 3(1), 1995.
-
-LIMIT = 5.0  # static axle loads: no tire reaches it
-
-
-def _slip(p: BicycleParameters, known: Any, theta: Any, v_x: Any, x: Any, u: Any) -> Any:
-    del p, known, theta, v_x, x, u
-    return ca.SX(2, 1)  # no tire reads it
-
-
-def _force(p: BicycleParameters, known: Any, theta: Any, slip: Any, u: Any) -> Any:
-    del known, slip, u
-    return axle_loads(p, GRAVITY) * theta
-
-
-FORCE_WALK = FilteredTire(slip=_slip, force=_force, lag=None, unknowns=2, prior=1, follows=True)
-
-
-@cache
-def _scan() -> Scan:
-    return Scan(build_step("force_ekf", FORCE_WALK), carry=CARRY, over=OVER)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ForceEkf(Method):
-    """Forces that walk at random: no tire, only how fast a force may change.
-
-    Parameters
-    ----------
-    force_walk : of each force, in static axle loads per root of time [1/√s].
-    v_y_noise : standard deviation of measured v_y [m/s].
-    r_noise : standard deviation of the measured yaw rate [rad/s].
-    v_y_disturbance : random change of v_y that no force explains [m/s/√s].
-    r_disturbance : random change of the yaw rate that no force explains [rad/s/√s].
-    outlier : standard deviations from which an innovation counts no more.
-    dt : sampling interval [s].
-    min_speed : below this speed [m/s] forces read zero.
-    """
-
-    estimates = "axle forces"
-
-    force_walk: float
-    v_y_noise: float
-    r_noise: float
-    v_y_disturbance: float
-    r_disturbance: float
-    outlier: float = 5.0
-    dt: float = 0.01
-    min_speed: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_positive(
-            ValueError,
-            **{name: getattr(self, name) for name in ("force_walk", *NOISE, "dt", "min_speed")},
-        )
-
-    @classmethod
-    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
-        """Return the filter for a car: for a sedan noise of 0.02 m/s and 0.002 rad/s.
-
-        The forces walk by half a load in a second, which gives about the bandwidth of the
-        extended state observer.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
-        """
-        time, speed = vehicle.froude_time, vehicle.froude_speed
-        return cls(
-            force_walk=0.36 / math.sqrt(time),
-            v_y_noise=0.004 * speed,
-            r_noise=0.001 / time,
-            v_y_disturbance=0.001 * speed / math.sqrt(time),
-            r_disturbance=0.001 / time**1.5,
-            dt=dt,
-            min_speed=vehicle.lowest_speed,
-        )
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return {
-            "force_walk": around(self.force_walk, 10.0),
-            "v_y_noise": around(self.v_y_noise, 4.0),
-            "r_noise": around(self.r_noise, 4.0),
-        }
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return PORTS
-
-    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is not looked at.
-        start : None; a signal estimator cannot begin with a model.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
-        """
-        self.require_fresh(start)
-        R = np.array([self.v_y_noise, self.r_noise]) ** 2
-        return Setup(
-            scan=_scan(),
-            carry={
-                "estimate": np.zeros(4),
-                "P": np.diag([*R, 1.0, 1.0]),
-                "before": np.zeros(3),
-                "running": np.zeros(1),
-            },
-            constants={
-                "noise": np.array([getattr(self, name) for name in NOISE]),
-                "walk": np.full(2, self.force_walk),
-                "limit": np.full(2, LIMIT),
-                "prior": np.zeros(1),
-                "learning_speed": np.array(self.min_speed),
-                "vehicle": np.array(vehicle.bicycle),
-                "sampling": np.array([self.dt, self.min_speed]),
-            },
-        )

@@ -33,7 +33,6 @@ from identifier.baselines.without_v_y import OVER, corrected, heard_ports
 from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, ranges_around
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
@@ -187,10 +186,6 @@ class LaggedEkf(Method):
         """Return the filter for a car: its size alone sets the numbers.
 
         Noise, disturbances and spreads were chosen on 24 random cars of our plant.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
@@ -205,13 +200,6 @@ class LaggedEkf(Method):
         )
 
     @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        noise = ("v_y_noise", "r_noise", "a_y_noise", "v_y_disturbance", "r_disturbance")
-        own = ("relaxation_length", "stiffness_spread", "friction_spread")
-        return ranges_around(self, dict.fromkeys(noise, 4.0) | dict.fromkeys(own, 3.0))
-
-    @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return (*PORTS, *LAG_DESCRIBED)
@@ -222,18 +210,7 @@ class LaggedEkf(Method):
         return "two numbers an axle, one relaxation length for all cars of a size"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is not looked at.
-        start : None.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
-        """
+        """Return what a run needs; it begins afresh, with no stored model."""
         if start is not None:
             raise ValueError("the lagged filter begins afresh: it goes on from no stored model")
         theta = np.repeat(np.log([STIFFNESS, FRICTION]), 2)

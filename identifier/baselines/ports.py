@@ -67,16 +67,6 @@ def axle_loads(p: BicycleParameters, gravity: float) -> Any:
     return p.m * gravity / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
 
 
-def impulse(p: BicycleParameters, x: Any) -> Any:
-    """Return ξ = K⁻¹ x of (7), (2,) [N s].
-
-    Parameters
-    ----------
-    x : [v_y, r] (2,).
-    """
-    return bicycle(p, 1.0).K_inv @ x  # K does not depend on v_x
-
-
 def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
     """Return n, the axle forces of a steady turn (2,) [N].
 

@@ -36,7 +36,6 @@ from identifier.baselines.without_v_y import (
 from identifier.method import Method, resumed
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, ranges_around
 from models.bicycle import BicycleParameters
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
@@ -95,7 +94,6 @@ def _tire(curve: str, force: Any, unknowns: int) -> FilteredTire:
         lag=None,
         unknowns=unknowns,
         prior=1,
-        follows=False,
     )
 
 
@@ -230,7 +228,6 @@ class SlipFilter(Method):
 
         Parameters
         ----------
-        tire : "linear" or "dugoff".
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -262,13 +259,6 @@ class SlipFilter(Method):
         return TIRES[self.tire].unknowns > 0
 
     @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        noise = ("r_noise", "a_y_noise", "v_y_disturbance", "r_disturbance")
-        own = ("walk", "stiffness_spread", "friction_spread") if self.learns else ()
-        return ranges_around(self, dict.fromkeys((*noise, *own), 4.0))
-
-    @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return PORTS
@@ -280,18 +270,7 @@ class SlipFilter(Method):
         return f"on {on}"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; its stiffness is the prior.
-        start : a frozen curve of Dugoff to begin with, where one is learnt; None: the prior.
-
-        Raises
-        ------
-        ValueError
-            Where the stored model is of another kind, or no tire is learnt.
-        """
+        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
         theta = np.zeros(TIRES[self.tire].unknowns)
         if not self.learns:
             self.require_fresh(start)
@@ -318,10 +297,6 @@ class SlipFilter(Method):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the curve of Dugoff with the carried parameters.
-
-        Parameters
-        ----------
-        state : estimate, which ends with θ.
 
         Raises
         ------

@@ -5,7 +5,6 @@ dv/dt = a_y - v_x r + ω (v_s - v): v is the integral washed out by s/(s + ω), 
 for rates that hold over a step. A complementary filter; what bank and bias do to it is 1/ω of them.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Self
@@ -24,7 +23,6 @@ from identifier.baselines.without_v_y import (
 from identifier.method import Method
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range, around
 from models.rules import require_positive
 from models.vehicle import Vehicle
 
@@ -101,10 +99,6 @@ class Washout(Method):
 
         Chosen on random cars of our plant, whose roads bank and whose sensors are biased: a higher
         one errs less there by a tenth at most, and is the linear model alone.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
         """
         return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
 
@@ -119,11 +113,6 @@ class Washout(Method):
         return True
 
     @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return {"cutoff": around(self.cutoff, 10.0)}
-
-    @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return PORTS
@@ -134,18 +123,7 @@ class Washout(Method):
         return "by integration, and below its cutoff on the vehicle's linear tires"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        vehicle : the car; the stiffness of its rear axle is used.
-        start : None; no tire is learnt.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
-        """
+        """Return what a run needs; it begins afresh, with no stored model."""
         self.require_fresh(start)
         return Setup(
             scan=_scan(),

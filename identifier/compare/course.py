@@ -10,20 +10,15 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from codegen import BatchScan, Scan
+from codegen import Scan
 from codegen.arrays import Array
 from identifier.method import CannotFreezeError, Method
-from identifier.refused import judges_samples
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import History, identify
-from identifier.setup import shown
 from identifier.tire_model import TireModel
 from identifier.verdict.motion import (
     BRISK,
@@ -139,8 +134,7 @@ class Trial:
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
     diverged_at : by recording on which the method diverged, when [s].
-    side_slip : by recording, what was told of lateral velocity; empty for a method that reads it,
-        and of a batch, which records none.
+    side_slip : by recording, what was told of lateral velocity; empty for a method that reads it.
     """
 
     online: Mapping[str, AxleRmse]
@@ -295,129 +289,6 @@ def _mean(values: Sequence[float]) -> float | None:
     return float(np.mean(values)) if values else None
 
 
-# A step that sums up its own errors, so that nothing else of a run need be recorded.
-#
-# Added are, sampled: truth (2,) [N] and counts, 1 where the sample counts; constant: impossible
-# [N], a force that no tire makes; carried: squares (2,) [N²], the sum of squared errors over the
-# samples that count, and sane_samples, the samples before the first impossible force, and sane, 1
-# till then.
-
-CARRY = ("squares", "sane_samples", "sane")
-OVER = ("truth", "counts")
-
-
-class Scores(NamedTuple):
-    """What is left of many runs.
-
-    squares : mean squared error of either axle over the samples that count (runs, 2) [N²].
-    sane_samples : samples before the first impossible force (runs,).
-    record : by port, what a `BatchScan` records.
-    """
-
-    squares: Array
-    sane_samples: NDArray[np.int64]
-    record: Mapping[str, Array]
-
-
-def scored(step: ca.Function) -> ca.Function:
-    """Return the step with further ports, which hold the score of its output axle_force.
-
-    Parameters
-    ----------
-    step : with an output axle_force (2,) [N].
-    """
-    kind: Any = ca.SX if step.is_a("SXFunction") else ca.MX  # a step of calls stays one
-    inputs = [kind.sym(step.name_in(i), step.sparsity_in(i)) for i in range(step.n_in())]
-    outputs = step.call(inputs)
-    squares, samples, sane = kind.sym("squares", 2), kind.sym("samples"), kind.sym("sane")
-    truth, counts, impossible = kind.sym("truth", 2), kind.sym("counts"), kind.sym("impossible")
-    force = outputs[step.index_out("axle_force")]
-    possible = ca.logic_and(ca.fabs(force[0]) < impossible, ca.fabs(force[1]) < impossible)
-    sane_next = ca.logic_and(sane, possible)
-    score = [
-        squares + ca.if_else(counts, (force - truth) ** 2, 0),
-        samples + sane_next,
-        sane_next,
-    ]
-    return ca.Function(
-        f"{step.name()}_scored",
-        [*inputs, squares, samples, sane, truth, counts, impossible],
-        [*outputs, *score],
-        [*step.name_in(), *CARRY, *OVER, "impossible"],
-        [*step.name_out(), *(f"{name}_next" for name in CARRY)],
-    )
-
-
-@cache
-def _scored_scan(scan: Scan) -> BatchScan:
-    differ = [port for port in scan.step.name_in() if port not in scan.over]
-    return BatchScan(
-        scored(scan.step),
-        carry=(*scan.carry, *CARRY),
-        over=(*scan.over, *OVER),
-        lanes_over=(*differ, "impossible"),
-    )
-
-
-def run_scored(
-    scan: Scan,
-    values: Sequence[Mapping[str, Array]],
-    recording: Recording,
-    *,
-    impossible: Sequence[float],
-    counts: NDArray[np.bool_],
-    keep: Sequence[int] = (),
-    rest: int = 1,
-    workers: int | None = None,
-) -> Scores:
-    """Run a step over a recording with many sets of numbers.
-
-    Parameters
-    ----------
-    scan : its step reads x, u and v_x sample by sample and tells axle_force (2,) [N].
-    recording : its forces are the truth; without them every error is that of no force.
-    impossible : for each run, a force that no tire makes [N].
-    counts : samples that count in the error (n,).
-    rest : samples that each run rests between stretches of the recording.
-    workers : threads; None takes one for each processor.
-    """
-    seen = shown(recording, scan.over, rest=rest, judges=judges_samples(values[0]))
-    truth = np.zeros((len(recording), 2)) if recording.axle_force is None else recording.axle_force
-    counted = counts.astype(np.float64)
-    record = _scored_scan(scan)(
-        seen.samples,
-        {
-            **{port: np.stack([one[port] for one in values]) for port in values[0]},
-            **seen.signals,
-            "truth": seen.with_rests(truth),
-            "counts": seen.with_rests(counted),
-            "impossible": np.array(impossible),
-            "squares": np.zeros(2),
-            "sane_samples": np.zeros(()),
-            "sane": np.ones(()),
-        },
-        keep=[seen.place(k) for k in keep],
-        workers=workers,
-    )
-    sane = record["sane_samples_final"][:, 0].astype(np.int64)
-    return Scores(
-        squares=record["squares_final"] / counts.sum(),
-        sane_samples=sane if seen.at is None else np.searchsorted(seen.at, sane),
-        record=record,
-    )
-
-
-def rmse(squares: Array) -> AxleRmse:
-    """Return the root of mean squares.
-
-    Parameters
-    ----------
-    squares : of front and rear axle (2,) [N²].
-    """
-    front, rear = np.sqrt(squares)
-    return AxleRmse(front=float(front), rear=float(rear))
-
-
 # How long one step of a method takes, in compiled code.
 
 LONG = 10_000  # samples, beside which the call of the loop does not count
@@ -429,6 +300,8 @@ def step_times(
 ) -> dict[str, float]:
     """Return by method the shortest time per sample of a compiled run over a recording [s].
 
+    A method that learns from whole logs has none.
+
     Setting up is left out. Times are those of this thread on its processor, so that waiting for a
     busy machine does not count, and the methods take turns. A short recording is run forward and
     backward in time until it is long enough, of a long one the first 100 000 samples count.
@@ -439,12 +312,14 @@ def step_times(
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}
     for name, method in methods.items():
+        if method.whole:
+            continue
         setup = method.setup(vehicle).begin(recording.x[0])
         sampled = {port: _long(signal) for port, signal in setup.shown(recording).signals.items()}
         n = len(sampled["v_x"])
         runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}, n
         setup.scan(n, runs[name][1])  # compiled and warm
-    shortest = dict.fromkeys(methods, math.inf)
+    shortest = dict.fromkeys(runs, math.inf)
     for _ in range(repeats):
         for name, (scan, values, n) in runs.items():
             start = time.thread_time()

@@ -1,30 +1,18 @@
-"""Work that may be stopped and goes on where it was: what is finished is kept by its content.
-
-The name of a result is a hash of all that it follows from, this source text included, so that a
-result is never taken for that of other input or of another version. The files may be deleted at
-any time.
-"""
+"""Work that is spread over processes, or over machines whose source text is the same."""
 
 import hashlib
-import json
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from models.files import write_atomically
-from models.schema import read_json
-
-# Work spread over processes, in order; one worker stays in this process.
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 
@@ -107,100 +95,3 @@ def source_digest() -> str:
             digest.update(f"\0{path.relative_to(ROOT)}\0".encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def content_digest(*parts: object) -> str:
-    """Return a hash of values, and of the source text.
-
-    Parameters
-    ----------
-    parts : arrays, and what `repr` tells completely, such as numbers and records of them.
-    """
-    digest = hashlib.sha256(source_digest().encode())
-    for part in parts:
-        if isinstance(part, np.ndarray):
-            digest.update(f"\0{part.dtype}{part.shape}\0".encode())
-            digest.update(np.ascontiguousarray(part).tobytes())
-        else:
-            digest.update(f"\0{part!r}\0".encode())
-    return digest.hexdigest()[:32]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Store:
-    """A folder of results.
-
-    Parameters
-    ----------
-    folder : where they are; made where it is missing.
-    from_json : the result that `to_json` describes; KeyError, TypeError or ValueError where it is
-        none, which is then found anew.
-    """
-
-    folder: Path
-    name: Callable[[Any], str]
-    to_json: Callable[[Any], Any]
-    from_json: Callable[[Any], Any]
-
-    def read(self, item: Any) -> Any:
-        """Return a result that was kept, or None."""
-        try:
-            return self.from_json(read_json(self._path(item), ValueError))
-        except (OSError, KeyError, TypeError, ValueError):
-            return None
-
-    def write(self, item: Any, result: Any) -> None:
-        """Keep a result, whole or not at all.
-
-        Raises
-        ------
-        OSError
-            Where the folder cannot be written.
-        """
-        self.folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(self._path(item), json.dumps(self.to_json(result)) + "\n")
-
-    def _path(self, item: Any) -> Path:
-        return self.folder / f"{self.name(item)}.json"
-
-
-@dataclass(frozen=True, slots=True)
-class _Numbered:
-    """Work that tells which item it was, so that results may come in any order."""
-
-    work: Callable[[Any], Any]
-
-    def __call__(self, numbered: tuple[int, Any]) -> tuple[int, Any]:
-        number, item = numbered
-        return number, self.work(item)
-
-
-def run_resumably(
-    work: Callable[[Any], Any],
-    items: Sequence[Any],
-    spread_map: Map,
-    *,
-    store: Store | None = None,
-    done: Callable[[int, int], None] | None = None,
-) -> list[Any]:
-    """Return the result of every item, in order; those that were kept are not worked out again.
-
-    Parameters
-    ----------
-    work : from item to result, never None; picklable where other processes do it.
-    spread_map : does the work; its results may come in any order.
-    store : where results are kept as soon as they come; None keeps none.
-    done : told after every item how many were found by an earlier run and how many are ready.
-    """
-    results = [None if store is None else store.read(item) for item in items]
-    missing = [(i, item) for i, item in enumerate(items) if results[i] is None]
-    earlier = ready = len(items) - len(missing)
-    if done and earlier:
-        done(earlier, ready)
-    for number, result in spread_map(_Numbered(work), missing):
-        results[number], ready = result, ready + 1
-        if store is not None:
-            store.write(items[number], result)
-        if done:
-            done(earlier, ready)
-    return results

@@ -6,24 +6,27 @@ from typing import Any
 
 from identifier.doctor.faults import Examination, examine, prepared
 from identifier.doctor.finding import Finding
+from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import (
     NEAR,
     Screened,
     before_sizes,
+    clock_findings,
     combined,
     doubted,
     screen,
     steering_finding,
 )
 from models.recordings import Recording, RecordingError
-from models.recordings.checks import physics_contradiction, vehicle_contradiction
+from models.recordings.checks import physics_contradiction, vehicle_contradiction, world_axes
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-ROUNDS, SETTLED = 4, 0.02  # to which the ratio of a steering wheel is settled
+ROUNDS, SETTLED = 2, 0.02  # to which the ratio of a steering wheel is settled
 WIDE = 1.0  # of that ratio, by which the screen may be off
 ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
+SURELY = 0.9  # confidence that a law is broken
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
@@ -99,9 +102,13 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     recording : as it was read; its axle forces are not looked at.
     vehicle : as it was told.
     """
+    world = world_axes(recording)
+    if world is not None:  # nothing that follows would be of this car
+        finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
+        return Diagnosis(name=recording.name, findings=(finding,), unseen=NEVER)
     if recording.logged_v_y is None:
-        contradicts = tuple(_contradictions(recording, vehicle))
-        return Diagnosis(name=recording.name, findings=contradicts, unseen=(WITHOUT_V_Y, *NEVER))
+        told = (*_contradictions(recording, vehicle), *_samples(recording))
+        return Diagnosis(name=recording.name, findings=told, unseen=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
     found, fine = list(gross.findings), Examination()
@@ -148,7 +155,12 @@ def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     """
     blind = replace(recording, axle_force=None)
     said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
-    return [] if said is None else [Finding(code="contradiction", confidence=0.9, text=said)]
+    return [] if said is None else [Finding(code="contradiction", confidence=SURELY, text=said)]
+
+
+def _samples(recording: Recording) -> list[Finding]:
+    """Return what is wrong with the samples of a log without a v_y."""
+    return list(clock_findings(recording)) or sample_findings(recording)
 
 
 def _told_once(findings: list[Finding]) -> list[Finding]:

@@ -2,18 +2,14 @@
 
 Each suspect is believed wide, one at a time, beside the nominal estimate (`estimate.solve`): it
 gains ΔJ, the misfit of the balance at its scale and memory, the prior's cost, and where there is
-an accelerometer the misfit of
-
-K - g sin β = a_y(t + τ)/c - b - x ṙ,   K = v̇_y + v_x r of the motion without its faults,
-
-a line over [1, a_y, a_y', ṙ] with the noise of K on its other side. The best is taken in as long as
-it gains enough, and the rest is asked beside it. What the nominal estimate has as a state (offsets,
-angle, place) is taken where its size stands out. One Gauss-Newton step of all parameters together
-ranks the suspects; only the best of them are fitted.
+an accelerometer its misfit (`accelerometer`). The best is taken in as long as it gains enough, and
+the rest is asked beside it. What the nominal estimate has as a state (offsets, angle, place) is
+taken where its size stands out. One Gauss-Newton step of all parameters together ranks the
+suspects; only the best of them are fitted.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -21,87 +17,67 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import NOTES, SUSPECTS, TURNING, Suspect
-from identifier.estimate.drive import SMOOTHED, Drive, box, gradient
+from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
-from identifier.estimate.solve import (
-    DELAYS,
-    Problem,
-    Residuals,
-    around_beliefs,
-    descend,
-    normal,
-    starts,
-)
-from identifier.motion.model import SENSORS, true_signals
+from identifier.estimate.solve import Problem, around_beliefs, descend, normal, starts
+from identifier.motion.model import SENSORS
 from identifier.motion.parameters import INDEX
 from models.recordings import Recording
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 Widths = Mapping[str, float]  # standard deviation of what is believed wide, by suspect's parameter
 BESIDE = {"ln_inertia": 0.1}  # believed of any car: what is told of it is an estimate
-OF_A_Y = ("a_y.offset", "a_y.factor", "a_y.delay", "a_y.place", "a_y.lag")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """Limits of the search, chosen on random cars of the plant.
+    """Limits of the search, chosen on random cars of the plant."""
 
-    interval : of samples that are looked at [s], of a sedan.
-    longest, pieces : s that are looked at of a log, and from how many parts of a longer one.
-    logs, log : most logs that are looked at as long, and what a stretch must last to be one [s].
-    shortest : s that must be driven.
-    margin : s at both ends of a stretch that do not count, as a delay may need them.
-    gain : of J that a fault must bring [nats].
-    state : the same over the value zero, of what the nominal estimate has as a state.
-    telling : deviations, with the least size in them, that a size must have.
-    against : nats by which the accelerometer may speak against a fault.
-    alike : gain within which two cannot be told apart.
-    fitted, most : suspects that are fitted in a round, and faults that are taken in.
-    steps, enough : of Gauss-Newton for each, and the gain of a step that ends it.
-    kept : deviations by which what was taken in may still move.
-    temper : odds of e per this gain.
-    sure, ahead, clear : gain of a sure fault, what it has over its rival, deviations of its size.
-    better : share by which the repaired model must miss less of the force of a part left out.
-    unexplained : share of the force missed with all found, from which nothing was understood.
-    untold : of `wide`, what is left by a drive that does not tell a size.
-    """
-
-    interval: float = 0.02
-    longest: float = 60.0
-    pieces: int = 4
-    logs: int = 3
-    log: float = 10.0
-    shortest: float = 5.0
-    margin: float = 0.4
-    gain: float = 12.0
-    state: float = 8.0
-    telling: float = 2.5
-    against: float = 4.0
-    alike: float = 4.0
-    fitted: int = 4
-    most: int = 3
-    steps: int = 8
-    enough: float = 0.3
-    kept: float = 3.0
-    temper: float = 2.0
-    sure: float = 20.0
-    ahead: float = 6.0
-    clear: float = 3.5
-    better: float = 0.03
-    unexplained: float = 0.4
-    untold: float = 0.6
+    interval: float = 0.02  # [s] between samples, of a sedan
+    longest: float = 60.0  # [s] that are looked at of a log,
+    pieces: int = 4  # and from how many parts of a longer one
+    logs: int = 3  # that are looked at as long, of several,
+    log: float = 10.0  # and what a stretch must last to be one [s]
+    shortest: float = 5.0  # [s] that must be driven
+    margin: float = 0.4  # [s] at both ends of a stretch that do not count: a delay may need them
+    gain: float = 12.0  # [nats] that a fault must bring
+    promise: float = 0.4  # of it, that one Gauss-Newton step must promise of what is fitted
+    fitted: int = 4  # suspects in a round
+    most: int = 3  # faults that are taken in
+    steps: int = 8  # of Gauss-Newton for each
+    enough: float = 0.3  # [nats] that a step must gain
+    telling: float = 2.5  # deviations, with the least size in them, that a size must have
+    against: float = 4.0  # [nats] by which the accelerometer may speak against a fault
+    alike: float = 4.0  # [nats] within which two cannot be told apart
+    kept: float = 1.0  # deviations by which what was taken in may still move
+    temper: float = 2.0  # [nats] for odds of e
+    sure: float = 20.0  # [nats] of a sure fault,
+    ahead: float = 6.0  # what it has over its rival,
+    clear: float = 3.5  # deviations of its size,
+    better: float = 0.03  # and share by which its model misses less of a part left out
+    unexplained: float = 0.25  # share of the force missed, from which nothing was understood
+    untold: float = 0.6  # of `wide`, what is left by a drive that does not tell a size
 
 
 RULES = Rules()
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
+SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
-    "sizes of faults: no tire explains the front axle, whichever of them is taken out: a steering "
-    "angle that was commanded and not measured, play, or several faults at once",
-    "sizes of faults: no tire explains the rear axle, whichever of them is taken out",
+    (
+        "delta_f",
+        "no tire explains the front axle, whichever fault is taken out: a steering angle that "
+        "was commanded and not measured, play, or several faults at once",
+    ),
+    (
+        "",
+        "no tire explains the rear axle, whichever fault is taken out: several faults at once, or "
+        "another car",
+    ),
 )
 
 
@@ -111,125 +87,6 @@ class Examination(NamedTuple):
     findings: tuple[Finding, ...] = ()
     unseen: tuple[str, ...] = ()
     taken: frozenset[tuple[str, str]] = frozenset()
-
-
-class Line(NamedTuple):
-    """What an accelerometer says of a motion: J [nats], its numbers as `OF_A_Y`, deviations."""
-
-    cost: float
-    numbers: Array
-    deviations: Array
-
-
-class Accelerometer:
-    """a_y over the motion of drives."""
-
-    FILTERED, STRIDE = 0.25, 0.1  # [s] of means, and between them
-    ERROR, RELATIVE = 0.02, 0.03  # of g, and of the acceleration
-    LEAST = 0.3  # of the scale of what is missed
-
-    def __init__(
-        self, stretches: Sequence[Recording], drives: Sequence[Drive], vehicle: Vehicle
-    ) -> None:
-        self.drives, L = drives, vehicle.wheelbase
-        roll = 0.008 * float(np.sqrt(L / SEDAN))  # s, by which weight follows it
-        self.mean = np.array([0.0, 0.97, 0.0, 0.0, 0.0])  # a body rolls by 0 to 6 degrees per g
-        self.usual = np.array([0.04, 0.03, roll, 0.012 * L, 1e-6])
-        self.memory = 0.0
-        self.size: Array | None = None
-        width = float(np.sqrt(L / SEDAN)) * SMOOTHED
-        self.shown = [
-            box(_averaged(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
-            for one, drive in zip(stretches, drives, strict=True)
-        ]
-
-    def line(self, p: Array, wide: Widths) -> Line:
-        """Return how well a_y follows from the motion without the sensors' faults p.
-
-        Parameters
-        ----------
-        wide : standard deviations, by `OF_A_Y`, of what may be wrong with it.
-        """
-        sd = np.array([wide.get(name, one) for name, one in zip(OF_A_Y, self.usual, strict=True)])
-        late = 0.0
-        for _ in range(4 if "a_y.delay" in wide else 1):
-            found, moved = self._line(p, sd, late)
-            late += moved
-        numbers = found.numbers.copy()
-        numbers[2] = late
-        return found._replace(numbers=numbers)
-
-    def _line(self, p: Array, sd: Array, late: float) -> tuple[Line, float]:
-        """Return the line where a_y is read later, and by how much more it is late."""
-        y, X, seconds = [], [], 0.0
-        for one, shown in zip(self.drives, self.shown, strict=True):
-            v_x, v_y, r = _motion(one, p)
-            count = self.FILTERED / one.dt
-            K = box(gradient(box(v_y, count / 3), one.dt) + v_x * r, count)
-            at = np.arange(shown.size)
-            felt = box(np.interp(at + late / one.dt, at, shown), count)
-            slope = gradient(felt, one.dt)
-            turning = gradient(box(r, count), one.dt)
-            columns = [-np.ones(K.size), felt, slope, -turning, slope]
-            every = max(1, round(self.STRIDE / one.dt))
-            kept = np.flatnonzero(one.counts[::every]) * every
-            y.append((K - GRAVITY * p[INDEX["bank"]])[kept])
-            X.append(np.column_stack(columns)[kept])
-            seconds += kept.size * every * one.dt
-        moved, rows = np.concatenate(y), np.concatenate(X)
-        if self.size is None:  # of the motion as logged: to shrink it gains nothing
-            self.size = GRAVITY * np.hypot(self.ERROR, self.RELATIVE * rows[:, 1] / GRAVITY)
-        size = self.size
-        moved, rows = moved / size, rows / size[:, None]
-        mean = self.mean.copy()
-        mean[2] = -late
-        S2, w, theta = 1.0, np.ones(moved.size), mean
-        for _ in range(5):
-            n = seconds / max(self.memory, self.STRIDE) / moved.size  # of each residual
-            H = n / S2 * (rows.T * w) @ rows + np.diag(sd**-2.0)
-            g = n / S2 * (rows.T * w) @ (moved - rows @ mean)
-            theta = mean + np.linalg.solve(H, g)
-            e = moved - rows @ theta
-            w = 5.0 / (4.0 + e**2 / S2)  # Student, 4 degrees
-            S2 = max(float(np.mean(w * e**2)), self.LEAST**2)
-        if not self.memory:
-            self.memory = _memory(np.clip(e, -4.0, 4.0), self.STRIDE)
-            n = seconds / self.memory / moved.size
-        away = (theta - mean) / sd
-        loss = 2.5 * np.log1p(e**2 / (4.0 * S2)).sum() + 0.5 * moved.size * math.log(S2)
-        cost = float(n * loss + 0.5 * away @ away)
-        return Line(cost, theta, np.sqrt(np.diag(np.linalg.inv(H)))), float(theta[2])
-
-
-def _value(one: Suspect, line: Line) -> float:
-    """Return what an accelerometer has of a suspect."""
-    value = float(line.numbers[OF_A_Y.index(one.parameter)])
-    return 1.0 / value - 1.0 if one.code == "factor" else value
-
-
-def _motion(one: Drive, p: Array) -> tuple[Array, Array, Array]:
-    """Return v_x, v_y and r without the sensors' faults, (n,) each."""
-    late, q = p[DELAYS], p.copy()
-    q[DELAYS] = 0.0
-    read = one.on_time(late) if late.any() else one
-    signals = [*read.signals[:, :4].T, *read.rates.T]
-    v_x, v_y, r, _ = true_signals(signals, [q[INDEX[name]] for name in SENSORS])
-    return v_x, v_y, r
-
-
-def _averaged(signal: Array, every: int) -> Array:
-    n = len(signal) // every * every
-    mean: Array = signal[:n].reshape(-1, every).mean(axis=1)
-    return mean
-
-
-def _memory(e: Array, step: float) -> float:
-    """Return the integrated autocorrelation time [s] of residuals."""
-    spectrum = np.fft.rfft(e, 1 << (2 * e.size - 1).bit_length())
-    rho = np.fft.irfft(np.abs(spectrum) ** 2)[: max(e.size // 3, 2)]
-    rho = rho / max(rho[0], 1e-12)
-    until = int(np.argmax(rho < 0.05)) or rho.size
-    return max(step * (1.0 + 2.0 * float(rho[1:until].sum())), 0.25)
 
 
 class Candidate(NamedTuple):
@@ -247,37 +104,10 @@ class Candidate(NamedTuple):
     felt: float
     post: Posterior | None
 
-
-def descended(cost: Callable[[float], float], width: float) -> tuple[float, float, float]:
-    """Return where a function of one number is least, its curvature there, and its value.
-
-    Parameters
-    ----------
-    width : of the parabola that bounds it from below; it begins at 0.
-    """
-    x, h, here = 0.0, 0.1 * width, cost(0.0)
-    curvature = width**-2
-    for _ in range(4):
-        up, down = cost(x + h), cost(x - h)
-        curvature = max((up + down - 2.0 * here) / h**2, width**-2)
-        step = min(max((down - up) / (2.0 * h * curvature), -3.0 * width), 3.0 * width)
-        for _ in range(3):
-            there = cost(x + step)
-            if there <= here:
-                break
-            step /= 3.0
-        else:
-            break
-        x, gained, here = x + step, here - there, there
-        h = min(h, max(0.5 * abs(step), 0.5 / math.sqrt(curvature)))
-        if gained < 0.1:
-            break
-    return x, curvature, here
-
-
-def twins(one: Suspect, other: Suspect) -> bool:
-    """Return whether both say that a channel is late, by a delay and by a low pass."""
-    return one.channel == other.channel and {one.code, other.code} == {"delay", "lag"}
+    def is_late_as(self, other: "Candidate") -> bool:
+        """Return whether both say that a channel is late, by a delay and by a low pass."""
+        one, two = self.suspect, other.suspect
+        return one.channel == two.channel and {one.code, two.code} == {"delay", "lag"}
 
 
 class Taken(NamedTuple):
@@ -296,6 +126,7 @@ class Search:
     ----------
     problem : of them, with slopes over all parameters.
     accelerometer : None where there is none.
+    wide, mean : standard deviations and means of what was taken in, by parameter.
     """
 
     problem: Problem
@@ -315,7 +146,7 @@ class Search:
         Without the tails of a typed number, which would be a suspect that is wide from the first.
         """
         apart = "v_y_bias" in wide or "v_y_angle" in wide
-        of_model = BESIDE | {name: sd for name, sd in wide.items() if not name.startswith("a_y.")}
+        of_model = BESIDE | {name: sd for name, sd in wide.items() if name not in OF_A_Y}
         if "downforce_f" in wide:
             of_model["downforce_r"] = wide["downforce_f"]
         priors = Priors.of(self.vehicle, wide=of_model, apart=apart)
@@ -330,6 +161,10 @@ class Search:
         found = [descend(problem, start, enough=RULES.enough) for start in starts(problem)]
         return min(found, key=lambda one: one.cost)
 
+    def least(self, one: Suspect) -> float:
+        """Return the least size of a suspect that matters, of its parameter."""
+        return one.scaled(one.least, self.vehicle)
+
     def widened(self, one: Suspect) -> dict[str, float]:
         """Return what is believed wide with one more."""
         return {**self.wide, one.parameter: one.scaled(one.wide, self.vehicle)}
@@ -338,87 +173,86 @@ class Search:
         """Return what the accelerometer says, None where there is none."""
         return None if self.accelerometer is None else self.accelerometer.line(p, wide)
 
-    def promised(self, base: Posterior, at: Residuals) -> dict[str, tuple[float, float]]:
-        """Return the gain of each suspect of the balance, if all were straight lines.
-
-        Beside it where to begin: the value that the accelerometer asks for, as far as it does.
-
-        Parameters
-        ----------
-        at : of all parameters, at the base.
-        """
-        H, g = normal(self.problem, at, base.scale**2, base.memory)
-        before = self.priors(self.wide).cost(base.p)
-        gains = {}
-        for one in self.left(of_model=True):
-            priors = self.priors(self.widened(one))
-            some = np.flatnonzero(priors.moves)
-            pull, P = around_beliefs(priors, base.p)
-            slope = g[some] + pull[some]
-            inside = (H + P)[np.ix_(some, some)]
-            change = priors.cost(base.p) - 0.5 * float(slope @ np.linalg.solve(inside, slope))
-            gains[one.parameter] = before - change, 0.0
-        line = self.line(base.p, self.wide)
-        for one in self.left(of_model=True) if line is not None else []:
-            if one.parameter not in (*SENSORS, "bank") or one.code == "lag":
-                continue
-            k, width = INDEX[one.parameter], one.scaled(one.wide, self.vehicle)
-            size = np.zeros(base.p.size)
-            size[k] = width
-
-            def cost(step: float, size: Array = size) -> float:
-                moved = self.line(base.p + step * size, self.wide)
-                assert moved is not None
-                return 0.5 * step**2 + moved.cost
-
-            step, _, least = descended(cost, 1.0)
-            gain, value = cost(0.0) - least, width * step
-            gains[one.parameter] = (
-                gains[one.parameter][0] + gain,
-                value if gain > 0.3 * RULES.gain else 0.0,
-            )
-        return gains
-
     def left(self, *, of_model: bool) -> list[Suspect]:
         """Return the suspects that were not taken in, of the balance or of the accelerometer."""
         return [
             one
             for one in SUSPECTS
             if one.parameter not in self.wide
-            and one.parameter.startswith("a_y.") != of_model
+            and (one.parameter not in OF_A_Y) == of_model
             and (of_model or self.accelerometer is not None)
         ]
+
+    def steps(self, base: Posterior) -> Iterator[tuple[Suspect, float, float, float]]:
+        """Yield each suspect of the balance, and one Gauss-Newton step of all with it wide.
+
+        That is the gain that it promises, its value, and its deviation.
+        """
+        every = self.problem.under(_all_move(self.problem.priors)).residuals(base.p)
+        H, g = normal(self.problem, every, base.scale**2, base.memory)
+        before = self.priors(self.wide).cost(base.p)
+        for one in self.left(of_model=True):
+            priors = self.priors(self.widened(one))
+            some = np.flatnonzero(priors.moves)
+            pull, P = around_beliefs(priors, base.p)
+            slope, k = g[some] + pull[some], int(np.searchsorted(some, INDEX[one.parameter]))
+            covariance = np.linalg.inv((H + P)[np.ix_(some, some)])
+            step = -covariance @ slope
+            gain = before - priors.cost(base.p) - 0.5 * float(slope @ step)
+            value = base[one.parameter] + float(step[k])
+            yield one, gain, value, math.sqrt(covariance[k, k])
+
+    def promised(self, base: Posterior) -> list[tuple[float, Suspect, float]]:
+        """Return what each suspect of the balance would bring, if all were straight lines.
+
+        Beside it where to begin: the value that the accelerometer asks for, as far as it does.
+        """
+        line, least, found = self.line(base.p, self.wide), RULES.promise * RULES.gain, []
+        for one, of_balance, value, sd in self.steps(base):
+            gain, begin = of_balance, 0.0
+            if line is not None and one.parameter in (*SENSORS, "bank") and one.code != "lag":
+                size = np.zeros(base.p.size)
+                size[INDEX[one.parameter]] = one.scaled(one.wide, self.vehicle)
+
+                def cost(step: float, size: Array = size) -> float:
+                    moved = self.line(base.p + step * size, self.wide)
+                    assert moved is not None
+                    return 0.5 * step**2 + moved.cost
+
+                step, _, there = descended(cost, 1.0)
+                more = cost(0.0) - there
+                gain, begin = gain + more, float(step * size.max()) if more > least else 0.0
+            if base.sd(one.parameter) > 0.0:  # it may promise no gain: the estimate has it
+                gain = max(gain, 0.5 * value**2 / (sd**2 + self.least(one) ** 2))
+            if gain > least and one.code != "lag":
+                found.append((gain, one, begin))
+        return sorted(found, key=lambda one: -one[0])
 
     def fitted(self, one: Suspect, base: Posterior, begin: float = 0.0) -> Candidate:
         """Return a suspect fitted beside what is there, beginning at a value away from it."""
         wide = self.widened(one)
         before = self.line(base.p, self.wide)
         if not one.parameters:
-            assert before is not None
             after = self.line(base.p, wide)
-            assert after is not None
-            k = OF_A_Y.index(one.parameter)
-            value = _value(one, after)
+            assert before is not None and after is not None
             gain = before.cost - after.cost
-            return Candidate(one, value, float(after.deviations[k]), gain, gain, gain, None)
+            return Candidate(one, *after.of(one.parameter), gain, gain, gain, None)
         problem = self.problem.under(self.priors(wide))
         start = base.p.copy()
         start[INDEX[one.parameter]] += begin
         post = descend(problem, start, base.memory, RULES.steps, RULES.enough)
-        gain = base.cost - post.cost - one.price
-        value, sd = post[one.parameter], post.sd(one.parameter)
-        felt = 0.0
-        if before is not None and one.code != "downforce":
-            post, sd, line, moved = self.both(post, one.parameter)
-            value, felt = post[one.parameter], before.cost - line
-            gain += felt - moved
+        gain = base.cost - post.cost
+        value, sd, felt = post[one.parameter], post.sd(one.parameter), 0.0
         if one.code == "downforce":
             shares = np.array(self.vehicle.axle_loads) / self.vehicle.weight
             value = float(shares @ [post[name] for name in one.parameters])
+        elif before is not None:
+            post, sd, line, moved = self.both(post, one.parameter)
+            value, felt = post[one.parameter], before.cost - line
+            gain += felt - moved
         shown = gain
         if base.sd(one.parameter) > 0.0:
-            least = one.scaled(one.least, self.vehicle)
-            shown = max(gain, 0.5 * value**2 / (sd**2 + least**2))
+            shown = max(gain, 0.5 * value**2 / (sd**2 + self.least(one) ** 2))
         return Candidate(one, value, sd, gain, shown, felt, post)
 
     def both(self, post: Posterior, name: str) -> tuple[Posterior, float, float, float]:
@@ -436,56 +270,50 @@ class Search:
             return 0.5 * (step / sd) ** 2 + line.cost
 
         step, curvature, best = descended(cost, sd)
-        moved = replace(post, p=post.p + step * along)
+        p = np.clip(post.p + step * along, self.problem.priors.low, self.problem.priors.high)
+        moved = replace(post, p=p)
         bent = 0.5 * (step / sd) ** 2
         return moved, 1.0 / math.sqrt(curvature), best - bent, bent
 
-    def candidates(self, base: Posterior, at: Residuals) -> list[Candidate]:
+    def candidates(self, base: Posterior) -> list[Candidate]:
         """Return the suspects that may be believed beside what is there, the best first."""
-        promised = self.promised(base, at)
         listed = [self.fitted(one, base) for one in self.left(of_model=False)]
-        standing, some = [], []
-        for one in self.left(of_model=True):
-            state, least = base.sd(one.parameter), one.scaled(one.least, self.vehicle)
-            stands = state > 0.0 and abs(base[one.parameter]) > 2.0 * math.hypot(state, least)
-            if stands:  # it promises no gain: the nominal estimate has it
-                standing.append(one)
-            elif one.code != "lag" and promised[one.parameter][0] > 0.3 * RULES.gain:
-                some.append(one)
-        some.sort(key=lambda one: -promised[one.parameter][0])
-        listed += [
-            self.fitted(one, base, promised[one.parameter][1])
-            for one in (*standing, *some[: RULES.fitted])
-        ]
+        some = self.promised(base)[: RULES.fitted]
+        listed += [self.fitted(one, base, begin) for _, one, begin in some]
         # A low pass is a delay but for its bend: it is asked where a delay is.
-        best = max(listed, key=lambda one: one.gain, default=None)
-        if best is not None and best.suspect.code == "delay" and best.gain > RULES.gain:
-            twin = next(
-                one for one in SUSPECTS if (one.code, one.channel) == ("lag", best.suspect.channel)
-            )
-            if twin.parameters and twin.parameter not in self.wide:
-                listed.append(self.fitted(twin, base, max(best.value, 0.0)))
+        enough = max(RULES.gain, 0.5 * max((one.gain for one in listed), default=0.0))
+        late = {
+            one.suspect.channel: max(one.value, 0.0)
+            for one in listed
+            if one.suspect.code == "delay" and one.gain > enough
+        }
+        listed += [
+            self.fitted(one, base, late[one.channel])
+            for one in self.left(of_model=True)
+            if one.code == "lag" and one.channel in late
+        ]
         return sorted(filter(self.believed, listed), key=lambda one: -one.gain)
 
     def believed(self, one: Candidate) -> bool:
         """Return whether a size stands out and is one that devices and cars have."""
-        least = one.suspect.scaled(one.suspect.least, self.vehicle)
-        telling = abs(one.value) > RULES.telling * math.hypot(one.deviation, least)
+        telling = abs(one.value) > RULES.telling * self.deviation(one)
         most = 3.5 * one.suspect.scaled(one.suspect.wide, self.vehicle)
         possible = one.suspect.possible(one.suspect.size(one.value), self.vehicle)
         return telling and possible and abs(one.value) < most and one.felt > -RULES.against
 
+    def deviation(self, one: Candidate) -> float:
+        """Return the deviation of a value, with the least that matters in it."""
+        return math.hypot(one.deviation, self.least(one.suspect))
+
     def run(self) -> Posterior:
         """Take in one fault after the other; return the estimate with all of them."""
         base = self.nominal()
-        every = self.problem.under(_all_move(self.problem.priors))
         while len(self.found) < RULES.most:
-            at = every.residuals(base.p)
-            listed = self.candidates(base, at)
-            chosen = [one for one in listed if one.gain > RULES.gain][:1]
-            if not chosen:
-                states = [one for one in listed if one.shown > max(one.gain, RULES.state)]
-                chosen = sorted(states, key=lambda one: -one.shown)[:1]
+            listed = self.candidates(base)
+            # What gains before what the estimate has anyhow, as a state that stands out.
+            chosen = [one for one in listed if one.gain > RULES.gain] or sorted(
+                (one for one in listed if one.shown > RULES.gain), key=lambda one: -one.shown
+            )
             if not chosen:
                 break
             best = chosen[0]
@@ -495,9 +323,9 @@ class Search:
                 for one in others
                 if self.in_place_of(best, one, base)
                 and one.gain > 0.5 * best.gain
-                and (one.gain > best.gain - RULES.alike or twins(one.suspect, best.suspect))
+                and (one.gain > best.gain - RULES.alike or one.is_late_as(best))
             )
-            rival = next((one for one in others if not twins(one.suspect, best.suspect)), None)
+            rival = next((one for one in others if not one.is_late_as(best)), None)
             firm = all(one.sure for one in self.found)  # what is asked beside a doubt is in doubt
             sure = firm and self.stands(best, rival, base)
             self.wide = self.widened(best.suspect)
@@ -524,10 +352,9 @@ class Search:
         """
         suspect, wide = best.suspect, self.widened(best.suspect)
         lead = best.shown - (rival.gain if rival is not None else 0.0)
-        deviation = math.hypot(best.deviation, suspect.scaled(suspect.least, self.vehicle))
-        clear = abs(best.value) > RULES.clear * deviation and suspect.code not in NOTES
-        # Factors of v_x and r change what the accelerometer must show: it has to agree.
-        agreed = best.felt > (RULES.ahead if suspect.price else -1.0)
+        clear = abs(best.value) > RULES.clear * self.deviation(best) and suspect.code not in NOTES
+        # A factor of v_x changes what the accelerometer must show: it has to agree.
+        agreed = best.felt > (RULES.ahead if suspect.parameter == "v_x_factor" else -1.0)
         if best.shown < RULES.sure or lead < RULES.ahead or not (clear and agreed):
             return False
         if best.post is None:  # of the accelerometer: it changes no tire
@@ -567,8 +394,7 @@ class Search:
         pull, P = pull[problem.index], P[np.ix_(problem.index, problem.index)]
         shares = np.empty(2)
         for k, (learnt, asked) in enumerate(((parts[1], parts[0]), (parts[0], parts[1]))):
-            half = problem.weighted(learnt)
-            H, g = normal(half, at, post.scale**2, post.memory)
+            H, g = normal(problem.weighted(learnt), at, post.scale**2, post.memory)
             H, g = H + P, g + pull
             step = np.zeros(problem.index.size)
             free = np.ones(step.size, dtype=bool)
@@ -580,6 +406,70 @@ class Search:
             e = (at.e + at.slopes @ step) * problem.size[:, None]
             shares[k] = math.sqrt(float((asked @ e**2).mean() / (asked @ problem.force**2)))
         return shares
+
+    def findings(self, post: Posterior) -> Iterator[Finding]:
+        """Yield what was found: what explains most first, followed by what may be it instead."""
+        names: set[str] = set()
+        line = self.line(post.p, self.wide)
+        for first, alike, sure in self.found:
+            name = first.suspect.parameter
+            if name in OF_A_Y:
+                assert line is not None
+                value, sd = line.of(name)
+            elif first.suspect.code == "downforce":
+                value, sd = first.value, first.deviation
+            else:
+                value, sd = post[name], post.sd(name)
+            best = first._replace(value=value, deviation=sd)
+            left = [x for x in alike if x.suspect.parameter not in {*self.wide, *names}]
+            brought = np.array([RULES.gain / 2.0, first.shown, *(one.gain for one in left)])
+            shares = np.exp((brought - first.shown) / RULES.temper)
+            shares /= shares.sum()
+            sure = sure and all(one.is_late_as(first) for one in left)
+            for one, share in zip((best, *left), shares[1:], strict=True):
+                names.add(one.suspect.parameter)
+                others = left if one is best else [first]
+                likely = float(share), float(1.0 - shares[0])
+                yield self.finding(one, likely, others, sure=sure and one is best)
+
+    def finding(
+        self, one: Candidate, likely: tuple[float, float], alike: Sequence[Candidate], *, sure: bool
+    ) -> Finding:
+        """Return a candidate as a finding.
+
+        Parameters
+        ----------
+        likely : that it is this, and that it is this or one of those that are alike.
+        """
+        suspect, vehicle, deviation = one.suspect, self.vehicle, self.deviation(one)
+        size = suspect.size(one.value)
+        text = suspect.words(size, deviation, vehicle)
+        if alike:
+            text += f"; this drive cannot tell it from: {', '.join(x.suspect.name for x in alike)}"
+        repair = suspect.repair(size, vehicle)
+        real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
+        return Finding(
+            code=suspect.code,
+            channel=suspect.channel,
+            size=size,
+            deviation=deviation,
+            unit=suspect.unit,
+            confidence=real * likely[0],
+            group=real * likely[1],
+            text=text,
+            repair=repair,
+            sure=sure and repair is not None,
+            note=suspect.code in NOTES,
+        )
+
+    def unseen(self, post: Posterior) -> Iterator[str]:
+        """Yield what this drive tells next to nothing of, beside what was found."""
+        for one, _, _, left in self.steps(post):
+            if left > RULES.untold * one.scaled(one.wide, self.vehicle):
+                least = f"{left * one.per_unit:.2g}{one.shown}"
+                if one.code in ("factor", "yaw_inertia"):
+                    least = f"a factor of {1.0 + left:.2g}"
+                yield f"{one.name}: {least} would not be seen on this drive"
 
 
 def _all_move(priors: Priors) -> Priors:
@@ -602,8 +492,14 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
     worst = search.problem.share_missed(post.p)
     if worst.max() > RULES.unexplained:
-        return Examination(unseen=(UNEXPLAINED[int(np.argmax(worst))],), taken=taken)
-    return Examination(findings(search, post), unseen(search, post), taken)
+        channel, text = UNEXPLAINED[int(np.argmax(worst))]
+        share = f"{100.0 * worst.max():.0f} % of its force is missed (usual: below 12 %)"
+        one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")
+        return Examination((one,), (SIZES_BLIND,), taken)
+    found = list(search.findings(post))
+    if search.accelerometer is not None:
+        found = _of_one_device(found, vehicle)
+    return Examination(tuple(found), tuple(search.unseen(post)), taken)
 
 
 def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
@@ -613,21 +509,16 @@ def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
     stretches = stretches_of(
         recording, vehicle, longest=logs * RULES.longest, pieces=logs * RULES.pieces
     )
-    has_a_y = recording.a_y is not None
     fastest = min(RULES.interval, RULES.interval * math.sqrt(vehicle.wheelbase / SEDAN) + 0.004)
-
-    def read(some: Sequence[Recording]) -> list[Drive]:
-        return [_inside(Drive.of(one, vehicle, fastest=fastest)) for one in some]
-
-    bare = [replace(one, a_y=None) for one in stretches] if has_a_y else stretches
-    drives = read(bare)
+    bare = [replace(one, a_y=None) for one in stretches]
+    drives = [_inside(Drive.of(one, vehicle, fastest=fastest)) for one in bare]
     if sum(np.count_nonzero(one.counts) * one.dt for one in drives) < RULES.shortest:
         return None
-    accelerometer = None
-    if has_a_y:
+    priors, accelerometer = Priors.of(vehicle), None
+    if recording.a_y is not None:
         accelerometer = Accelerometer(stretches, drives, vehicle)
-        accelerometer.line(Priors.of(vehicle).mean, dict.fromkeys(OF_A_Y[:4], 1.0))
-    problem = Problem(drives, vehicle, Priors.of(vehicle), every=True)
+        accelerometer.line(priors.mean, dict.fromkeys(OF_A_Y[:4], 1.0))
+    problem = Problem(drives, vehicle, priors, every=True)
     return Search(problem=problem, accelerometer=accelerometer)
 
 
@@ -637,76 +528,6 @@ def _inside(drive: Drive) -> Drive:
     counts: NDArray[np.bool_] = drive.counts.copy()
     counts[:n], counts[counts.size - n :] = False, False
     return replace(drive, counts=counts)
-
-
-def findings(search: Search, post: Posterior) -> tuple[Finding, ...]:
-    """Return what was found: what explains most first, followed by what may be it instead."""
-    listed: list[Finding] = []
-    names: set[str] = set()
-    line = search.line(post.p, search.wide)
-    for one in search.found:
-        first = one.first
-        if first.suspect.parameters:
-            value, sd = post[first.suspect.parameter], post.sd(first.suspect.parameter)
-            if first.suspect.code == "downforce":
-                value, sd = first.value, first.deviation
-        else:
-            assert line is not None
-            k = OF_A_Y.index(first.suspect.parameter)
-            value = _value(first.suspect, line)
-            sd = float(line.deviations[k])
-        alike = [other for other in one.alike if other.suspect.parameter not in search.wide]
-        alike = [other for other in alike if other.suspect.parameter not in names]
-        shares = np.exp(
-            (np.array([RULES.gain / 2.0, first.shown, *(x.gain for x in alike)]) - first.shown)
-            / RULES.temper
-        )
-        shares /= shares.sum()
-        group = float(1.0 - shares[0])
-        sure = one.sure and all(twins(x.suspect, first.suspect) for x in alike)
-        best = first._replace(value=value, deviation=sd)
-        for which, share, others in (
-            (best, shares[1], alike),
-            *((x, s, [first]) for x, s in zip(alike, shares[2:], strict=True)),
-        ):
-            names.add(which.suspect.parameter)
-            listed.append(
-                _finding(search, which, (float(share), group), others, sure and which is best)
-            )
-    if search.accelerometer is None:
-        return tuple(listed)
-    return tuple(_of_one_device(listed, search.vehicle))
-
-
-def _finding(
-    search: Search,
-    one: Candidate,
-    told: tuple[float, float],
-    alike: Sequence[Candidate],
-    sure: bool,
-) -> Finding:
-    suspect, vehicle = one.suspect, search.vehicle
-    size = suspect.size(one.value)
-    deviation = math.hypot(one.deviation, suspect.scaled(suspect.least, vehicle))
-    text = suspect.words(size, deviation, vehicle)
-    if alike:
-        names = (f"{x.suspect.code} {x.suspect.channel}".strip() for x in alike)
-        text += f"; this drive cannot tell it from: {', '.join(names)}"
-    repair = suspect.repair(size, vehicle)
-    real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
-    return Finding(
-        code=suspect.code,
-        channel=suspect.channel,
-        size=size,
-        deviation=deviation,
-        unit=suspect.unit,
-        confidence=real * told[0],
-        group=real * told[1],
-        text=text,
-        repair=repair,
-        sure=sure and repair is not None,
-        note=suspect.code in NOTES,
-    )
 
 
 def _of_one_device(listed: list[Finding], vehicle: Vehicle) -> list[Finding]:
@@ -729,24 +550,3 @@ def _of_one_device(listed: list[Finding], vehicle: Vehicle) -> list[Finding]:
         )  # fmt: skip
         return [both if x is one else x for x in listed if x is not other]
     return listed
-
-
-def unseen(search: Search, post: Posterior) -> tuple[str, ...]:
-    """Return what this drive tells next to nothing of, beside what was found, a line each."""
-    every = search.problem.under(_all_move(search.problem.priors))
-    H, _ = normal(search.problem, every.residuals(post.p), post.scale**2, post.memory)
-    lines = []
-    for one in search.left(of_model=True):
-        priors = search.priors(search.widened(one))
-        some = np.flatnonzero(priors.moves)
-        P = around_beliefs(priors, post.p)[1]
-        covariance = np.linalg.inv((H + P)[np.ix_(some, some)])
-        k = int(np.flatnonzero(some == INDEX[one.parameter])[0])
-        left, wide = math.sqrt(covariance[k, k]), one.scaled(one.wide, search.vehicle)
-        if left > RULES.untold * wide:
-            name = f"{one.code.replace('_', ' ')} {one.channel}".strip()
-            least = f"{left * one.per_unit:.2g}{one.shown}"
-            if one.code in ("factor", "yaw_inertia"):
-                least = f"a factor of {1.0 + left:.2g}"
-            lines.append(f"{name}: {least} would not be seen on this drive")
-    return tuple(lines)

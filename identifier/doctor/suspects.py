@@ -48,7 +48,6 @@ class Suspect(NamedTuple):
     parameter, of a sedan.   least : what nobody need mend, and what no model of this size tells
     from a tire.   grows : both with the size of a car.   text : with {size} in `shown`, {origin}
     of a number of the car.   shown : unit of the text.   per_unit : of the text per SI unit.
-    price : gain that it must bring beside that of every suspect, where tires easily do the same.
     """
 
     parameter: str
@@ -61,7 +60,11 @@ class Suspect(NamedTuple):
     text: str
     shown: str = ""
     per_unit: float = 1.0
-    price: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Its code and channel, in words."""
+        return f"{self.code.replace('_', ' ')} {self.channel}".strip()
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -124,22 +127,24 @@ class Suspect(NamedTuple):
     def words(self, size: float, deviation: float, vehicle: Vehicle) -> str:
         """Return it in words."""
         text = self.text
+        if self.code == "center_of_gravity":
+            swapped = abs(vehicle.l_f - vehicle.l_r - size) < 1.5 * abs(deviation)
+            text += ", as if they were swapped" * swapped
         if size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
             size, text = -size, text.replace(said, OPPOSITES[said])
         shown = f"{with_doubt(size * self.per_unit, abs(deviation) * self.per_unit)}{self.shown}"
         return text.format(size=shown, origin=vehicle.origin(self.code))
 
 
-WORDS = {  # of a channel, the parameter of its factor, and its price
-    "v_x": ("v_x", "v_x_factor", 3.0),
-    "v_y": (
-        "v_y",
+WORDS = {  # of a channel, and the parameter of its factor
+    "v_x": ("v_x", "v_x_factor"),
+    "v_y": ("v_y", ""),  # to shrink it shrinks its noise, which looks like a better model
+    "r": (
+        "the yaw rate",
         "",
-        0.0,
-    ),  # to shrink it makes its noise smaller, which looks like a better model
-    "r": ("the yaw rate", "r_gain", 3.0),
-    "delta_f": ("the steering angle", "steering_gain", 0.0),
-    "a_y": ("the lateral acceleration", "a_y.factor", 0.0),
+    ),  # of gyroscopes within a percent, and like that of v_x
+    "delta_f": ("the steering angle", "steering_gain"),
+    "a_y": ("the lateral acceleration", "a_y.factor"),
 }
 DEVICES = {"v_y": "v_y", "r": "r", "delta_f": "steering", "a_y": "a_y."}
 TURNING = Suspect(
@@ -171,11 +176,11 @@ def _of_channels() -> tuple[Suspect, ...]:
             Suspect(f"{stem}lag", "lag", name, "s", 0.15, least, grows,
                     f"{words} lags behind a low pass of {{size}}", " ms", 1e3),
         ]  # fmt: skip
-    smallest = {"v_x": 0.01, "r": 0.01, "delta_f": 0.012, "a_y": 0.01}
+    smallest = {"v_x": 0.01, "delta_f": 0.012, "a_y": 0.01}
     found += [
         Suspect(parameter, "factor", name, "", 0.2, smallest[name], "",
-                f"{words} reads {{size}} times the right value", price=price)
-        for name, (words, parameter, price) in WORDS.items()
+                f"{words} reads {{size}} times the right value")
+        for name, (words, parameter) in WORDS.items()
         if parameter
     ]  # fmt: skip
     return tuple(found)
@@ -197,5 +202,5 @@ SUSPECTS = (
             "the road falls by {size} to the left, or wind pushes so", "°", DEGREES),
     Suspect("downforce_f", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "",
             "the tires push more at speed, as by a downforce of {size}",
-            " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2, 1.0),
+            " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),
 )  # fmt: skip

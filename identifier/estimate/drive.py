@@ -51,6 +51,11 @@ class Drive:
     every: int
     begins: tuple[int, ...] = (0,)
 
+    @property
+    def begin(self) -> float:
+        """Time of the first sample that its first mean is of [s]."""
+        return float(self.t[0]) - 0.5 * self.dt * (1.0 - 1.0 / self.every)
+
     @classmethod
     def of(
         cls,
@@ -132,37 +137,36 @@ def _piece(
     """Return time, signals and rates of a stretch; its first sample does not count."""
     v_y = recording.needed("v_y")
 
-    def thinned(signal: Array) -> Array:
-        part = signal[piece]
-        if every == 1:
-            return np.asarray(part)
-        m = len(part) // every * every
-        mean: Array = part[:m].reshape(-1, every).mean(axis=1)
-        return mean
-
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
     count = round(SMOOTHED * scale / dt) | 1
     raw = (recording.v_x, v_y, recording.r, recording.delta_f, recording.delta_r)
-    v_x, v_y, r, delta_f, delta_r = (box(thinned(signal), count) for signal in raw)
+    v_x, v_y, r, delta_f, delta_r = (box(thinned(signal[piece], every), count) for signal in raw)
     on = v_x > slowest
     v_x = np.where(on, v_x, slowest)
     n3 = LONGITUDINAL / dt
     a_x = box(gradient(box(v_x, n3 / 2), dt), n3) - box(v_y * r, n3)
     if recording.a_x is not None:
-        felt = box(thinned(recording.a_x), count)
+        felt = box(thinned(recording.a_x[piece], every), count)
         if _slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, ALONG) is not None:
             a_x = felt
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
     bank = np.zeros_like(v_x)
     if recording.a_y is not None:
-        bank = _bank(thinned(recording.a_y), v_x, v_y, r, on, dt)
+        bank = _bank(thinned(recording.a_y[piece], every), v_x, v_y, r, on, dt)
     on[0] = False  # nothing is carried into a stretch
     signals = np.column_stack(
         [v_x, v_y, r, delta_f, delta_r, a_x, bank, np.zeros_like(v_x), on.astype(float)]
     )
     rates = np.column_stack([gradient(signal, dt) for signal in (v_y, r, delta_f)])
-    t = thinned(recording.t)
+    t = thinned(recording.t[piece], every)
     return t, np.ascontiguousarray(signals), np.ascontiguousarray(rates)
+
+
+def thinned(signal: Array, every: int) -> Array:
+    """Return the means of so many samples each, (n // every,)."""
+    m = len(signal) // every * every
+    mean: Array = signal[:m].reshape(-1, every).mean(axis=1)
+    return mean
 
 
 def gradient(signal: Array, dt: float) -> Array:

@@ -2,36 +2,37 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import FASTEST, Drive
+from identifier.estimate.information import Information
 from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
-from identifier.estimate.solve import ENOUGH, estimate, simulate
+from identifier.estimate.solve import ENOUGH, STRIDE, error_size, estimate, simulate
 from models.recordings import Recording
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
 BLOCK = 600.0  # [s] that are estimated at once
 ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
-LONG, COARSE = (
-    3600.0,
-    2.0,
-)  # [s] of logs from which samples are averaged to intervals so much longer
+LONG, COARSE = 3600.0, 2.0  # [s] of logs from which samples are averaged to intervals so longer
 REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
-MISSED = 0.06  # of the force, by which drives of one car differ from one model; of one log a belief
+LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
 class Fit(NamedTuple):
-    """What logs taught: the model, and the estimate behind it."""
+    """What logs taught: the model, the estimate behind it, and each block's own information.
+
+    parts : when blocks begin, by the clock of their first log [s], and what they alone tell.
+    """
 
     model: FittedModel
     posterior: Posterior
+    parts: list[tuple[float, Information]]
 
 
 def fit(
@@ -39,14 +40,18 @@ def fit(
     vehicle: Vehicle,
     priors: Priors | None = None,
     *,
+    block: float = BLOCK,
+    coarse: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Fit:
     """Estimate the tires of a car from logs with a v_y, with the same sensors.
 
     Parameters
     ----------
-    recordings : logs of the car; a log longer than ten minutes is taken in blocks.
+    recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
+    block : longest time that is estimated at once [s].
+    coarse : whether samples are averaged to twice the interval, as they are of logs of hours.
     progress : called now and then with the share that is done, 0 to 1.
 
     Raises
@@ -54,22 +59,29 @@ def fit(
     ValueError
         Where no sample is fast enough to count.
     """
-    beliefs = Priors.of(vehicle) if priors is None else priors
+    before = Priors.of(vehicle) if priors is None else priors
+    told, sd = Information.nothing(), Priors.of(vehicle).sd
+    parts: list[tuple[float, Information]] = []
     total = sum(one.duration for one in recordings)
     done, reach, found = 0.0, Reach(), None
     segments: list[Segment] = []
-    for drives in _blocks(recordings, vehicle):
+    coarse = coarse or total > LONG
+    for drives in _blocks(recordings, vehicle, block, coarse=coarse):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
         enough = ENOUGH if begin is None else ENOUGH_MORE
+        beliefs = before.after(told) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
         segments += _segments(drives, roads)
-        reach = reach.and_of(drives, found, vehicle)
-        information = np.zeros_like(beliefs.information)
-        information[np.ix_(found.index, found.index)] = found.information
-        beliefs = replace(beliefs, mean=found.p, information=information, typed=())
+        here = Reach.of(drives, roads, found, vehicle)
+        reach = reach.with_(here)
+        part = Information.about(
+            found.p, found.slope, found.curvature, sd, here.slip, found.seconds
+        )
+        told += part
+        parts.append((drives[0].begin, part))
         done += sum(len(one.signals) * one.dt for one in drives)
         if progress is not None:
             progress(min(done / max(total, 1e-9), 1.0))
@@ -83,10 +95,10 @@ def fit(
         driven=reach.slip,
         speeds=reach.speeds,
         a_x=reach.a_x,
-        missed=np.full(2, MISSED),
+        unexplained=reach.unexplained,
         segments=tuple(segments),
     )
-    return Fit(model, found)
+    return Fit(model, found, parts)
 
 
 def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
@@ -106,45 +118,89 @@ def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
 
 
 class Reach(NamedTuple):
-    """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²]."""
+    """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²].
+
+    alike, pairs : sum of products of what the model misses, over its size, at two times `LASTS`
+    apart, (2,), and how many there are: white noise of the sensors has no part in it.
+    """
 
     slip: Array = np.zeros(2)
     speeds: Array = np.array([np.inf, -np.inf])
     a_x: Array = np.array([np.inf, -np.inf])
+    alike: Array = np.zeros(2)
+    pairs: float = 0.0
 
-    def and_of(self, drives: Sequence[Drive], found: Posterior, vehicle: Vehicle) -> "Reach":
-        """Return what these drives reached, too."""
-        slip, speeds, a_x = (np.array(one) for one in self)
-        for one in drives:
+    def with_(self, other: "Reach") -> "Reach":
+        """Return what both reached."""
+
+        def widest(one: Array, two: Array) -> Array:
+            return np.array([min(one[0], two[0]), max(one[1], two[1])])
+
+        return Reach(
+            np.maximum(self.slip, other.slip),
+            widest(self.speeds, other.speeds),
+            widest(self.a_x, other.a_x),
+            self.alike + other.alike,
+            self.pairs + other.pairs,
+        )
+
+    @property
+    def unexplained(self) -> Array:
+        """Size of what is missed for longer than noise, over what a good model misses, (2,)."""
+        found: Array = np.sqrt(np.maximum(self.alike, 0.0) / max(self.pairs, 1e-9))
+        return found
+
+    @classmethod
+    def of(
+        cls, drives: Sequence[Drive], roads: Roads | None, found: Posterior, vehicle: Vehicle
+    ) -> "Reach":
+        """Return what drives reached, by the estimate of them."""
+        nothing = cls()
+        slip, speeds, a_x, alike = (
+            np.array(one) for one in (nothing.slip, nothing.speeds, nothing.a_x, nothing.alike)
+        )
+        pairs = 0
+        later = LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+        for i, one in enumerate(drives):
             on = one.counts
             if not on.any():
                 continue
-            size = np.abs(simulate(one, found.p, vehicle)["slip"][on])
+            if roads is not None:
+                here = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+            driven = simulate(one if roads is None else here, found.p, vehicle)
+            size = np.abs(driven["slip"][on])
+            force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
+            e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
+            n = max(round(max(later, STRIDE) / one.dt), 1)
+            together = on[n:] & on[:-n]
+            alike += (e[n:] * e[:-n])[together].sum(axis=0)
+            pairs += int(np.count_nonzero(together))
             k = min(max(round(REACHED / one.dt), 1), len(size))
             slip = np.maximum(slip, np.partition(size, len(size) - k, axis=0)[-k])
             for both, column in ((speeds, 0), (a_x, 5)):
                 low, high = np.quantile(one.signals[on, column], [0.005, 0.995])
                 both[:] = min(both[0], low), max(both[1], high)
-        return Reach(slip, speeds, a_x)
+        return cls(slip, speeds, a_x, alike, pairs)
 
 
-def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[Drive]]:
-    """Yield drives of at most `BLOCK` together."""
+def _blocks(
+    recordings: Sequence[Recording], vehicle: Vehicle, longest: float, *, coarse: bool
+) -> Iterator[list[Drive]]:
+    """Yield drives that last no longer together."""
     group: list[Drive] = []
     length = 0.0
-    coarse = COARSE if sum(one.duration for one in recordings) > LONG else 1.0
-    scale = min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+    small = COARSE * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
+    fastest = FASTEST * (COARSE if coarse and not small else 1.0)
     for recording in recordings:
-        n = max(round(BLOCK / recording.dt), 1)
+        n = max(round(longest / recording.dt), 1)
         count = -(-len(recording) // n)
         edges = np.linspace(0, len(recording), count + 1).astype(int)
         for begin, end in itertools.pairwise(edges):
             seconds = (end - begin) * recording.dt
-            if group and length + seconds > BLOCK:
+            if group and length + seconds > longest:
                 yield group
                 group, length = [], 0.0
             part = slice(int(begin), int(end))
-            fastest = FASTEST * (coarse if coarse * scale >= 1.0 else 1.0)
             group.append(Drive.of(recording, vehicle, part, fastest=fastest))
             length += seconds
     if group:

@@ -71,16 +71,22 @@ class FitMethod(Method):
     ) -> FittedModel:
         """Return the tires that a log taught.
 
+        Parameters
+        ----------
+        start : a fit, or the prior of a fleet, that is believed before; None believes the table.
+
         Raises
         ------
         ValueError
-            Where it is told to go on from a stored model, or no sample is fast enough.
+            Where it is told to go on from a model of another method, or no sample is fast enough.
         """
-        if start is not None:
+        if start is not None and not isinstance(start, FittedModel):
             raise ValueError(
-                "--method fit learns from whole logs: give it all of them, in place of a model"
+                "--method fit begins with a fit or a fleet's prior: give it all logs, in place of "
+                "a model of another method"
             )
-        return fit([recording], vehicle, progress=progress).model
+        priors = None if start is None else start.as_prior(vehicle)
+        return fit([recording], vehicle, priors, progress=progress).model
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Refuse: what its step carries are no tires.

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.motion.parameters import INDEX
@@ -18,8 +17,8 @@ class Posterior:
     ----------
     p : all parameters, as `motion.parameters` lists them (p,).
     covariance : of them, zero of those that did not move (p, p).
-    index : which of them moved, (n,).
-    information : inverse covariance of those, other roads marginal (n, n).
+    slope, curvature : of the loss of the drives alone, without the priors (p,), (p, p).
+    seconds : of driving that counts [s].
     roads : ln of the friction of other roads than that of the curves (K,).
     road_sd : standard deviation of these (K,).
     scale : S of the residuals of both axles [-], (2,).
@@ -30,8 +29,9 @@ class Posterior:
     vehicle: Vehicle
     p: Array
     covariance: Array
-    index: NDArray[np.intp]
-    information: Array
+    slope: Array
+    curvature: Array
+    seconds: float
     roads: Array
     road_sd: Array
     scale: Array

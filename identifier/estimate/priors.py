@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.estimate.information import Information
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import Vehicle
 
@@ -76,6 +77,7 @@ ALIKE = {  # standard deviation of front less rear
 # At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds differ.
 SHARED_ERROR = 0.5
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
+SENSORS = tuple(name for name in OF_CAR if name.startswith(("v_y", "steering")))
 TYPED = ("steering_gain",)
 TAILS = 1.0  # degrees of freedom of their priors
 
@@ -89,6 +91,8 @@ class Priors:
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
+    typed : which numbers somebody typed.
+    told : what drives told beside it.
     """
 
     mean: Array
@@ -97,6 +101,7 @@ class Priors:
     information: Array
     moves: NDArray[np.bool_]
     typed: tuple[int, ...] = ()
+    told: Information | None = None
 
     @classmethod
     def of(
@@ -142,6 +147,19 @@ class Priors:
         typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
         return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
 
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the parameters, zero of what does not move (p, p)."""
+        found, where = np.zeros_like(self.information), np.ix_(self.moves, self.moves)
+        found[where] = np.linalg.inv(self.information[where])
+        return found
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations of the parameters, each apart; 0 where it does not move, (p,)."""
+        told = np.diag(self.information)
+        return np.sqrt(np.divide(1.0, told, out=np.zeros_like(told), where=self.moves))
+
     def with_roads(self, count: int) -> "Priors":
         """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
         low, high = np.full(count, np.log(0.2)), np.full(count, np.log(2.2))
@@ -169,7 +187,7 @@ class Priors:
         for k in self.typed:
             z2 = float(self.information[k, k] * away[k] ** 2)
             cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / (TAILS + 1.0)) - z2)
-        return cost
+        return cost if self.told is None else cost + self.told.around(p[: len(NAMES)])[0]
 
     def around(self, p: Array) -> tuple[Array, Array]:
         """Return gradient (p,) and positive curvature (p, p) of the cost at parameters `p` (p,)."""
@@ -178,7 +196,16 @@ class Priors:
             z2 = self.information[k, k] * away[k] ** 2
             curvature[k, k] *= (TAILS + 1.0) / (TAILS + 1.0 + z2)
         gradient: Array = curvature @ away
+        if self.told is not None:
+            n = len(NAMES)  # of other roads no drive before tells
+            _, slope, bend = self.told.around(p[:n])
+            gradient[:n] += slope
+            curvature[:n, :n] += bend
         return gradient, curvature
+
+    def after(self, told: Information) -> "Priors":
+        """Return the beliefs with what drives told."""
+        return replace(self, told=told)
 
 
 def _told(vehicle: Vehicle) -> dict[str, tuple[float, float]]:

@@ -24,7 +24,7 @@ from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
 
 STRIDE = 0.05  # [s] between residuals
-ERROR, RELATIVE = 0.02, 0.04  # b: of a static load, and of the lateral acceleration in g
+ERROR_SIZE = 0.02, 0.04  # b: of a static load, and of the lateral acceleration in g
 NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far off
 LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 SHORTEST_MEMORY, LONGEST_MEMORY = 0.25, 8.0  # T [s]
@@ -32,6 +32,7 @@ LEAST_STIFF, STIFF_SD = 0.25, 0.1  # of C: slope at zero, and how firmly it is b
 ITERATIONS = 25
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
+SETTLING, SETTLED = 60, 1e-4  # iterations and improvement [nats] where no drive is looked at
 
 
 Labels: TypeAlias = Sequence[NDArray[np.intp]]
@@ -82,7 +83,7 @@ class Problem:
         for one, stride, kept in zip(drives, self._strides, self._kept, strict=True):
             v_x, r = one.signals[::stride][kept][:, [0, 2]].T
             forces.append(np.abs(v_x * r) / GRAVITY)
-            sizes.append(np.hypot(ERROR, RELATIVE * forces[-1]))
+            sizes.append(error_size(forces[-1]))
             weights.append(np.full(kept.size, one.dt * stride))
         self.size = np.concatenate(sizes)
         self.weight = np.concatenate(weights)
@@ -158,11 +159,16 @@ class Problem:
                 on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
                 J = np.concatenate([J, of_road * on[:, None, :]], axis=2)
             slopes.append(J)
-        size = self.size[:, None]
+        missed, slope = np.concatenate(e), np.concatenate(slopes)
+        # To shrink v_x shrinks what is missed, and explains nothing: its size shrinks alike.
+        shrunk = min(1.0 + float(p[INDEX["v_x_factor"]]), 1.0)
+        size = self.size[:, None] * shrunk
+        if shrunk < 1.0:
+            slope[:, :, self.index == INDEX["v_x_factor"]] -= missed[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
             return Residuals(
-                np.nan_to_num(np.concatenate(e) / size, nan=1e3, posinf=1e3, neginf=-1e3),
-                np.nan_to_num(np.concatenate(slopes) / size[..., None]),
+                np.nan_to_num(missed / size, nan=1e3, posinf=1e3, neginf=-1e3),
+                np.nan_to_num(slope / size[..., None]),
             )
 
     def memory(self, e: Array) -> Array:
@@ -172,28 +178,10 @@ class Problem:
         ----------
         e : over b [-], (m, 2).
         """
-        found = np.empty(2)
-        step = self.weight[0]
+        step, x = float(self.weight[0]), np.clip(e, -4.0, 4.0)
         lags = int(LONGEST_MEMORY / step) + 1
-        for axle in range(2):
-            total, begin = np.zeros(lags), 0
-            for length in self.lengths:
-                x = np.clip(e[begin : begin + length, axle], -4.0, 4.0)
-                begin += length
-                if length < 20:
-                    continue
-                size = 1 << (2 * length - 1).bit_length()
-                spectrum = np.fft.rfft(x, size)
-                correlation = np.fft.irfft(np.abs(spectrum) ** 2, size)
-                few = max(min(length // 3, lags - 1), 1)
-                total[:few] += correlation[:few]
-            if not total[0] > 0.0:
-                found[axle] = 2.0
-                continue
-            rho = total / total[0]
-            fallen = rho < 0.05
-            until = int(np.argmax(fallen)) if fallen.any() else lags
-            found[axle] = step * (1.0 + 2.0 * rho[1 : max(until, 1)].sum())
+        edges = np.cumsum(self.lengths)[:-1]
+        found = [autocorrelation_time(np.split(x[:, k], edges), step, lags) for k in range(2)]
         return np.maximum(found, SHORTEST_MEMORY)
 
     def scale(self, e: Array) -> Array:
@@ -234,6 +222,37 @@ class Problem:
         """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
+
+
+def error_size(force: Array) -> Array:
+    """Return b, what a good model misses of a force, both in static loads."""
+    floor, share = ERROR_SIZE
+    return np.hypot(floor, share * force)
+
+
+def autocorrelation_time(pieces: Sequence[Array], step: float, lags: int) -> float:
+    """Return the integrated autocorrelation time of a signal [s]; 2 s where it is zero.
+
+    Parameters
+    ----------
+    pieces : of the signal; such below 20 samples do not count.
+    step : between samples [s].
+    lags : of which at most a third of a piece is looked at.
+    """
+    total = np.zeros(lags)
+    for x in pieces:
+        if x.size < 20:
+            continue
+        size = 1 << (2 * x.size - 1).bit_length()
+        correlation = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2, size)
+        few = max(min(x.size // 3, lags - 1), 1)
+        total[:few] += correlation[:few]
+    if not total[0] > 0.0:
+        return 2.0
+    rho = total / total[0]
+    fallen = rho < 0.05
+    until = int(np.argmax(fallen)) if fallen.any() else lags
+    return step * (1.0 + 2.0 * float(rho[1 : max(until, 1)].sum()))
 
 
 def car_numbers(vehicle: Vehicle) -> Array:
@@ -379,18 +398,20 @@ def descend(
         if gained < enough and (count > 3 or memory is not None):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
-    H = normal(problem, now, S2, T)[0] + around_beliefs(priors, p)[1][np.ix_(index, index)]
+    H, gradient = normal(problem, now, S2, T)
+    slope, curvature = _of_drives(problem, H, gradient)
+    H = H + around_beliefs(priors, p)[1][np.ix_(index, index)]
     cost = problem.cost(now.e, p, T)
     whole = np.zeros((len(p), len(p)))
     whole[np.ix_(index, index)] = np.linalg.inv(H)
-    n, tires = len(NAMES), problem.tires
-    told = np.asarray(np.linalg.inv(whole[np.ix_(index[:tires], index[:tires])]), np.float64)
+    n = len(NAMES)
     return Posterior(
         vehicle=problem.vehicle,
         p=p[:n],
         covariance=whole[:n, :n],
-        index=index[:tires],
-        information=told,
+        slope=slope,
+        curvature=curvature,
+        seconds=float(problem.weight.sum()),
         roads=p[n:],
         road_sd=np.sqrt(np.diag(whole)[n:]),
         scale=np.sqrt(S2),
@@ -398,6 +419,50 @@ def descend(
         cost=cost,
         iterations=count,
     )
+
+
+def _of_drives(problem: Problem, H: Array, gradient: Array) -> tuple[Array, Array]:
+    """Return slope (p,) and curvature (p, p) of the misfit, roads of segments marginal."""
+    n, tires = len(NAMES), problem.tires
+    index, some, roads = problem.index[:tires], slice(0, tires), slice(tires, None)
+    if problem.roads:
+        before = problem.priors.information[n:, n:]
+        gain = np.linalg.solve(before + H[roads, roads], H[roads, some]).T
+        H, gradient = H[some, some] - gain @ H[roads, some], gradient[some]  # at the optimum
+    slope, curvature = np.zeros(n), np.zeros((n, n))
+    slope[index], curvature[np.ix_(index, index)] = gradient, 0.5 * (H + H.T)
+    return slope, curvature
+
+
+def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
+    """Return the optimum (p,) of what is believed, and its covariance (p, p).
+
+    With `Priors.after` these are the parameters that all drives told together.
+
+    Parameters
+    ----------
+    begin : parameters to begin with (p,).
+    """
+    index, p = np.flatnonzero(priors.moves), begin.copy()
+    low, high = priors.low[index], priors.high[index]
+    cost, damping = _beliefs(priors, p), 1e-6
+    for _ in range(SETTLING):
+        gradient, curvature = around_beliefs(priors, p)
+        H = curvature[np.ix_(index, index)]
+        step = _bounded(H + damping * np.diag(np.diag(H)), gradient[index], p[index], low, high)
+        trial = p.copy()
+        trial[index] = np.clip(p[index] + step, low, high)
+        reached = _beliefs(priors, trial)
+        if not reached < cost:
+            damping = max(6.0 * damping, 1e-3)
+            continue
+        gained, p, cost, damping = cost - reached, trial, reached, max(damping / 5.0, 1e-6)
+        if gained < SETTLED:
+            break
+    covariance = np.zeros_like(priors.information)
+    where = np.ix_(index, index)
+    covariance[where] = np.linalg.inv(around_beliefs(priors, p)[1][where])
+    return p, covariance
 
 
 def _beliefs(priors: Priors, p: Array) -> float:

@@ -310,8 +310,9 @@ def _band_of_fit(source: FittedModel, graph: Graph, axle: int, units: str, force
     load = model.vehicle.axle_loads[axle]
     h = nodes.sensitivity(model, axle, units, float(source.speeds.mean()))
     left = nodes.variance(h, _of_curve(model, model.covariance, axle))
-    missed = nodes.node("Mul", force, nodes.number(source.missed[axle] / load))
-    nodes.finish(nodes.node("Add", left, nodes.square(missed)), load * normal_quantile(LEVEL))
+    share = nodes.node("Mul", force, nodes.number(source.error_share[axle] / load))
+    own = nodes.node("Add", nodes.square(share), nodes.number(source.error_floor[axle] ** 2))
+    nodes.finish(nodes.node("Add", left, own), load * normal_quantile(LEVEL))
 
 
 def _band_of_axle(model: AxleModel, graph: Graph, axle: int, units: str, force: str) -> None:

@@ -28,7 +28,6 @@ from identifier.inertial.step import CARRY, OVER, PORTS, LearntLimits, build_ste
 from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel
-from identifier.tuning import Range, ranges_around
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
@@ -46,24 +45,6 @@ AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
 }
 
 # What a search may vary of it, and what the number is multiplied and divided by.
-TUNED: Mapping[str, float] = {
-    "beliefs.roll": 3.0,
-    "beliefs.sd_roll": 3.0,
-    "trust.error": 3.0,
-    "trust.relative_error": 3.0,
-    "trust.correlation_time": 3.0,
-    "trust.bank": 3.0,
-    "trust.bank_time": 2.0,
-    "trust.jerk": 3.0,
-    "trust.r_error": 3.0,
-    "trust.a_y_error": 3.0,
-    "trust.lateness": 3.0,
-    "prior.sd_shape": 2.0,
-    "prior.sd_stiffness": 2.0,
-    "prior.sd_friction": 2.0,
-    "prior.compliance": 3.0,
-    "prior.sd_compliance": 3.0,
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,11 +146,6 @@ class InertialIdentifier(Method):
     def possible_tires(self) -> HalfSpaces:
         """Return the weights that the curve of a tire can have, within the bounds."""
         return prior_box(self.bounds, self.ladder)
-
-    @property
-    def tunables(self) -> Mapping[str, Range]:
-        """What a search may vary, around the numbers that it has."""
-        return ranges_around(self, TUNED)
 
     @property
     def ports(self) -> tuple[Port, ...]:

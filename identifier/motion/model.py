@@ -31,7 +31,7 @@ from codegen.compiler import FLAGS
 from identifier.axle.car import named_port
 from identifier.axle.gate import GateNumbers, GateState, gate
 from identifier.axle.slip import SHORTEST
-from identifier.motion.parameters import NAMES, SLIPS
+from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
 
 LEAST_GRIP = 0.05  # of G²: what an axle that uses all of its grip lengthwise keeps sideways
@@ -296,6 +296,23 @@ def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
         weight * (1 - t * t) / slip for weight, t, slip in zip(q, T, SLIPS, strict=True)
     )
     return numbers, x, m * phi, slope
+
+
+@cache
+def curve_index(axle: str) -> list[int]:
+    """Return where the numbers of `curve_symbols` of an axle stand among the parameters, (9,)."""
+    names = [f"{name}_{axle}" for name in ("ln_stiffness", "ln_grip", "shape", "curvature")]
+    names += [f"residual{j}_{axle}" for j in range(len(SLIPS))]
+    return [INDEX[name] for name in (*names, "ln_road")]
+
+
+@cache
+def curve_function() -> ca.Function:
+    """Return (numbers (9,), slip) -> φ, dφ/dx, ∂φ/∂numbers (9,)."""
+    numbers, x, phi, slope = curve_symbols()
+    vector = ca.vertcat(*numbers)
+    gradient = ca.densify(ca.jacobian(phi, vector)).T
+    return ca.Function("curve", [vector, x], [phi, slope, gradient])
 
 
 def _axle(

@@ -195,13 +195,7 @@ class PaperIdentifier(Method):
         return operation(self, vehicle, driving or self.driving or natural_driving(vehicle))
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of its gains.
-
-        Parameters
-        ----------
-        driving : how hard it is driven; None takes what it was designed for, else
-            `natural_driving`.
-        """
+        """Return what is proven of its gains."""
         return certify(self.gains, LAWS[self.law], self.operation(vehicle, driving))
 
     @property
@@ -214,7 +208,6 @@ class PaperIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : weights to begin with; None draws them from the seed.
 
         Raises

@@ -258,12 +258,7 @@ class NetworkModel(TireModel):
         require_within(ValueError, 0.0, LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs.
-
-        Parameters
-        ----------
-        dt : sampling interval of what is replayed [s]; it is not looked at.
-        """
+        """Return what a replay needs."""
         del dt
         return Setup(
             scan=_replay_scan(self.network),
@@ -278,13 +273,7 @@ class NetworkModel(TireModel):
         )
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression.
-
-        Parameters
-        ----------
-        alpha : slip angles (2,) [rad], the wheels straight ahead.
-        v_x : longitudinal speed [m/s].
-        """
+        """Return the steady axle forces (2,) [N] as a CasADi expression."""
         return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
 
     def force_expression(
@@ -295,9 +284,6 @@ class NetworkModel(TireModel):
         Parameters
         ----------
         slip : empty.
-        x : [v_y, r] (2,).
-        delta : angle of the front wheels [rad].
-        v_x : longitudinal speed [m/s], positive.
         """
         del slip, least_lag
         return self._static_force(x, delta, v_x), ca.MX(0, 1)
@@ -324,12 +310,7 @@ class NetworkModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":
-        """Return the model that `to_dict` describes.
-
-        Parameters
-        ----------
-        source : name of the file, for errors.
-        """
+        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             return cls(

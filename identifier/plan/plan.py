@@ -164,7 +164,6 @@ def make_plan(
     tires : that the car may have, under static loads; the plan's are those under the loads of its
         speed.
     time : of all passes together [s].
-    progress : called with the share that is done.
 
     Raises
     ------

@@ -4,9 +4,8 @@ from identifier.certificate import Certificate, Property
 from identifier.paper.laws import DrivingError
 from identifier.stability.certificate import certify
 from identifier.stability.gain_design import DesignError, GainDesign, design_gains
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, along_run
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.operation import Operation
-from identifier.stability.pi_lead import pi_lead
 
 __all__ = [
     "INSTANTANEOUS",
@@ -17,8 +16,6 @@ __all__ = [
     "GainDesign",
     "Operation",
     "Property",
-    "along_run",
     "certify",
     "design_gains",
-    "pi_lead",
 ]

@@ -45,7 +45,6 @@ def small_gain(
     Parameters
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     forgetting : λ [1/s].
     eta_W : learning rate of (11).
     n_h : hidden units; |s|² <= n_h.
@@ -76,11 +75,9 @@ def steady_capacity(
     Parameters
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     forgetting : λ [1/s].
     eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
-    n_h : hidden units.
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
     require_positive(ValueError, forgetting=forgetting, rho_W=rho_W)

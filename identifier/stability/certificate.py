@@ -1,7 +1,7 @@
 """Is a set of gains safe to drive with? All properties of a design, with limits and advice.
 
 Judged at the worst regressor (|s|² = n_h, no leakage), so that a pass holds on every road; the
-same loop at the regressors of a recorded run is `along_run`.
+same loop at the regressors of a recorded run is in `along`.
 """
 
 import math
@@ -55,7 +55,6 @@ def judged_loop(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s].
     kept : |W_hat| that is proven [U].
     """

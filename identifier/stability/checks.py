@@ -168,7 +168,6 @@ def drift_check(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s].
     """
     found = drift_frequency(
@@ -264,7 +263,6 @@ def bound_checks(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s].
     proven : of `proven_bounds`.
     """

@@ -69,7 +69,6 @@ def gain_for_phase_margin(
     ----------
     a : decay rate [1/s].
     lam : forgetting factor λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     phase_margin : wanted [deg], above 0 and below 90.
     dt : step of explicit Euler [s]; None for continuous time (RK4 at a dt <= 0.2 comes to it).
 
@@ -133,10 +132,8 @@ def design_gains(
 
     Parameters
     ----------
-    law : coefficients of z and ξ̃ in the driving error.
     bandwidth : highest frequency of steering that matters [Hz].
     dt : sampling interval T_s [s].
-    n_h : hidden units.
     disturbance : what acts on the error, for the proven bounds.
     needed_force : that the network is expected to hold [U].
     V_max : wanted bound on |V_hat|, at least its initial norm.

@@ -141,7 +141,6 @@ def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
 
     Parameters
     ----------
-    loop : the loop at factor 1.
     factors : (n,) multipliers of G; complex ones turn the phase.
     """
     base = loop.matrix().astype(np.complex128)
@@ -165,7 +164,6 @@ def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
 
     Parameters
     ----------
-    loop : the loop at factor 1.
     factors : (n,) multipliers of G.
     """
     return eigenvalues(scaled_matrices(loop, factors))
@@ -177,7 +175,6 @@ def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float =
     Parameters
     ----------
     matrices : (..., n, n) loop matrices.
-    integrator : R.
     dt : step [s]; irrelevant for `exact`.
     """
     mu = eigenvalues(matrices)
@@ -193,7 +190,6 @@ def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> A
     Parameters
     ----------
     matrices : (..., n, n) loop matrices.
-    integrator : R.
     dt : step [s].
     """
     return np.exp(growth_rate(matrices, integrator, dt) * dt)
@@ -310,20 +306,3 @@ def root(
     from scipy.optimize import brentq  # takes longer to import than a log of a minute to learn from
 
     return float(brentq(f, low, high, xtol=xtol, rtol=rtol))
-
-
-def along_run(loop: Loop, gains_along: ArrayLike, integrator: str, dt: float) -> Array:
-    """Spectral radius of the sampled loop at each sample of a run, (n,).
-
-    Parameters
-    ----------
-    loop : A_d, law and input of the design; its own G is not used.
-    gains_along : (n, 2, 2) G along the run, from `regressor_gains`.
-    integrator : "euler", "rk4" or "exact".
-    dt : sampling interval [s].
-    """
-    G = np.asarray(gains_along, dtype=np.float64)
-    unit = replace(loop, G=np.eye(2)).matrix()
-    stack = np.repeat(unit[None], G.shape[0], axis=0)
-    stack[:, 4:, :4] = G @ unit[4:, :4]
-    return spectral_radius(stack, INTEGRATORS[integrator], dt)

@@ -6,7 +6,6 @@ For A_d = -a I both are those of the scalar loop (g/a) (c_ξ + c_z/(s + λ)) / (
 """
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -26,10 +25,9 @@ from identifier.stability.loop import (
     scaled_matrices,
 )
 from identifier.stability.lyapunov import require_hurwitz
-from models.rules import require_positive
 
 if TYPE_CHECKING:
-    import control
+    pass
 
 LARGEST_FACTOR = 1e6
 AT_ONCE = 150  # points of a grid whose eigenvalues are found together
@@ -57,7 +55,6 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
 
     Parameters
     ----------
-    loop : the loop at factor 1.
     integrator : `exact` for continuous time, or the integrator of the step.
     dt : step [s]; irrelevant for `exact`.
     """
@@ -93,59 +90,6 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
     grid = np.linspace(0.0, np.pi, 721)
     crossing = _first_crossing(growth_at, grid, 1e-11 * _rate(loop))
     return 180.0 if crossing is None else float(np.degrees(crossing))
-
-
-def scalar_loop(
-    *,
-    a: float,
-    lam: float,
-    g: float,
-    law: DrivingError,
-    leakage: float = 0.0,
-    dt: float | None = None,
-) -> "control.TransferFunction":
-    """Return the loop transfer function for A_d = -a I, in s, or in w = 1 + s dt (Euler).
-
-    (g/a) (c_ξ (s + λ) + c_z) / ((s + λ)(s + a)(s + l)); the pole-zero pair at λ of a law without
-    z is kept out.
-
-    Parameters
-    ----------
-    a : decay rate [1/s].
-    lam : forgetting factor λ [1/s].
-    g : loop gain λ_max(G).
-    law : coefficients of z and ξ̃ in the driving error.
-    leakage : l [1/s].
-    dt : step [s] of explicit Euler, None for continuous time.
-    """
-    require_positive(ValueError, a=a, lam=lam, g=g)
-    c_z, c_xi = law
-    poles = [-a, -leakage] + ([-lam] if c_z > 0.0 else [])
-    zeros = [-lam - c_z / c_xi] if c_z > 0.0 and c_xi > 0.0 else []
-    gain = g / a * (c_xi if c_xi > 0.0 else c_z)
-    if dt is not None:
-        gain *= dt ** (len(poles) - len(zeros))
-        poles = [1.0 + dt * pole for pole in poles]
-        zeros = [1.0 + dt * zero for zero in zeros]
-    import control  # takes a second to import, so only where it is needed
-
-    time = 0 if dt is None else dt
-    return control.tf(gain * np.poly(zeros), np.poly(poles), time)
-
-
-def scalar_margins(loop: "control.TransferFunction") -> tuple[float, float, float, float]:
-    """Gain margin [-], phase margin [deg] and their frequencies [rad/s], by `control.margin`.
-
-    Parameters
-    ----------
-    loop : transfer function of `scalar_loop`.
-    """
-    import control
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # control warns where a margin is at infinity
-        gain, phase, at_phase_crossing, at_gain_crossing = control.margin(loop)
-    return float(gain), float(phase), float(at_phase_crossing), float(at_gain_crossing)
 
 
 def _first_crossing(
@@ -215,7 +159,6 @@ def passivity(
     frequency : (n,) ω [rad/s].
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
     dynamics = require_hurwitz(A_d)
@@ -241,7 +184,6 @@ def drift_frequency(
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
 
@@ -271,7 +213,7 @@ def passivity_shortage(
 ) -> float:
     """Max over ω of -λ_min He H(jω), zero where H is positive real.
 
-    For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²), `shortage_formula`. The other
+    For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²). The other
     arguments are those of `drift_frequency`, `direction` (2, 2) [s].
 
     Parameters
@@ -297,18 +239,6 @@ def passivity_shortage(
     return shortage if shortage > 1e-12 * float(np.max(np.abs(lowest(grid)))) else 0.0
 
 
-def shortage_formula(a: float, lam: float) -> float:
-    """1/(a (a + λ) (√a + √λ)²): shortage of passivity of the integral law with A_d = -a I.
-
-    Parameters
-    ----------
-    a : decay rate of A_d = -a I [1/s].
-    lam : forgetting factor λ [1/s].
-    """
-    require_positive(ValueError, a=a, lam=lam)
-    return 1.0 / (a * (a + lam) * (math.sqrt(a) + math.sqrt(lam)) ** 2)
-
-
 def sufficient_leakage(
     *,
     A_d: ArrayLike,
@@ -326,7 +256,6 @@ def sufficient_leakage(
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
     eta_W : learning rate of (11).
     n_h : hidden units; |s|² <= n_h.
     direction : (2, 2) D, None for -A_d⁻ᵀ.

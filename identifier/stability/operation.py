@@ -172,7 +172,6 @@ def proven_bounds(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s], of `direction_matrix`.
     """
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
@@ -233,7 +232,6 @@ def worst_loop(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
     """
@@ -315,21 +313,6 @@ def minimal_decay(feedback: ArrayLike) -> float:
     feedback : (2, 2) J_f K [1/s].
     """
     return float(np.max(np.linalg.eigvals(np.asarray(feedback)).real))
-
-
-def jacobian_feedback(*, W: ArrayLike, V_x: ArrayLike, s: ArrayLike, K: ArrayLike) -> Array:
-    """J_f K = W (I - Λ) V_x K of the present network [1/s], (2, 2).
-
-    Parameters
-    ----------
-    W : (2, n_h) output weights, force unit U.
-    V_x : (n_h, 2) d(V x_bar)/dx, with the scales of the input in it [s/m, s/rad].
-    s : (n_h,) hidden units.
-    K : (2, 2) of (6) for forces in U.
-    """
-    W, V_x, s, K = np.asarray(W), np.asarray(V_x), np.asarray(s), np.asarray(K)
-    feedback: Array = (W * (1.0 - s**2)) @ V_x @ K
-    return feedback
 
 
 # From a car and how hard it is driven to what a certificate must know: signals and disturbances.

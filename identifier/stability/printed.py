@@ -33,7 +33,6 @@ def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W
 
     Parameters
     ----------
-    pair : A_d, P and Q of A_dᵀ P + P A_d = -Q.
     W_M : bound on the ideal weights (Frobenius) [U].
     n_h : hidden units; |s| <= √n_h.
     eta_W : learning rate of (11).
@@ -128,7 +127,6 @@ def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
 
     Parameters
     ----------
-    pair : A_d, P and Q of A_dᵀ P + P A_d = -Q.
     w_bar : bound on the approximation error [U].
     k_b : of `printed_k_b`, `tight_k_b` or `k_b_with_V` [U].
     """
@@ -171,7 +169,6 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
 
     Parameters
     ----------
-    pair : A_d, P and Q of A_dᵀ P + P A_d = -Q.
     w_bar : bound on the approximation error [U].
     k_b : of `printed_k_b` or `tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
@@ -209,7 +206,6 @@ def printed_bounds(
     Parameters
     ----------
     gains : of (8) to (12), with leakage.
-    law : coefficients of z and ξ̃ in the driving error.
     trivial : bound of an identifier without a network [U s].
     """
     pair, tight_pair = best_pair(gains, operation), _tight_pair(gains, operation)

@@ -218,9 +218,7 @@ def output_layer(
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     direction : (2, 2) D [s].
-    n_h : hidden units.
     integrator : "euler", "rk4" or "exact".
     dt : sampling interval [s].
     """
@@ -247,7 +245,6 @@ def by_leakage(
     error : of `error_gains`.
     learning : of `output_layer`.
     A_d : (2, 2) error dynamics [1/s].
-    n_h : hidden units.
     """
 
     def around(X: float) -> tuple[float, float, float]:
@@ -285,7 +282,6 @@ def by_projection(
     ----------
     error : of `error_gains`.
     A_d : (2, 2) error dynamics [1/s].
-    n_h : hidden units.
     W_max : radius of the projection (Frobenius) [U].
     """
     forces = (math.sqrt(n_h) * W_max,) * len(error.weights)

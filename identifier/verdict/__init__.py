@@ -3,15 +3,13 @@
 from identifier.verdict.bands import calibrated, within_band
 from identifier.verdict.friction import Road, RoadFriction, road_friction
 from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
-from identifier.verdict.judging import judge, judge_prediction
-from identifier.verdict.online_bound import OnlineBound
+from identifier.verdict.judging import judge, judge_prediction, judge_taught
 from identifier.verdict.verdict import Number, Objection, Verdict, WindowForces
 
 __all__ = [
     "BoundViolatedError",
     "Number",
     "Objection",
-    "OnlineBound",
     "Road",
     "RoadFriction",
     "Verdict",
@@ -21,6 +19,7 @@ __all__ = [
     "guaranteed",
     "judge",
     "judge_prediction",
+    "judge_taught",
     "road_friction",
     "within_band",
 ]

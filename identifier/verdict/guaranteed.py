@@ -9,6 +9,8 @@ The bound that is estimated is `RESERVE` times the least one with which any curv
 and a little more: the quick part of errors, which means hide, has to find room in it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,9 +25,10 @@ from identifier.axle.guarantee import (
     possible_weights,
 )
 from identifier.axle.learning import Regression
+from identifier.axle.model import AxleModel
 from identifier.run import History
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict.motion import BRISK, FEWEST, WINDOW, Windows, impulse_signals
+from identifier.verdict.motion import FEWEST, WINDOW, Windows, brisk_from, impulse_signals
 from identifier.verdict.parts import asked_run
 from models.recordings import Recording
 
@@ -51,16 +54,13 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     model : frozen; its lag, sway and offsets make the slip.
     road : what a banked road pushes to the left at each sample [weights], (n,); None unknown.
     """
-    if recording.logged_v_y is None:
+    if recording.logged_v_y is None or not isinstance(model, AxleModel):
         return None
-    drives = recording.v_x >= least_speed(model)
+    drives = recording.v_x >= brisk_from(model)
     windows = Windows.where(drives, recording, WINDOW, OVERLAPPING)
     if len(windows) < FEWEST:
         return None
-    signals = model.signals_of(recording)
-    if signals is None:
-        return None
-    units, doubt = signals
+    units, doubt = model.signals_of(recording)
     g, slope = triangle(windows.n, recording.dt)
     impulse, sideways = impulse_signals(recording, model.vehicle, road)
 
@@ -78,11 +78,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
         v_x=mean(recording.v_x[:, None], g)[:, 0],
         t=recording.t[windows.starts],
     )
-
-
-def least_speed(model: TireModel) -> float:
-    """Return the speed [m/s] from which a moment counts."""
-    return max(model.min_speed, BRISK * model.vehicle.froude_speed)
 
 
 def triangle(n: int, dt: float) -> tuple[Array, Array]:
@@ -131,7 +126,7 @@ def guaranteed(
     told = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
     carries, box = run.model if model is None else model, history.design.possible_tires()
-    if box is None:
+    if box is None or not isinstance(carries, AxleModel):
         return carries
     strips = strips_of(run.model, run.portion.recording, run.road)
     if strips is not None and run.until is not None:
@@ -152,7 +147,7 @@ def guaranteed(
         speed=float(strips.v_x.mean()),
         fastest=fastest(strips),
     )
-    return carries.with_guarantee(guarantee)
+    return replace(carries, guarantee=guarantee)
 
 
 def fastest(strips: Strips) -> tuple[float, float]:

@@ -4,7 +4,7 @@ A drive that did not teach the model is the judge proper. Of its own drive the s
 that it counts there together with what the drive left undecided.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -12,11 +12,18 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
-from identifier.reproducibility import beyond_known, motion_error
+from identifier.reproducibility import beyond_known
 from identifier.run import History, state_index
 from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.verdict.friction import RoadFriction, road_friction
-from identifier.verdict.motion import FEWEST, WINDOW, Evidence, evidence, lateral_noise
+from identifier.verdict.motion import (
+    FEWEST,
+    WINDOW,
+    Evidence,
+    evidence,
+    lateral_noise,
+    motion_error,
+)
 from identifier.verdict.verdict import (
     MOST_MISSED,
     PERCENT,
@@ -99,13 +106,30 @@ def judge(history: History, t: float | None = None) -> Verdict:
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
-    asked = _asked(model, whole, own=True, frozen=state_index(whole, end))
-    if asked is None:
-        return _too_short(model)
     state = {} if history.design.whole else history.state_at(end)
     reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
+    return judge_taught(model, whole, state_index(whole, end), reached)
+
+
+def judge_taught(
+    model: TireModel,
+    recording: Recording,
+    frozen: int | None = None,
+    reached: Sequence[Reached] | None = None,
+) -> Verdict:
+    """Return the verdict on a model over the drive that taught it.
+
+    Parameters
+    ----------
+    frozen : samples that taught; None is all of them.
+    reached : numbers that rest at their bounds; None asks the model.
+    """
+    asked = _asked(model, recording, own=True, frozen=frozen)
+    if asked is None:
+        return _too_short(model)
+    bounds = model.at_bounds() if reached is None else reached
     notes = [Objection(code, None, text, False) for code, text in model.notes]
-    return _verdict(asked, [*_findings(asked), *map(_at_bound, reached), *notes], whole)
+    return _verdict(asked, [*_findings(asked), *map(_at_bound, bounds), *notes], recording)
 
 
 def judge_prediction(

@@ -248,10 +248,15 @@ def clean_share(missed: Array, force: Array, noise: Array) -> Array:
     return share
 
 
+def brisk_from(model: TireModel) -> float:
+    """Return the speed [m/s] from which a window counts."""
+    return max(model.min_speed, BRISK * model.vehicle.froude_speed)
+
+
 def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
     """Return what a model explains of a drive; None where too little of it is driven."""
     vehicle = model.vehicle
-    windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
+    windows = Windows.of(recording, brisk_from(model))
     if len(windows) < FEWEST:
         return None
     return Evidence(
@@ -260,3 +265,61 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
         modelled=modelled_force(model, recording, windows),
         noise=noise_variance(recording, vehicle, windows),
     )
+
+
+# A frozen model against measured motion, without true forces: the mean of (F_f + F_r)/m is the
+# lateral acceleration, that of (l_f F_f - l_r F_r)/I_z the yaw acceleration.
+
+MOMENT = 0.2  # s, over which both are meant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionError:
+    """What forces miss of the measured motion, root mean square of means over `MOMENT`.
+
+    The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
+    small the forces are right, where it is large they need not be wrong.
+
+    Parameters
+    ----------
+    lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
+    """
+
+    lateral: float
+    yaw: float
+    lateral_rms: float
+    yaw_rms: float
+
+    @property
+    def explained(self) -> tuple[float | None, float | None]:
+        """Share of the mean square of both that the forces explain; None where it stands still."""
+        pairs = (self.lateral, self.lateral_rms), (self.yaw, self.yaw_rms)
+        lateral, yaw = (1.0 - (e / size) ** 2 if size > 0.0 else None for e, size in pairs)
+        return lateral, yaw
+
+
+def motion_error(
+    force: Array, recording: Recording, vehicle: Vehicle, counted: NDArray[np.bool_]
+) -> MotionError | None:
+    """Return what axle forces miss of the measured motion; None where no window counts.
+
+    Parameters
+    ----------
+    force : lateral axle forces (n, 2) [N], frame of the body.
+    counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
+    """
+    windows = Windows.where(counted, recording, MOMENT, round(MOMENT / recording.dt))
+    if not len(windows):
+        return None
+    m, I_z, l_f, l_r = vehicle.bicycle[:4]
+    v_y = recording.logged_v_y
+    if v_y is None:
+        a_y = windows.mean(recording.needed("a_y"))
+    else:
+        a_y = windows.rate(v_y) + windows.mean(recording.v_x * recording.r)
+    r_dot = windows.rate(recording.r)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
+        F = windows.mean(force)
+        missed = a_y - F.sum(axis=1) / m, r_dot - (l_f * F[:, 0] - l_r * F[:, 1]) / I_z
+        lateral, yaw, *sizes = (float(np.sqrt(np.mean(s**2))) for s in (*missed, a_y, r_dot))
+    return MotionError(lateral=lateral, yaw=yaw, lateral_rms=sizes[0], yaw_rms=sizes[1])

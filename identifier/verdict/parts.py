@@ -72,21 +72,17 @@ _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 def road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
+    if history.design.needs_v_y == (asked.recording.logged_v_y is None):
+        return None  # it was learnt of another motion than that which is asked
     pushes = []
     for block in history.blocks(asked.samples):
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
         mine = asked.samples[first:last] - block.part.start
-        tell = history.design.beside_force if without_v_y(asked) else history.design.road_push
-        push = tell(block.state)
+        push = history.design.beside_force(block.state)
         if push is None:
             return None
         pushes.append(push[mine])
     return np.concatenate(pushes)
-
-
-def without_v_y(asked: Portion) -> bool:
-    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows."""
-    return asked.recording.logged_v_y is None
 
 
 def taught_elsewhere(

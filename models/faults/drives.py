@@ -32,11 +32,6 @@ class Misaligned:
     Parameters
     ----------
     angle : by which it is turned to the left [rad]: v_y reads v_y cos - v_x sin of it.
-
-    Raises
-    ------
-    FaultError
-        For an angle that is not finite.
     """
 
     angle: float
@@ -66,11 +61,6 @@ class SensorElsewhere:
     ----------
     sensor : one of `PLACED`.
     x, y : where it is from the center of gravity, ahead and to the left [m].
-
-    Raises
-    ------
-    FaultError
-        For an unknown sensor, or a place that is not finite.
     """
 
     sensor: str
@@ -115,11 +105,6 @@ class Bank:
     vehicle : the car that drives; its l_f and l_r are what is needed.
     angle : of the road across the car, largest [rad].
     period : of the crown [s], a cosine; infinite for a constant angle.
-
-    Raises
-    ------
-    FaultError
-        For an angle that is not finite, or a period that is not positive.
     """
 
     vehicle: Vehicle
@@ -187,11 +172,6 @@ class Passing:
     ----------
     until : time until which it is there in full [s], on the recording's clock.
     fade : how long it then takes to vanish, in a straight line [s].
-
-    Raises
-    ------
-    FaultError
-        For a time that is not finite, or a fade that is negative.
     """
 
     fault: Fault
@@ -234,11 +214,6 @@ class WrongNumber:
     Parameters
     ----------
     field : name of the number in `Vehicle`.
-
-    Raises
-    ------
-    FaultError
-        For a field that is no number of a vehicle, or a factor that is not positive.
     """
 
     field: str
@@ -279,11 +254,6 @@ class ShiftedCenter:
     Parameters
     ----------
     share : of the wheelbase, by which l_f is told too long; negative where too short [-].
-
-    Raises
-    ------
-    FaultError
-        For a share beyond a half.
     """
 
     share: float

@@ -83,11 +83,6 @@ class SensorFault:
     duration : how long it lasts [s]; infinite for ever.
     size : in the unit of the channel, or a factor; only for the kinds of `SIZED`.
     seed : of the noise of `apply`.
-
-    Raises
-    ------
-    FaultError
-        For an unknown kind, a time that is negative or not finite, or a size that is not finite.
     """
 
     channel: str
@@ -158,12 +153,6 @@ class SensorFault:
         Parameters
         ----------
         recording : the drive without it; the fault's times are on its clock.
-
-        Raises
-        ------
-        FaultError
-            Where the recording lacks the channel, or the fault shows no number, which no recording
-            can hold.
         """
         if self.kind == "lost":
             raise FaultError("a recording holds numbers only: a lost channel is `Held` in a log")
@@ -181,11 +170,6 @@ class WrongUnit:
     Parameters
     ----------
     unit : one of `UNITS`.
-
-    Raises
-    ------
-    FaultError
-        For an unknown unit.
     """
 
     channel: str
@@ -235,11 +219,6 @@ class Late:
     ----------
     channels : that come late; empty for all.
     delay : by this [s], between samples by straight lines.
-
-    Raises
-    ------
-    FaultError
-        For a delay that is not positive.
     """
 
     channels: tuple[str, ...]
@@ -266,11 +245,6 @@ class Lagging:
     ----------
     channels : that lag; empty for all.
     time_constant : of the low pass [s]; exact for straight lines between samples.
-
-    Raises
-    ------
-    FaultError
-        For a time constant that is not positive.
     """
 
     channels: tuple[str, ...]
@@ -298,11 +272,6 @@ class Held:
     channels : that are held; empty for all.
     every : time from one hold to the next [s].
     lasts : how long each is [s]; equal to `every` for a sensor that samples so slowly.
-
-    Raises
-    ------
-    FaultError
-        Unless 0 < lasts <= every.
     """
 
     channels: tuple[str, ...]
@@ -337,11 +306,6 @@ class Jitter:
     ----------
     size : longest time that a sample is old [s]; uniform from zero.
     channels : concerned; empty for all, which then are late together.
-
-    Raises
-    ------
-    FaultError
-        For a size that is not positive.
     """
 
     size: float
@@ -370,11 +334,6 @@ class ClockJump:
     ----------
     at : when [s], on the recording's clock.
     size : time that is missing [s]; negative where samples before are logged once more.
-
-    Raises
-    ------
-    FaultError
-        For a number that is not finite.
     """
 
     at: float
@@ -388,13 +347,7 @@ class ClockJump:
         return f"clock jumps by {self.size:g} s at {self.at:g} s"
 
     def apply(self, recording: Recording) -> Recording:
-        """Return the recording with the jump; it ends where the drive does, forces jump with it.
-
-        Raises
-        ------
-        FaultError
-            Where the recording does not hold that time.
-        """
+        """Return the recording with the jump; it ends where the drive does, forces jump with it."""
         t = recording.t
         if not t[0] <= self.at <= t[-1]:
             raise FaultError(f"at must be within {t[0]:g} to {t[-1]:g} s, it is {self.at}")

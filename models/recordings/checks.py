@@ -16,13 +16,19 @@ from models.bicycle import measured_slip
 from models.logs.log import RecordingError
 from models.recordings.evidence import (
     STRIDE,
+    WINDOW,
     Fit,
+    Means,
+    Pair,
     Steering,
-    Windows,
     correlation,
+    course_rate,
     least_squares,
     onset,
+    pair,
+    proportional,
     steering,
+    turning,
     windows,
 )
 from models.recordings.record import Recording, peak
@@ -30,8 +36,10 @@ from models.recordings.record import Recording, peak
 LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
 LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
 LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
+SURE_PAIR, NO_PAIR = 0.9, 0.3  # correlations of two channels that are of one bend, or of none
+COPY = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
+LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
 SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
-LONGEST_CERTAIN = 45.0  # [m]: effective wheelbase; a 1.5 m car in degrees reads 86
 LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
 DOCTOR = "tireid doctor LOG --vehicle FILE says what else may be wrong, and repairs it"
 LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
@@ -56,6 +64,9 @@ def physics_contradiction(recording: Recording) -> str | None:
     str | None
         One line about the first law that is broken, None where all hold.
     """
+    world = world_axes(recording)
+    if world is not None:
+        return world
     w = windows(recording)
     found = _check_peaks(recording)
     if found is not None or w.r.size * STRIDE < 2.0:
@@ -64,7 +75,7 @@ def physics_contradiction(recording: Recording) -> str | None:
     if found is not None:
         return found
     turn = steering(w)
-    found = _check_lateral_acceleration(w, turn) or _check_v_x_r(w)
+    found = _check_v_x_r(w) or _check_turns(w) or _check_lateral_acceleration(w)
     if turn is not None:
         found = found or _check_steering(recording, w, turn)
         found = found or _check_lateral_velocity(recording, w, turn)
@@ -122,19 +133,105 @@ def _check_signs_are_there(recording: Recording) -> str | None:
     return None
 
 
-def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None:
-    """Answer with a_y that is not v̇_y + v_x r; the two slopes and the steering tell who is wrong.
+def world_axes(recording: Recording) -> str | None:
+    """Return that v_x and v_y are of the world's axes, None where they are not.
+
+    The direction of the velocity of a car turns with the car in the world's axes; in its own it
+    does so, the other way, in a spin alone. Judged over 2 s of windows that turn.
+    """
+    found = course_rate(recording)
+    if found is None:
+        return None
+    course, r = found
+    turning = np.abs(r) > 0.2 * np.percentile(np.abs(r), 99)
+    course, r = course[turning], r[turning]
+    if r.size * WINDOW < 2.0 or not float(np.sqrt(np.mean(r**2))) > 0.01:
+        return None
+    slope = float(course @ r) / float(r @ r)
+    if not (abs(abs(slope) - 1.0) < 0.2 and abs(correlation(course, r)) > 0.9):
+        return None
+    return (
+        "vx and vy must be of the car's axes, their direction turns as the heading does, "
+        f"{slope:.3g} times as fast as r: they are of the world's axes (east and north, or north "
+        "and east); turn them by the heading, or give the pose, x, y and yaw"
+    )
+
+
+def _check_turns(w: Means) -> str | None:
+    """Answer with the one of r, steering and a_y that turns the other way than both others.
+
+    Of two alone nobody can tell which is wrong: they are named both.
+    """
+    turn, felt = w.v_x_r, w.a_y
+    steered = w.v_x**2 * w.delta
+    r_delta = pair(turn, steered, w.grips)
+    if felt is None:
+        return _check_two(r_delta)
+    rest = felt - w.r * (float(felt @ w.r) / max(float(w.r @ w.r), 1e-300))
+    if float(rest @ rest) < COPY**2 * float(felt @ felt):
+        return (
+            "ay must be an acceleration, it is r times a number: a copy of the yaw rate? "
+            "leave it out"
+        )
+    r_a, a_delta = pair(turn, felt), pair(felt, steered, w.grips)
+    dot, dot_error = _of_v_y(least_squares(_kinematics(w), felt), w)
+    against_v_y = dot_error < 0.6 and abs(dot) > dot_error
+    if r_a.sign < 0:
+        rho = r_a.correlation
+        law = f"ay must be v̇_y + v_x r (ISO axes), its correlation with v_x r is {rho:.2f}"
+        turned_r = r_delta.sign < 0 <= a_delta.sign
+        turned_a = a_delta.sign < 0 <= r_delta.sign
+        if against_v_y and turned_r == turned_a:
+            turned_r, turned_a = dot > 0.0, dot < 0.0
+        if turned_r:
+            return f"r contradicts ay: {law}; r must be positive to the left, change its sign"
+        if turned_a:
+            return f"{law}; change the sign of ay (positive to the left)"
+        return (
+            f"r and ay contradict one another: {law}; nobody can tell which, look at one left turn"
+        )
+    if r_delta.sign < 0 and a_delta.sign >= 0 and r_a.sign > 0:
+        return _check_two(r_delta)  # a_y says nothing of the steering
+    if (
+        abs(a_delta.correlation) > SURE_PAIR
+        and a_delta.sign
+        and max(abs(r_a.correlation), abs(r_delta.correlation)) < NO_PAIR
+    ):
+        return (
+            "r must be the yaw rate, it goes neither with ay nor with the steering (correlations "
+            f"{r_a.correlation:.2f} and {r_delta.correlation:.2f}), these two go together "
+            f"({a_delta.correlation:.2f}): another axis of the gyro, or one that is not connected?"
+        )
+    return _check_two(r_delta)
+
+
+def _check_two(r_delta: Pair) -> str | None:
+    """Answer with a steering angle that turns the other way than r."""
+    if r_delta.sign >= 0:
+        return None
+    return (
+        "delta_f must turn the car to the left (r > 0) when positive, its correlation with r is "
+        f"{r_delta.correlation:.2f}; change the sign of delta_f (or of r)"
+    )
+
+
+def _check_lateral_acceleration(w: Means) -> str | None:
+    """Answer with a_y that is not v̇_y + v_x r in size.
 
     Regressors: v_x r, v̇_y where v_y was measured, ṙ (a sensor off the center of gravity) and,
     where v_x r varies by half its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady
-    turn of 1.5 m/s^2, three times a usual bias. A slope is judged when it is four standard errors
-    outside its bound; too large a slope must also explain half of a_y, which vibration does not.
+    turn of 1.5 m/s^2, three times a usual bias; or as much of an a_y that goes with v_x r. A slope
+    is judged when it is four standard errors outside its bound; too large a slope must also explain
+    half of a_y, which vibration does not.
     """
     if w.a_y is None:
         return None
     X = _kinematics(w)
-    mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(w.v_x_r))
-    if spread >= max(0.3, 0.5 * mean):
+    some = turning(w.v_x_r, w.a_y)
+    moved, felt = w.v_x_r[some], w.a_y[some]
+    mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(moved))
+    alike = correlation(felt - np.mean(felt), moved - np.mean(moved)) > SURE_PAIR
+    if spread >= max(0.3, 0.5 * mean) or (alike and float(np.std(felt)) >= 0.3):
         X = np.column_stack([X, np.ones(w.r.size)])
     elif mean < 1.5:
         return None
@@ -142,13 +239,6 @@ def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None
     slope, error = fit.theta[0], 4.0 * fit.error[0]
     dot, dot_error = _of_v_y(fit, w)
     law = f"must be v̇_y + v_x r (ISO axes), its slope on v_x r is {slope:.3g} instead of 1"
-    if slope + error < 0.0:
-        r_is_wrong = turn is not None and turn.correlation < -0.5
-        if dot_error < 0.6 and abs(dot) > dot_error:
-            r_is_wrong = dot > 0.0
-        if r_is_wrong:
-            return f"r contradicts ay: ay {law}; r must be positive to the left, change its sign"
-        return f"ay {law}; change the sign of ay (positive to the left)"
     if slope + error < SLOPE[0] or (slope - error > SLOPE[1] and fit.r_squared > 0.5):
         return _blame(slope, law)
     if _turned(dot, dot_error, w) and slope - error > 0.0:
@@ -159,35 +249,49 @@ def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None
     return None
 
 
-def _kinematics(w: Windows) -> Array:
+def _kinematics(w: Means) -> Array:
     """Return v_x r, v̇_y where there is one, and ṙ (k, 2 or 3)."""
     return np.column_stack([one for one in (w.v_x_r, w.v_y_dot, w.r_dot) if one is not None])
 
 
-def _of_v_y(fit: Fit, w: Windows) -> tuple[float, float]:
+def _of_v_y(fit: Fit, w: Means) -> tuple[float, float]:
     """Return the slope on v̇_y and four standard errors of it: 1 ± infinity where there is none."""
     return (1.0, np.inf) if w.v_y_dot is None else (fit.theta[1], 4.0 * fit.error[1])
 
 
-def _turned(dot: float, dot_error: float, w: Windows) -> bool:
+def _turned(dot: float, dot_error: float, w: Means) -> bool:
     """Whether a slope on v̇_y is the -1 of a wrong sign, and v̇_y moves enough to say so."""
     moves = w.v_y_dot is not None and float(np.std(w.v_y_dot)) >= 0.003
     return moves and -2.5 < dot < -0.3 and dot + dot_error < 0.0
 
 
+# What a slope of a_y on v_x r says where it is the factor of a unit.
+BLAMED = {
+    1 / 57.3: "r must be in rad/s: ay {}; degrees per second? multiply r by pi/180",
+    1 / 9.81: "ay {}; ay in g? multiply it by 9.81",
+    1 / 3.6: "vx must be in m/s: ay {}; km/h? divide vx by 3.6",
+    1 / 2.237: "vx must be in m/s: ay {}; mph? divide vx by 2.237",
+    3.6: "vx must be in m/s: ay {}; m/s that were read as km/h? multiply vx by 3.6",
+    9.81: "ay {}; m/s^2 that were read as g? divide ay by 9.81",
+    57.3: "r must be in rad/s: ay {}; rad/s that were read as deg/s? multiply r by 180/pi",
+}
+
+
 def _blame(slope: float, law: str) -> str:
     """Name the column and unit whose factor lies nearest to the slope."""
-    for factor, text in {
-        1 / 57.3: f"r must be in rad/s: ay {law}; degrees per second? multiply r by pi/180",
-        1 / 9.81: f"ay {law}; ay in g? multiply it by 9.81",
-        1 / 3.6: f"vx must be in m/s: ay {law}; km/h? divide vx by 3.6",
-    }.items():
-        if factor / 1.5 < slope < factor * 1.5:
-            return text
+    if slope > 0.0:
+        factor = min(BLAMED, key=lambda one: abs(np.log(slope / one)))
+        if abs(np.log(slope / factor)) < np.log(1.3):
+            return BLAMED[factor].format(law)
+    elif abs(slope) < LACKS:
+        return (
+            f"ay {law}; it lacks the centripetal part (the change of a body's velocity, as some "
+            "simulators give?): add v_x r, or leave the column ay out"
+        )
     return f"ay {law}; check its axis, unit and time stamps, or leave the column ay out"
 
 
-def _check_v_x_r(w: Windows) -> str | None:
+def _check_v_x_r(w: Means) -> str | None:
     """Answer with a centripetal acceleration above 60 m/s^2 in 5 % of the moving windows."""
     largest = float(np.percentile(np.abs(w.v_x_r), 95))
     if largest > LARGEST_V_X_R:
@@ -198,7 +302,7 @@ def _check_v_x_r(w: Windows) -> str | None:
     return None
 
 
-def _check_steering(recording: Recording, w: Windows, turn: Steering) -> str | None:
+def _check_steering(recording: Recording, w: Means, turn: Steering) -> str | None:
     """Answer with steering that turns the wrong way or an effective wheelbase out of all cars.
 
     Upper bound 7.5 m + 0.03 v_x^2 (a bus, with three times a sedan's understeer) where small
@@ -207,23 +311,15 @@ def _check_steering(recording: Recording, w: Windows, turn: Steering) -> str | N
     """
     column = _larger_steering(recording)
     L = turn.wheelbase
-    if turn.correlation < -0.5:
-        return (
-            f"{column} must turn the car to the left (r > 0) when positive, its "
-            f"correlation with r is {turn.correlation:.2f}; change the sign of {column} (or of r)"
-        )
     if turn.correlation < 0.7:
         return None
     v = float(np.sqrt(np.mean(w.v_x**2)))
-    small = onset(w)
-    same = small is not None and small.correlation > 0.7 and small.wheelbase > 0.7 * L
-    plows = small is not None and small.correlation > 0.7 and small.wheelbase < 0.5 * L
     longest = 7.5 + 0.03 * v**2
-    too_long = longest < L and (same or (L > LONGEST_CERTAIN and not plows))
+    too_long = longest < L and proportional(w)
     if too_long:
         return (
             f"{column} must be in rad, the effective wheelbase v_x delta/r is "
-            f"{L:.4g} m, above {min(longest, L):.3g}; degrees? multiply {column} by pi/180"
+            f"{L:.4g} m, above {longest:.3g}; {_too_large(L, v)}"
         )
     shortest = min(max(0.015 * v, 0.03), 0.12)
     if shortest > L:
@@ -234,7 +330,16 @@ def _check_steering(recording: Recording, w: Windows, turn: Steering) -> str | N
     return None
 
 
-def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) -> str | None:
+def _too_large(L: float, v: float) -> str:
+    """Return which angle was taken for that of the road wheels, by the effective wheelbase."""
+    in_degrees = "degrees? multiply it by pi/180"
+    wheel = "the angle of the steering wheel? divide it by the steering ratio (12 to 20 in cars)"
+    shortest = 0.1 if v < 8.0 else 1.5
+    both = (in_degrees, wheel) if L * np.pi / 180.0 > shortest else (wheel, in_degrees)
+    return "; or ".join(both)
+
+
+def _check_lateral_velocity(recording: Recording, w: Means, turn: Steering) -> str | None:
     """Answer with a center of rotation behind the rear axle: its tires would push outward.
 
     v_y/r is the distance from the center of gravity back to where lateral velocity vanishes,
@@ -255,7 +360,7 @@ def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) ->
     return None
 
 
-def _check_forces(w: Windows, turn: Steering | None) -> str | None:
+def _check_forces(w: Means, turn: Steering | None) -> str | None:
     """Answer with axle forces that push against the acceleration, are swapped, or are in kN.
 
     Needs rms(v̇_y + v_x r) >= 0.3 m/s^2. Signs: correlation below -0.5. Unit: the mass that the
@@ -421,7 +526,7 @@ def _check_rises(alpha: Array, force: Array, column: str, other: str) -> str | N
     return None
 
 
-def _check_rear_rises(alpha: Array, w: Windows, l_r: float, other: str) -> str | None:
+def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | None:
     """Answer with a lateral acceleration that falls with the slip of the rear: by v_y or the car.
 
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.

@@ -17,10 +17,13 @@ from models.recordings.record import Recording
 WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
 STRIDE = 0.05  # [s], longer where a recording is: evenly over it, as many as of `LONG` samples
 SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
+TURNS = 0.2  # of what a channel reaches, beyond which the car turns
+ALIKE, BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
+LEAST = 0.1  # [m/s^2], rms, below which nothing turns
 TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
-class Windows(NamedTuple):
+class Means(NamedTuple):
     """Window means of the moving part of a recording, each of shape (k,).
 
     v_x [m/s], v_y [m/s], r [rad/s], delta_f and delta_r [rad]; v_y_dot [m/s^2] and r_dot [rad/s^2]
@@ -45,6 +48,13 @@ class Windows(NamedTuple):
         return self.delta_f - self.delta_r
 
     @property
+    def grips(self) -> NDArray[np.bool_]:
+        """Where the tail is not out, so that steering and turn go together, (k,)."""
+        if self.v_y is None:
+            return np.ones(self.r.size, dtype=np.bool_)
+        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > TAIL_OUT * self.v_x))
+
+    @property
     def acceleration(self) -> Array:
         """v̇_y + v_x r [m/s^2]; without a v_y what the accelerometer shows, or v_x r alone."""
         if self.v_y_dot is not None:
@@ -67,7 +77,19 @@ class Steering(NamedTuple):
     correlation: float
 
 
-def windows(recording: Recording) -> Windows:
+class Pair(NamedTuple):
+    """How two channels that follow the same bends go together.
+
+    correlation : from -1 to 1.   sign : 1 or -1 where that is beyond chance, else 0.   seconds : of
+    windows that turn.
+    """
+
+    correlation: float
+    sign: int
+    seconds: float
+
+
+def windows(recording: Recording) -> Means:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
     No window reaches from one stretch into the next.
@@ -91,7 +113,7 @@ def windows(recording: Recording) -> Windows:
         return slopes
 
     v_y, force = recording.logged_v_y, recording.axle_force
-    return Windows(
+    return Means(
         v_x=mean(recording.v_x),
         v_y=None if v_y is None else mean(v_y),
         r=mean(recording.r),
@@ -136,11 +158,82 @@ def correlation(a: Array, b: Array) -> float:
     return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)
 
 
-def steering(w: Windows) -> Steering | None:
+def turning(a: Array, b: Array) -> NDArray[np.bool_]:
+    """Return the windows where one of two measures is beyond a fifth of what it reaches, (k,).
+
+    So neither a long straight nor a channel that holds noise hides the other.
+
+    Parameters
+    ----------
+    a, b : of each window, in any unit (k,).
+    """
+    some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)
+    for one in (a, b):
+        some |= np.abs(one) > TURNS * np.percentile(np.abs(one), 99)
+    return some
+
+
+def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
+    """Return how two measures of the same bends go together, in the windows where either turns.
+
+    Parameters
+    ----------
+    a, b : of each window, in any unit (k,).
+    keep : windows that may count (k,).
+    """
+    some = turning(a, b)
+    if keep is not None:
+        some &= keep
+    seconds = float(np.count_nonzero(some)) * STRIDE
+    if seconds < 2.0:
+        return Pair(0.0, 0, seconds)
+    x, y = (_less_offset(one, some) for one in (a, b))
+    rho = correlation(x, y)
+    chance = rho**2 * max(seconds - 2.0, 0.5) / max(1.0 - rho**2, 1e-9)
+    sure = abs(rho) > ALIKE and chance > BEYOND_CHANCE
+    return Pair(rho, int(np.sign(rho)) if sure else 0, seconds)
+
+
+def _less_offset(signal: Array, some: NDArray[np.bool_]) -> Array:
+    """Return a signal where the car turns, less its offset where it goes to both sides."""
+    part = signal[some]
+    both = float(np.std(part)) >= 0.5 * abs(float(np.mean(part)))
+    less: Array = part - np.mean(part) if both else part
+    return less
+
+
+def course_rate(recording: Recording) -> tuple[Array, Array] | None:
+    """Return how fast the direction of (v_x, v_y) turns, and the yaw rate, [rad/s], (k,) each.
+
+    Over windows of 0.2 s one after the other; None without a v_y, or with less than 2 s.
+    """
+    v_y, dt = recording.logged_v_y, recording.dt
+    width = max(round(WINDOW / dt), 1)
+    n = len(recording) // width
+    if v_y is None or n * width * dt < 2.0:
+        return None
+    some = np.arange(n)[:: thinning(len(recording))] * width
+    some = some[some < (n - 1) * width]
+    some = some[recording.within_a_stretch(some, 2 * width - 1)]
+
+    def mean(signal: Array, at: NDArray[np.intp]) -> Array:
+        means: Array = np.mean([signal[at + k] for k in range(width)], axis=0)
+        return means
+
+    before, after = (mean(recording.v_x, at) + 1j * mean(v_y, at) for at in (some, some + width))
+    r = 0.5 * (mean(recording.r, some) + mean(recording.r, some + width))
+    speed = np.abs(before)
+    fast = speed > max(SLOWEST, 0.3 * float(np.percentile(speed, 95))) if speed.size else speed > 0
+    turned: Array = np.angle(after[fast] * np.conj(before[fast])) / (width * dt)
+    return (turned, r[fast]) if turned.size * WINDOW >= 2.0 else None
+
+
+def steering(w: Means) -> Steering | None:
     """Effective wheelbase sqrt(sum (v_x delta)^2 / sum r^2), or None when nothing turns.
 
     It is the wheelbase L of a neutral car; understeer adds K v_x^2. Samples with the tail out,
-    where a driver may countersteer, do not count. Needs 2 s of turning with rms(r) >= 0.05 rad/s.
+    where a driver may countersteer, do not count. Needs 2 s of turning, in which r and the steering
+    go together beyond chance.
 
     Parameters
     ----------
@@ -149,7 +242,28 @@ def steering(w: Windows) -> Steering | None:
     return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
 
 
-def onset(w: Windows) -> Steering | None:
+def proportional(w: Means) -> bool:
+    """Whether the car turns the more, the more it is steered: it does not slide over its front.
+
+    Large steering, beyond 0.7 of what is usual at most, is compared with 0.3 to 0.7 of that.
+
+    Parameters
+    ----------
+    w : window means.
+    """
+    size = np.abs(w.v_x * w.delta)
+    most = float(np.percentile(size, 95))
+    large, middle = size > 0.7 * most, (size > 0.3 * most) & (size <= 0.7 * most)
+    if min(np.count_nonzero(large), np.count_nonzero(middle)) * STRIDE < 0.5:
+        return False
+    steered, turned = (
+        float(np.sqrt(np.mean(one[large] ** 2) / max(np.mean(one[middle] ** 2), 1e-300)))
+        for one in (size, w.r)
+    )
+    return turned > 0.75 * steered
+
+
+def onset(w: Means) -> Steering | None:
     """Return the same from the windows with less than half the usual peak steering, or None.
 
     A car that slides over its front wheels reads long at large steering and normal here.
@@ -162,18 +276,24 @@ def onset(w: Windows) -> Steering | None:
     return _wheelbase(w, size < 0.5 * np.percentile(size, 95))
 
 
-def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
+def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     """Return the effective wheelbase over some of the windows, None without excitation."""
-    if w.v_y is not None:
-        tail_out = (w.v_y * w.r < 0.0) & (np.abs(w.v_y) > TAIL_OUT * w.v_x)
-        keep = keep & ~tail_out
-    r, kinematic = w.r[keep], (w.v_x * w.delta)[keep]
-    if r.size * STRIDE < 2.0 or not np.sqrt(np.mean(r**2)) >= 0.05:
+    keep = keep & w.grips
+    r, kinematic = w.r, w.v_x * w.delta
+    if not keep.any():
         return None
-    rr, dd = float(r @ r), float(kinematic @ kinematic)
-    if dd == 0.0:
+    together = pair(r[keep], kinematic[keep])
+    moving = max(float(np.sqrt(np.mean((w.v_x * r) ** 2))), _rms_of(w.a_y))
+    if together.sign == 0 or moving < LEAST:
         return None
-    return Steering(float(np.sqrt(dd / rr)), correlation(r, kinematic))
+    r, kinematic = r[keep], kinematic[keep]
+    some = turning(r, kinematic)
+    x, y = (_less_offset(one, some) for one in (r, kinematic))
+    return Steering(float(np.sqrt((y @ y) / (x @ x))), together.correlation)
+
+
+def _rms_of(a: Array | None) -> float:
+    return 0.0 if a is None else float(np.std(a))
 
 
 def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:

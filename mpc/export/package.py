@@ -10,19 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen import package as packaging
 from codegen.arrays import Array
-from codegen.package import (
-    about_package,
-    c_files,
-    check_name,
-    cmake,
-    content_head,
-    generated,
-    header,
-    manifest_text,
-    plain,
-    rows,
-)
+from codegen.package import rows
 from codegen.template import Values, Words, filled
 from identifier.frozen import vehicle_numbers
 from mpc.prediction import build_stage, state_size
@@ -33,19 +23,12 @@ from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import PredictionTire
 from mpc.tires.tire import ALL
 
-# The parameters of a tracker as C and as JSON, in the order of the structure.
-
 Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
 
 
 def initializers(params: Params) -> str:
-    """Return the members of the C structure, one a line with its name.
-
-    Parameters
-    ----------
-    params : of `mpc.realtime.instance.params_type`, in double.
-    """
+    """Return the members of the C structure, one a line with its name."""
     return "".join(
         f"    /* {name} */ {MACROS.get(name) or _initializer(params[name])},\n"
         for name in params.dtype.names or ()
@@ -53,12 +36,7 @@ def initializers(params: Params) -> str:
 
 
 def plain_params(params: Params) -> dict[str, Any]:
-    """Return the numbers by name, ready for JSON.
-
-    Parameters
-    ----------
-    params : of `mpc.realtime.instance.params_type`, in double.
-    """
+    """Return the numbers by name, ready for JSON."""
     return {name: params[name].tolist() for name in params.dtype.names or ()}
 
 
@@ -69,8 +47,6 @@ def _initializer(value: NDArray[Any]) -> str:
         return f"{int(value)}U"
     return f"R({float(value)!r})"
 
-
-# The self-test of a package: a closed-loop record, and what Python's tracker steered in it.
 
 STEPS = 200
 SPEED = 20.0  # m/s
@@ -102,13 +78,7 @@ class Vectors(NamedTuple):
     stride: int
 
     def measurement(self, k: int, horizon: int) -> Measurement:
-        """Return what the tracker is told at a step.
-
-        Parameters
-        ----------
-        k : number of the step.
-        horizon : number of stages.
-        """
+        """Return what the tracker is told at a step."""
         rows = np.append(k, k + self.offset + self.stride * np.arange(horizon))
         e_y, e_psi, v_y, r = map(float, self.measured[k])
         kappa, v_x = self.road[rows].T
@@ -121,8 +91,6 @@ def record(tracker: Tracker, steps: int = STEPS) -> Vectors:
     Numbers are rounded, and the car is computed without a function of a library: the record does
     not depend on the machine.
 
-    Parameters
-    ----------
     tracker : in double; it is reset before, and steers.
     """
     tracker.reset()
@@ -176,8 +144,7 @@ def _road(n: int, period: float) -> Array:
 
 
 def vectors_header(name: str, found: Vectors) -> str:
-    """Return the vectors as a C header."""
-    return header(
+    return packaging.header(
         f"{name}_vectors.h",
         "Generated. Measurements e_y, e_psi, v_y, r; steering [rad] and status that follow; "
         "curvature\nand speed each period: row k now, k + offset + stride j in stage j. SI.",
@@ -213,7 +180,7 @@ class MpcPackage(NamedTuple):
     """A package before it is written.
 
     name : prefix of every symbol.   tire : of the prediction.   problem : what is minimized.
-    params : the numbers that it begins with, of `mpc.realtime.instance.params_type`.
+    params : the numbers that it begins with, of `mpc.realtime.instance.c_types`.
     files : texts by path.   vectors : of the self-test.   about : title, version, hash, as text.
     """
 
@@ -238,21 +205,11 @@ def build_mpc_package(
 ) -> MpcPackage:
     """Return the package of a tracker; the same input gives the same bytes.
 
-    Parameters
-    ----------
-    period : between two steps [s].
-    delay : from a measurement until its command acts [s].
+    period : between two steps [s].   delay : from a measurement until its command acts [s].
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.
-
-    Raises
-    ------
-    PackageNameError
-        Where the name is not one of C in lower case.
-    NoCompilerError
-        Where there is no C compiler, which the self-test is computed with.
     """
-    check_name(name, "_mpc")
+    packaging.check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
     params: Params = tracker.params
     content = _ingredients(tracker, params, name, single=single)
@@ -262,22 +219,18 @@ def build_mpc_package(
     )
     vectors = record(tracker)
     files |= {
-        **c_files(C, PLACES, {PREFIX: name}),
+        **packaging.c_files(C, PLACES, {PREFIX: name}),
         f"src/{name}_tables.h": _tables(name, params, about),
         f"tests/{name}_vectors.h": vectors_header(name, vectors),
     }
-    files |= cmake(files, about, flags=FLAGS, so_that="loops over all rows in vector registers")
-    files |= {f"{name}.json": manifest_text(content, files)}
+    files |= packaging.cmake(
+        files, about, flags=FLAGS, so_that="loops over all rows in vector registers"
+    )
+    files |= {f"{name}.json": packaging.manifest_text(content, files)}
     return MpcPackage(name, tire, tracker.problem, params, files, vectors, about)
 
 
 def mpc_readme(package: MpcPackage, about_figures: str) -> str:
-    """Return the README of a package.
-
-    Parameters
-    ----------
-    about_figures : what it costs, as Markdown.
-    """
     p = plain_params(package.params)
     rows = "".join(
         f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD
@@ -313,13 +266,13 @@ def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -
         else {"text": repr(structure)}
     )
     return {
-        **content_head(FORMAT, name, single=single),
-        "tire": {"kind": type(structure).__name__, **plain(numbers)},
-        "vehicle": plain(vehicle_numbers(tire.vehicle)),
-        "problem": plain(asdict(problem)),
+        **packaging.content_head(FORMAT, name, single=single),
+        "tire": {"kind": type(structure).__name__, **packaging.plain(numbers)},
+        "vehicle": packaging.plain(vehicle_numbers(tire.vehicle)),
+        "problem": packaging.plain(asdict(problem)),
         "period_s": tracker.period,
         "delay_s": tracker.delay,
-        "params": plain(plain_params(params)),
+        "params": packaging.plain(plain_params(params)),
         "statuses": {status.name: int(status) for status in Status},
     }
 
@@ -327,7 +280,7 @@ def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -
 def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Words]:
     times = tracker.times
     return {
-        **about_package(content, f"Path tracking of the car {tracker.tire.vehicle.name}"),
+        **packaging.about_package(content, f"Path tracking of the car {tracker.tire.vehicle.name}"),
         "tire": content["tire"]["kind"],
         "horizon": str(tracker.problem.horizon),
         "dt": f"{tracker.problem.dt:g}",
@@ -339,9 +292,9 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
 
 def _tables(name: str, params: Params, about: Values) -> str:
     """Return the numbers of the export as C."""
-    return header(
+    return packaging.header(
         f"{name}_tables.h",
-        f"The numbers of the export.\n\n{generated(about)}",
+        f"The numbers of the export.\n\n{packaging.generated(about)}",
         [
             f'#include "{name}.h"\n',
             f"#define R(x) (({name}_real)(x))\n",

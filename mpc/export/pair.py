@@ -20,8 +20,6 @@ from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import prediction_tire
 
-# C that turns what an identifier has learnt into the weights of the prediction.
-
 C = Path(__file__).parent / "pair"
 HANDOVER: Mapping[str, str] = {"tireid_handover.h": "include", "tireid_handover.c": "src"}
 EXAMPLES: Mapping[str, str] = dict.fromkeys(
@@ -35,13 +33,7 @@ class NoHandoverError(TireidError, ValueError):
 
 
 def frozen_start(package: Package) -> TireModel:
-    """Return the model that an exported identifier begins with.
-
-    Raises
-    ------
-    NoHandoverError
-        Where the method learns neither a network nor axle curves, or the car has downforce.
-    """
+    """Return the model that an exported identifier begins with."""
     specialized = package.specialized
     if specialized.vehicle.has_downforce:
         raise NoHandoverError(
@@ -61,14 +53,7 @@ def frozen_start(package: Package) -> TireModel:
 def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
     """Return header and source by path.
 
-    Parameters
-    ----------
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
-
-    Raises
-    ------
-    NoHandoverError
-        Where the method learns neither a network nor axle curves.
     """
     specialized, model = identifier.specialized, frozen_start(identifier)
     name = specialized.name
@@ -152,19 +137,10 @@ def build_pair(
 ) -> Pair:
     """Return the tracker that goes with an identifier, one step a sample, and what joins them.
 
-    Parameters
-    ----------
     identifier : package of the identifier; its weights are the tire that is begun with.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.
     caution : of the tracker, from 0 to 1; a number of the parameters.
-
-    Raises
-    ------
-    NoHandoverError
-        Where the method learns neither a network nor axle curves.
-    NoCompilerError
-        Where there is no C compiler.
     """
     specialized = identifier.specialized
     tracker = build_mpc_package(

@@ -38,10 +38,7 @@ def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SL
     Its forces are finite, push against the slip of their axle, rise from zero slip, and lie between
     those of ice and a grip that no road tire has; straight ahead and in bends of g/3.
 
-    Parameters
-    ----------
-    v_x : speed [m/s].
-    largest : slip up to which it is judged [rad].
+    v_x : speed [m/s].   largest : slip up to which it is judged [rad].
     """
     if not np.isfinite(tire.weights).all():
         return "a weight is not finite"

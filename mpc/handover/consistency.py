@@ -12,46 +12,11 @@ seen after 1.7/l. A channel that is stuck, flipped, scaled or noisy breaks the s
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from models.rules import require_positive_fields
 from models.sensors import LARGEST_SHOWN, is_shown
-
-
-class FullSample(Protocol):
-    """What is read of a measurement, SI: `mpc.loop.sensing.Measured` is one."""
-
-    @property
-    def X(self) -> float:
-        """Position [m]."""
-
-    @property
-    def Y(self) -> float:
-        """Position [m]."""
-
-    @property
-    def psi(self) -> float:
-        """Heading [rad]."""
-
-    @property
-    def v_x(self) -> float:
-        """Longitudinal speed [m/s]."""
-
-    @property
-    def v_y(self) -> float:
-        """Lateral velocity [m/s]."""
-
-    @property
-    def r(self) -> float:
-        """Yaw rate [rad/s]."""
-
-    @property
-    def delta(self) -> float:
-        """Angle of the front road wheels [rad]."""
-
-    @property
-    def a_y(self) -> float:
-        """Lateral acceleration [m/s²]."""
+from mpc.loop.sensing import Measured
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +62,6 @@ class Residual(NamedTuple):
     share: float
 
     def __str__(self) -> str:
-        """Return it in words."""
         return f"{self.relation} disagree by {self.value:.2g} {self.unit}"
 
 
@@ -128,13 +92,11 @@ class Consistency:
         self._means: tuple[float, ...] = (0.0,) * 6
         self._last_asked = 0.0
 
-    def observe(self, measured: FullSample, asked: float | None = None) -> bool:
+    def observe(self, measured: Measured, asked: float | None = None) -> bool:
         """Take a sample; return whether the sensors agree.
 
-        Parameters
-        ----------
         asked : angle asked of the wheels that should have been reached by now [rad]; None where it
-            is not known.
+        is not known.
         """
         self.worst = self._judged(measured, asked)
         calm, relapse = self._allowed.calm, self._allowed.relapse
@@ -149,7 +111,7 @@ class Consistency:
         self.agrees = self._calm >= self._calm_asked
         return self.agrees
 
-    def _judged(self, m: FullSample, asked: float | None) -> Residual:
+    def _judged(self, m: Measured, asked: float | None) -> Residual:
         allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
         if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST_SHOWN):
             self._begin()

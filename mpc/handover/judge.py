@@ -24,8 +24,6 @@ from models.vehicle import GRAVITY
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
 
-# The last seconds of a drive: what models are judged on.
-
 COLUMNS = ("v_x", "v_y", "r", "delta")  # m/s, m/s, rad/s, rad
 
 
@@ -36,11 +34,6 @@ class Window:
     ----------
     seconds : longest time that can be looked back on [s].
     dt : sampling interval [s].
-
-    Raises
-    ------
-    ValueError
-        Where there is not room for two samples.
     """
 
     def __init__(self, seconds: float, dt: float) -> None:
@@ -54,12 +47,6 @@ class Window:
         self._kept = 0
 
     def add(self, sample: Sequence[float]) -> None:
-        """Take a sample.
-
-        Parameters
-        ----------
-        sample : in the order of `COLUMNS`.
-        """
         if self._end == len(self._rows):
             self._rows[: self._n] = self._rows[-self._n :]
             self._end = self._n
@@ -79,8 +66,6 @@ class Window:
     def last(self, seconds: float) -> Array:
         """Return the last samples (n, 4), a view; all of them where there are fewer.
 
-        Parameters
-        ----------
         seconds : time to look back [s].
         """
         n = min(round(seconds / self.dt), self._kept)
@@ -91,20 +76,14 @@ class Window:
         self._kept = 0
 
 
-# The axle forces that prediction tires tell from measured motion, sample by sample.
-
 SHORTEST_LAG = 1e-3  # m
 
 
 def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float) -> Array:
     """Return the axle forces (k, n, 2) [N] of k tires, frame of the body; a lag begins settled.
 
-    Parameters
-    ----------
-    tire : structure and car; its weights are not read.
-    weights : of k tires (k, n_weights).
-    samples : rows of `window.COLUMNS`, (n, 4).
-    dt : sampling interval [s].
+    tire : structure and car; its weights are not read.   weights : of k tires (k, n_weights).
+    samples : rows of `window.COLUMNS`, (n, 4).   dt : sampling interval [s].
     """
     k = len(weights)
     run = axle_scan(cast(Hashable, tire.structure), k)(
@@ -123,12 +102,7 @@ def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float)
 
 @cache
 def axle_scan(structure: Any, k: int) -> Scan:
-    """Return the compiled loop: slip, its lag held exactly over a sample, force of k tires.
-
-    Parameters
-    ----------
-    k : number of tires.
-    """
+    """Return the compiled loop: slip, its lag held exactly over a sample, force of k tires."""
     lagged, begun = ca.SX.sym("lagged", 2, k), ca.SX.sym("begun")
     sample, dt = ca.SX.sym("sample", len(COLUMNS)), ca.SX.sym("dt")
     car, w = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights, k)
@@ -203,11 +177,6 @@ class Judge:
     ----------
     dt : sampling interval [s].
     expected : errors of a good tire; None takes the default.
-
-    Raises
-    ------
-    ValueError
-        Where a stretch has no three samples.
     """
 
     def __init__(self, dt: float, expected: ErrorModel | None = None) -> None:
@@ -224,8 +193,6 @@ class Judge:
     def lookback(self, seconds: float) -> float:
         """Return how far back samples must go to judge the last seconds [s].
 
-        Parameters
-        ----------
         seconds : in which the judged stretches end [s].
         """
         return seconds + (self._settle + self._h + 1) * self.dt
@@ -233,40 +200,19 @@ class Judge:
     def errors(self, tire: PredictionTire, samples: Array) -> tuple[Array, Array]:
         """Return e (m, 2) and the forces that it is the error of (m, 2) [static axle loads].
 
-        Parameters
-        ----------
         samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
-
-        Raises
-        ------
-        ValueError
-            Where there are too few samples.
         """
         e, force = self._errors(tire, tire.weights[None], samples)
         return e[0], force[0]
 
     def chi_square(self, tire: PredictionTire, samples: Array) -> ChiSquare:
-        """Return how badly a tire explains samples.
-
-        Raises
-        ------
-        ValueError
-            Where there are too few samples.
-        """
+        """Return how badly a tire explains samples."""
         return self.chi_squares(tire, tire.weights[None], samples)[0]
 
     def chi_squares(self, tire: PredictionTire, weights: Array, samples: Array) -> list[ChiSquare]:
         """Return how badly k tires explain samples.
 
-        Parameters
-        ----------
-        tire : structure and car; its weights are not read.
-        weights : of k tires (k, n_weights).
-
-        Raises
-        ------
-        ValueError
-            Where there are too few samples.
+        tire : structure and car; its weights are not read.   weights : of k tires (k, n_weights).
         """
         e, force = self._errors(tire, weights, samples)
         expected = self.expected

@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpc.handover.consistency import Consistency, FullSample
+from mpc.handover.consistency import Consistency
 from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
+from mpc.loop.sensing import Measured
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
-
-# Moving weights to new ones so gently that the plan does not jump.
 
 HALVINGS = 6
 
@@ -43,16 +42,9 @@ def blended(
     The share is halved until the tracker, asked what it would plan with the weights in the same
     situation, answers within the bound; where no share of the way is small enough, weights stay.
 
-    Parameters
-    ----------
     share : of the way that is left, to go at most [-], in (0, 1].
     planned : first steering rate of the plan that a tire leads to, in one situation [rad/s].
     most : change of it that is allowed [rad/s].
-
-    Raises
-    ------
-    ValueError
-        Where the structures differ.
     """
     if now.structure != target.structure:
         raise ValueError(f"weights of {now.structure} cannot move to those of {target.structure}")
@@ -105,11 +97,9 @@ class Learner:
         self._left = 0.0  # time in which to arrive [s]
         self._quick = False
 
-    def observe(self, measured: FullSample, tracker: Tracker) -> str | None:
+    def observe(self, measured: Measured, tracker: Tracker) -> str | None:
         """Take a sample before the tracker steps; return what was decided, where that matters.
 
-        Parameters
-        ----------
         tracker : which steers; its tire is moved.
         """
         agree = self._sensors.observe(measured, self._asked(tracker))

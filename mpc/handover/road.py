@@ -37,14 +37,7 @@ class FrictionFit(NamedTuple):
 def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     """Return a tire where the friction is another.
 
-    Parameters
-    ----------
     ratio : friction over the one that the tire has [-].
-
-    Raises
-    ------
-    ValueError
-        Where the tire's structure has no such weights, or the ratio is not positive.
     """
     if not 0.0 < ratio < math.inf:
         raise ValueError(f"ratio must be positive, it is {ratio}")
@@ -71,16 +64,9 @@ def fit_friction(
 ) -> FrictionFit:
     """Return the friction that explains samples best, and what is known of roads beforehand.
 
-    Parameters
-    ----------
     known : friction over that of the tire that was taken so far [-].
     between : least and largest friction over that of the tire that is looked for [-].
     scale : of chi-squares: they are that many times as large as expected even of a good tire [-].
-
-    Raises
-    ------
-    ValueError
-        Where the tire cannot be told for another friction.
     """
     center, (least, most) = math.log(known), np.log(between)
 
@@ -131,7 +117,6 @@ class Change(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """In words."""
         return (
             f"{self.road.ratio:.2f} of the friction learnt on: chi-square {self.before:.0f} -> "
             f"{self.after:.0f}"
@@ -156,8 +141,6 @@ def look_at_road(
     lasts. Above the friction that the base was learnt on, a new number would be extrapolation:
     that is left to learning.
 
-    Parameters
-    ----------
     t : time [s].
     baseline : mean chi-square of the tire in use where the road does not change [-].
     trusted : slip up to which a tire must be one [rad].

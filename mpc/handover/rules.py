@@ -86,5 +86,4 @@ class Decision(NamedTuple):
     friction: float = 1.0
 
     def __str__(self) -> str:
-        """Return one line."""
         return f"{self.t:.2f} s: {self.verdict.value}, {self.reason}"

@@ -16,8 +16,6 @@ from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
 
-# Has the car been driven so that there was something to learn, and where was it learnt?
-
 LEARNS = 0.005  # rad: below, a tire is a straight line in noise
 BEYOND = 1.2  # slip that is trusted over the largest one that was learnt from
 
@@ -39,12 +37,8 @@ class Excitation:
     def add(self, v_x: float, v_y: float, r: float, delta: float) -> None:
         """Take a sample.
 
-        Parameters
-        ----------
-        v_x : longitudinal speed [m/s], positive.
-        v_y : lateral velocity [m/s].
-        r : yaw rate [rad/s].
-        delta : angle of the front road wheels [rad].
+        v_x : longitudinal speed [m/s], positive.   v_y : lateral velocity [m/s].
+        r : yaw rate [rad/s].   delta : angle of the front road wheels [rad].
         """
         size = np.abs(slips(np.array([[v_x, v_y, r, delta]]), self._vehicle))[0]
         self._time += self._dt * (size >= LEARNS)
@@ -53,10 +47,8 @@ class Excitation:
     def complaint(self, model: TireModel, samples: Array) -> str | None:
         """Return why a model is not known well enough where the car is driven, or None.
 
-        Parameters
-        ----------
-        model : the candidate. One of axles knows where it was learnt; of any other it is taken
-            to be known as far as the car slipped.
+        model : the candidate. One of axles knows where it was learnt; of any other it is taken to
+        be known as far as the car slipped.
         samples : rows of v_x, v_y, r, δ_f: where it must be known, (n, 4 or more).
         """
         for axle, time in zip(("front", "rear"), self._time, strict=True):
@@ -85,8 +77,6 @@ class Excitation:
 def slips(samples: Array, vehicle: Vehicle) -> Array:
     """Return kinematic slip angles (n, 2) [rad], paper's sign.
 
-    Parameters
-    ----------
     samples : rows of v_x (positive), v_y [m/s], r [rad/s], δ_f [rad], (n, 4 or more).
     """
     v_x, v_y, r, delta = samples[:, :4].T
@@ -111,11 +101,6 @@ class Supervisor:
     judge : of chi-squares; None expects the usual errors.
     proven : whether that tire is one of this car, so that what it does not explain is the road;
         else a friction is looked for only after a learnt tire took over.
-
-    Raises
-    ------
-    ValueError
-        Where a law does not have its certificate.
     """
 
     def __init__(
@@ -173,11 +158,7 @@ class Supervisor:
         what was learnt go back to what they were before its cause can have been at work. An
         identifier that is stale is a fault by itself.
 
-        Parameters
-        ----------
-        v_x : longitudinal speed [m/s].
-        v_y : lateral velocity [m/s].
-        r : yaw rate [rad/s].
+        v_x : longitudinal speed [m/s].   v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
         delta : angle of the front road wheels [rad].
         fault : why the sensors are not to be believed, in words; None where they are.
         """
@@ -282,7 +263,6 @@ class Supervisor:
         return self._learnt(moments, now, v_x)
 
     def _learnt(self, moments: Array, now: ChiSquare, v_x: float) -> Decision:
-        """Return a decision on what the identifier has learnt."""
         rules, judge = self.rules, self.judge
         seconds = min(rules.seconds, self.t - self._road.changed_at)
         samples = self._window.last(judge.lookback(seconds))

@@ -34,11 +34,6 @@ class Dither:
     grip : largest lateral acceleration of the car [m/s²].
     need : how much is unknown now, 0 to 1; None teaches a log, with full strength.
     strength : g now [-].
-
-    Raises
-    ------
-    ValueError
-        Where amplitude or grip are not positive.
     """
 
     vehicle: Vehicle
@@ -53,8 +48,6 @@ class Dither:
     def displacement(self, t: Array) -> tuple[Array, Array, Array]:
         """Return d [m], its rate [m/s] and acceleration [m/s²] at full strength, (k,) each.
 
-        Parameters
-        ----------
         t : times [s], (k,).
         """
         omega = 2.0 * math.pi * FREQUENCY / self.vehicle.froude_time
@@ -75,10 +68,7 @@ class Dither:
     def displaced(self, told: Measurement, t: float, times: Array, period: float) -> Measurement:
         """Return what the tracker is told in place of a measurement.
 
-        Parameters
-        ----------
-        t : now [s].
-        times : after which the road ahead is told [s], (k,).
+        t : now [s].   times : after which the road ahead is told [s], (k,).
         period : since the last one [s].
         """
         bends = float(np.abs(told.kappa * told.v_x**2).max())

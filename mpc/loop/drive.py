@@ -21,8 +21,6 @@ from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Measurement
 
-# What the loop asks of a tracker, whatever solves its problem.
-
 
 class PathTracker(Protocol):
     """Steers a car along a path, one control period at a time; `mpc.realtime.Tracker` is one."""
@@ -86,28 +84,18 @@ def drive(
 ) -> Drive:
     """Drive a car along a path.
 
-    Parameters
-    ----------
-    path : to follow, from s = 0.
-    tracker : which steers; it is reset.
+    path : to follow, from s = 0.   tracker : which steers; it is reset.
     speed : wanted along the path, [m/s] where it is a number.
     sensors : of the car; None measures exactly.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-        they show.
-    dither : weaves along the path to teach; None keeps to it.
+    they show.   dither : weaves along the path to teach; None keeps to it.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
     widest : deviation at which the car has left the path [m].
     blind : longest time without a number of a position, heading or speed [s]: until then the car
-        goes on by dead reckoning, then the drive ends.
+    goes on by dead reckoning, then the drive ends.
     plan_every : periods between two plans that are kept; 0 keeps none.
     name : of the drive; None takes that of the path.
-    progress : called with the share of the way at every period.
-
-    Raises
-    ------
-    ValueError
-        Where the tracker's period is not the car's, a delay is negative, or blind is not positive.
     """
     if abs(car.period - tracker.period) > 1e-9:
         raise ValueError(f"the car steps {car.period} s, the tracker {tracker.period} s")
@@ -191,8 +179,6 @@ class Place(NamedTuple):
     def just_lost(self, dt: float) -> tuple[str, ...]:
         """Return the guides that show no number since this sample.
 
-        Parameters
-        ----------
         dt : period [s].
         """
         pairs = zip(GUIDES, self.silent, strict=True)
@@ -201,8 +187,6 @@ class Place(NamedTuple):
     def complaint(self, blind: float) -> str:
         """Return which guide has been silent for too long, or nothing.
 
-        Parameters
-        ----------
         blind : longest time [s].
         """
         pairs = zip(GUIDES, self.silent, strict=True)

@@ -54,8 +54,6 @@ class TellsLateral(Protocol):
     def tell(self, measured: Measured) -> Told:
         """Take a sample; return what it tells.
 
-        Parameters
-        ----------
         measured : by the sensors; v_y is not read.
         """
 
@@ -101,11 +99,6 @@ class LateralVelocity:
     identifier : of a method that tells v_y; it is told every sample here, and learns.
     localization : how far position and heading are trusted; None takes the default.
     body : how it rolls; None takes what the chassis of the identifier's vehicle tells.
-
-    Raises
-    ------
-    ValueError
-        Where the method does not tell v_y.
     """
 
     def __init__(
@@ -131,8 +124,6 @@ class LateralVelocity:
     def tell(self, measured: Measured) -> Told:
         """Take a sample; return what it tells.
 
-        Parameters
-        ----------
         measured : by the sensors; v_y is not read.
         """
         m, identifier, dt = measured, self.identifier, self._dt

@@ -99,11 +99,6 @@ class Drive:
         """Return what an identifier would read of it: measured signals, axle forces as truth.
 
         Where nothing measures v_y, it is what was told, and marked as that: no method is shown it.
-
-        Raises
-        ------
-        RecordingError
-            Where the drive is too short to be one.
         """
         return Recording(
             name=self.name,
@@ -119,9 +114,8 @@ class Drive:
         )
 
 
-# Collecting a drive, period by period.
-
-OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta")
+OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "axle_force")
+OTHERS = ("s", "e_y", "e_psi", "kappa", "v_ref", "command", "solve_time", "status")
 
 
 class Recorder:
@@ -144,8 +138,6 @@ class Recorder:
     def note(self, t: float, text: str | None) -> None:
         """Keep what the learner said.
 
-        Parameters
-        ----------
         t : time [s].
         """
         if text:
@@ -159,8 +151,6 @@ class Recorder:
     def plan(self, command: Command, s: Array) -> None:
         """Keep the plan of this period.
 
-        Parameters
-        ----------
         s : where the states of the plan lie along the path [m], (N + 1,).
         """
         plan = Plan(len(self._cars), s, command.plan_x.copy(), command.plan_u.copy())
@@ -177,10 +167,7 @@ class Recorder:
     ) -> None:
         """Keep a period.
 
-        Parameters
-        ----------
         v_ref : wanted speed [m/s].
-        told : of v_y, where nothing measures it.
         """
         if told is not None:
             self._told.append(told)
@@ -204,14 +191,8 @@ class Recorder:
         completed: bool,
         ending: str,
     ) -> Drive:
-        """Return the drive.
-
-        Parameters
-        ----------
-        period : control period [s].
-        completed : whether the car reached the end on the path and without spinning.
-        """
-        s, e_y, e_psi, kappa, v_ref, steering, solve_time, status = np.array(self._others).T
+        """Return the drive; its control period is told in s."""
+        others = dict(zip(OTHERS, np.array(self._others).T, strict=True))
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
         told: dict[str, Array] = {}
         if self._told:
@@ -223,17 +204,10 @@ class Recorder:
             path=path,
             period=period,
             **{key: np.array([getattr(car, key) for car in self._cars]) for key in OF_THE_CAR},
-            axle_force=np.array([car.axle_force for car in self._cars]),
-            s=s,
-            e_y=e_y,
-            e_psi=e_psi,
-            kappa=kappa,
-            v_ref=v_ref,
-            command=steering,
+            status=others.pop("status").astype(np.int64),
+            **others,
             measured=measured,
             told=told,
-            status=status.astype(np.int64),
-            solve_time=solve_time,
             plans=tuple(self._plans),
             notes=tuple(self._notes),
             completed=completed,
@@ -241,22 +215,20 @@ class Recorder:
         )
 
 
-# What a drive is worth, in a few numbers.
-
-
 class Scores(NamedTuple):
-    """Deviation from the path and cost of steering; `to_dict` is ready for JSON."""
+    """Deviation from the path and cost of steering; `to_dict` is ready for JSON.
+
+    rms_e_y_m, peak_e_y_m : root mean square and largest magnitude of the true deviation [m].
+    completed : whether the car reached the end on the path.   failures : periods in which the
+    tracker reported other than success, by status.   solve_ms : time of the tracker's step: median,
+    p99 and max [ms].
+    """
 
     rms_e_y_m: float
-    """Root mean square of the true deviation over the whole drive [m]."""
     peak_e_y_m: float
-    """Its largest magnitude [m]."""
     completed: bool
-    """Whether the car reached the end on the path."""
     failures: Mapping[str, int]
-    """Periods in which the tracker reported other than success, by status."""
     solve_ms: Mapping[str, float]
-    """Time of the tracker's step: median, p99 and max [ms]."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers and words."""
@@ -264,7 +236,6 @@ class Scores(NamedTuple):
 
 
 def scores(drive: Drive) -> Scores:
-    """Return the scores of a drive."""
     values, counts = np.unique(drive.status, return_counts=True)
     failures = {
         Status(int(value)).name: int(count)
@@ -285,31 +256,24 @@ def scores(drive: Drive) -> Scores:
     )
 
 
-# How right it was, where v_y was told.
-
-
 class ToldScores(NamedTuple):
-    """Errors of the lateral velocity that was told, against the truth."""
+    """Errors of the lateral velocity that was estimated, against the truth.
+
+    rms_error_m_s, rms_error_deg : root mean square of the error of v_y [m/s] and of side slip
+    [deg].   rms_deg : of the true side slip [deg].   within_two_sd : share of the samples whose
+    error lies within two standard deviations.   inertial_rms_error_m_s : of the identifier alone,
+    without position [m/s].
+    """
 
     rms_error_m_s: float
-    """Root mean square of the error of v_y [m/s]."""
     rms_error_deg: float
-    """The same of side slip [degrees]."""
     rms_deg: float
-    """Root mean square of the true side slip [degrees]."""
     within_two_sd: float
-    """Share of the samples whose error lies within two standard deviations."""
     inertial_rms_error_m_s: float
-    """Root mean square of the error of the identifier alone, without position [m/s]."""
 
 
 def told_scores(drive: Drive) -> ToldScores | None:
-    """Return how right the v_y was that was told over a drive; None where sensors showed it.
-
-    Parameters
-    ----------
-    drive : where nothing was told at a sample, it does not count.
-    """
+    """Return how right the v_y was that was told over a drive; None where sensors showed it."""
     if not drive.told:
         return None
 

@@ -17,7 +17,7 @@ from models.plant import Plant
 from models.sensors import Sensor, SensorError
 from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
-from mpc.cars.car import CarState
+from mpc.cars import CarState
 from mpc.path.path import Path
 
 EXACT = Sensor()
@@ -61,11 +61,6 @@ class CarSensors:
     a_y : lateral acceleration [m/s^2].
     body_fixed : whether the accelerometer rolls with the body and feels gravity then; else a_y is
         in the plane of the road.
-
-    Raises
-    ------
-    SensorError
-        For a sensor with a delay of its own: the delay of the loop is that of its command.
     """
 
     X: Sensor = EXACT
@@ -91,8 +86,6 @@ class CarSensors:
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
         """Return what is measured at one instant.
 
-        Parameters
-        ----------
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
         noise = rng.standard_normal(len(CHANNELS))
@@ -140,10 +133,8 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     yaw rate 0.003 rad/s, acceleration 0.1 m/s², steering 0.5 mrad, new at every sample. Yaw rate
     and acceleration are biased, and the accelerometer is fixed to the body and rolls with it.
 
-    Parameters
-    ----------
     rng : draws the biases, of 0.001 rad/s and 0.05 m/s² standard deviation; None takes sensors
-        without noise and bias.
+    without noise and bias.
     """
     if rng is None:
         return CarSensors(v_y=None, body_fixed=True)
@@ -163,11 +154,6 @@ class FaultySensors:
     Parameters
     ----------
     faults : what breaks, where channels are those of `Measured`.
-
-    Raises
-    ------
-    FaultError
-        For a channel that is not measured.
     """
 
     def __init__(self, sensors: CarSensors, faults: Sequence[SensorFault]) -> None:
@@ -181,8 +167,6 @@ class FaultySensors:
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
         """Return what is measured at one instant, calls in the order of time.
 
-        Parameters
-        ----------
         rng : source of the noise; of a fault's own noise too, so that it changes no other draw.
         """
         shown = self._sensors.measure(state, rng)
@@ -206,14 +190,11 @@ class FaultySensors:
 
 
 class Preview(NamedTuple):
-    """The road at some times ahead, each (k,)."""
+    """The road at some times ahead, each (k,): arc length [m], curvature [1/m], speed [m/s]."""
 
     s: Array
-    """Arc length [m]."""
     kappa: Array
-    """Curvature [1/m]."""
     v_x: Array
-    """Speed [m/s]."""
 
 
 class SpeedProfile:
@@ -222,11 +203,6 @@ class SpeedProfile:
     Parameters
     ----------
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
-
-    Raises
-    ------
-    ValueError
-        When the shape is wrong, or a speed is not positive and finite.
     """
 
     def __init__(self, path: Path, v: ArrayLike) -> None:
@@ -246,8 +222,6 @@ class SpeedProfile:
     def at(self, s: ArrayLike) -> Array:
         """Return the wanted speed [m/s] in the shape of s.
 
-        Parameters
-        ----------
         s : arc length [m].
         """
         return self.path.along(self.v, s)
@@ -255,8 +229,6 @@ class SpeedProfile:
     def reference(self, s: float, gain: float) -> float:
         """Return what to ask of a proportional driver, so that it does not lag behind [m/s].
 
-        Parameters
-        ----------
         s : arc length [m].
         gain : acceleration that the driver asks for, per error of the speed [1/s].
         """
@@ -267,11 +239,7 @@ class SpeedProfile:
     def ahead(self, s: float, v_x: float, t: Array, gain: float) -> Preview:
         """Return the road that the car will be on.
 
-        Parameters
-        ----------
-        s : arc length now [m].
-        v_x : speed now [m/s].
-        t : times from now [s], (k,).
+        s : arc length now [m].   v_x : speed now [m/s].   t : times from now [s], (k,).
         gain : of the driver [1/s].
         """
         error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
@@ -312,8 +280,6 @@ def cornering_limit(
 ) -> float:
     """Return the largest steady lateral acceleration [m/s^2].
 
-    Parameters
-    ----------
     tire : of all four wheels; None reads the file named by the chassis.
     mu : friction of the road over that of the tire's measurement [-].
     speed : at which the car is driven [m/s].

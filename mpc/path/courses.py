@@ -40,8 +40,6 @@ class Straight:
     def heading(self, s: Array) -> tuple[Array, Array]:
         """Return ψ [rad] since the start of the section and κ [1/m], (k,) each.
 
-        Parameters
-        ----------
         s : since the start of the section [m], (k,).
         """
         return np.zeros_like(s), np.zeros_like(s)
@@ -61,12 +59,6 @@ class Turn:
     radius : of the constant part [m].
     angle : heading gained over all of it [rad], > 0 to the left.
     easing : length over which the curvature rises, and falls again [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is not finite, radius or easing not positive, angle zero, or the angle too
-        small for the easing.
     """
 
     radius: float
@@ -90,8 +82,6 @@ class Turn:
     def heading(self, s: Array) -> tuple[Array, Array]:
         """Return ψ [rad] since the start of the section and κ [1/m], (k,) each.
 
-        Parameters
-        ----------
         s : since the start of the section [m], (k,).
         """
         peak = math.copysign(1.0 / self.radius, self.angle)
@@ -110,14 +100,7 @@ Section: TypeAlias = Straight | Turn
 def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
     """Put sections one after another, from the origin along X.
 
-    Parameters
-    ----------
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing is not positive or there is no section.
     """
     if not (spacing > 0.0 and sections):
         raise PathError(f"{len(sections)} sections cannot be sampled every {spacing} m")
@@ -137,15 +120,8 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
 def close(sections: Sequence[Section], free: tuple[int, int]) -> list[Section]:
     """Choose the lengths of two straights so that the course ends where it starts.
 
-    Parameters
-    ----------
     sections : in driving order; they must turn by a multiple of 2 pi altogether.
     free : which two sections are straights of free length; they must not be parallel.
-
-    Raises
-    ------
-    PathError
-        Where a rule is broken or a straight would need a negative length.
     """
     turned = sum(section.angle for section in sections)
     if abs(math.remainder(turned, 2.0 * math.pi)) > 1e-9 or turned == 0.0:
@@ -252,8 +228,6 @@ def handling_course(*, spacing: float = 0.25) -> Path:
 def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Array:
     """Return pairs of cones on both sides of a path, X and Y [m], (k, 2).
 
-    Parameters
-    ----------
     gap : about the distance from pair to pair along the path [m].
     half_width : from the path to a cone [m].
     """
@@ -263,8 +237,6 @@ def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Ar
     middle = np.column_stack((X, Y))
     return np.vstack((middle + across, middle - across))
 
-
-# The built-in paths by the names that a command line knows them by.
 
 BUILT_IN: Mapping[str, Callable[[], Path]] = MappingProxyType(
     {

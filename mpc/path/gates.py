@@ -7,7 +7,7 @@ cost on dκ/ds chooses among the lines with the same peak.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, isfinite
 from typing import Any
@@ -41,11 +41,6 @@ class Gate:
     end : where it ends [m].
     right : y of the right cones [m].
     left : y of the left cones [m].
-
-    Raises
-    ------
-    PathError
-        Where start or end is not finite, start after end, or right not below left.
     """
 
     start: float
@@ -83,20 +78,11 @@ def line_through_gates(
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
 
-    Parameters
-    ----------
-    gates : what the line must pass.
-    start : x, y of the first point [m].
-    end : x, y of the last point [m].
+    start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
     spacing : longest step of the samples [m].
     knots : about the distance of the knots of the spline [m].
-
-    Raises
-    ------
-    PathError
-        Where a gate is too narrow for the clearance, a number is out of range, or no line is found.
     """
     numbers = {"easing": easing, "spacing": spacing, "knots": knots, "length": end[0] - start[0]}
     for name, value in {**numbers, "clearance": clearance}.items():
@@ -223,8 +209,8 @@ def iso_3888_1(
         Gate(start=45.0, end=70.0, right=right + 3.5, left=right + 3.5 + middle),
         Gate(start=95.0, end=125.0, right=right, left=right + last),
     )
-    name, easing = "ISO 3888-1", 10.0
-    return _lane_change(name, gates, car_width, margin, easing, run_in, run_out, spacing)
+    half, runs = 0.5 * car_width + margin, (run_in, run_out)
+    return _path("ISO 3888-1", gates, half, 10.0, runs, spacing, lanes=True)
 
 
 def iso_3888_2(
@@ -254,8 +240,8 @@ def iso_3888_2(
         Gate(start=25.5, end=36.5, right=side, left=side + middle),
         Gate(start=49.0, end=61.0, right=right, left=right + last),
     )
-    name, easing = "ISO 3888-2", 6.0
-    return _lane_change(name, gates, car_width, margin, easing, run_in, run_out, spacing)
+    half, runs = 0.5 * car_width + margin, (run_in, run_out)
+    return _path("ISO 3888-2", gates, half, 6.0, runs, spacing, lanes=True)
 
 
 def _checked(car_width: float) -> float:
@@ -264,39 +250,33 @@ def _checked(car_width: float) -> float:
     return car_width
 
 
-def _lane_change(
+def _path(
     name: str,
-    gates: tuple[Gate, Gate, Gate],
-    car_width: float,
-    margin: float,
+    gates: Sequence[Gate],
+    clearance: float,
     easing: float,
-    run_in: float,
-    run_out: float,
+    runs: tuple[float, float],
     spacing: float,
+    *,
+    lanes: bool = False,
 ) -> Path:
-    """Drive through the gates; before and after them the car keeps their lanes."""
-    for what, value in (("run_in", run_in), ("run_out", run_out)):
+    """Drive through the gates; where they are lanes, the car keeps them before and after."""
+    for what, value in zip(("run_in", "run_out"), runs, strict=True):
         if not 5.0 <= value <= 1000.0:
             raise PathError(f"{what} must be 5 to 1000 m, it is {value}")
-    first, middle, last = gates
-    begin, finish = first.start - run_in, last.end + run_out
-    lanes = (
-        Gate(start=begin, end=first.end, right=first.right, left=first.left),
-        middle,
-        Gate(start=last.start, end=finish, right=last.right, left=last.left),
-    )
+    begin, finish = gates[0].start - runs[0], gates[-1].end + runs[1]
     line = line_through_gates(
-        lanes,
+        [replace(gates[0], start=begin), *gates[1:-1], replace(gates[-1], end=finish)]
+        if lanes
+        else gates,
         start=(begin, 0.0),
         end=(finish, 0.0),
-        clearance=0.5 * car_width + margin,
+        clearance=clearance,
         easing=easing,
         spacing=spacing,
     )
     return Path.from_line(line, name=name, cones=cones_of(gates))
 
-
-# A slalom: cones in a row at equal distances, passed left and right in turn.
 
 EASING = 6.0  # m
 
@@ -332,26 +312,10 @@ def slalom(
     """
     if not (cones >= 1 and gap >= 5.0 and math.isfinite(gap)):
         raise PathError(f"a slalom needs a cone and 5 m between them, got {cones} and {gap} m")
-    for what, value in (("run_in", run_in), ("run_out", run_out)):
-        if not 5.0 <= value <= 1000.0:
-            raise PathError(f"{what} must be 5 to 1000 m, it is {value}")
     if not (car_width > 0.0 and margin >= 0.0):
         raise PathError(f"car_width and margin must be positive, they are {car_width}, {margin}")
-    gates = [
-        Gate(
-            start=i * gap,
-            end=i * gap,
-            right=0.0 if i % 2 == 0 else -math.inf,
-            left=math.inf if i % 2 == 0 else 0.0,
-        )
-        for i in range(cones)
-    ]
-    line = line_through_gates(
-        gates,
-        start=(-run_in, 0.0),
-        end=((cones - 1) * gap + run_out, 0.0),
-        clearance=0.5 * car_width + margin,
-        easing=EASING,
-        spacing=spacing,
-    )
-    return Path.from_line(line, name="slalom", cones=cones_of(gates))
+    sides = (0.0, math.inf), (-math.inf, 0.0)  # right and left of the gates in turn
+    places = [(i * gap, *sides[i % 2]) for i in range(cones)]
+    gates = [Gate(start=x, end=x, right=right, left=left) for x, right, left in places]
+    half, runs = 0.5 * car_width + margin, (run_in, run_out)
+    return _path("slalom", gates, half, EASING, runs, spacing)

@@ -31,15 +31,7 @@ class Line(NamedTuple):
 def uniform_grid(length: float, spacing: float) -> Array:
     """Return s from 0 to `length` [m] in equal steps of at most `spacing`.
 
-    Parameters
-    ----------
-    length : of the curve [m].
-    spacing : longest step [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing is not positive or leaves fewer than four steps, or too many.
+    length : of the curve [m].   spacing : longest step [m].
     """
     if not 0.0 < spacing <= length / 4.0:
         raise PathError(
@@ -58,17 +50,9 @@ def line_from_heading(
 
     X and Y by Boole's rule, whose error is of order spacing^6.
 
-    Parameters
-    ----------
     psi : heading [rad], (4 n + 1,), at steps of spacing/4.
-    kappa : dψ/ds at the same places [1/m], (4 n + 1,).
-    spacing : step of the line [m].
+    kappa : dψ/ds at the same places [1/m], (4 n + 1,).   spacing : step of the line [m].
     start : X, Y of the first sample [m].
-
-    Raises
-    ------
-    PathError
-        Where the number of samples is not 4 n + 1.
     """
     if psi.shape != kappa.shape or psi.size % 4 != 1 or psi.size < 5:
         raise PathError(f"psi and kappa must have 4 n + 1 samples, they have {psi.size}")
@@ -81,26 +65,12 @@ def line_from_heading(
     return Line(s, place[0], place[1], psi[::4], kappa[::4])
 
 
-# Whether samples are one curve over its arc length.
-
 LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
 DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
 
 
 def check_line(line: Line, name: str, closed: bool) -> None:
-    """Refuse samples that do not fit one another.
-
-    Parameters
-    ----------
-    line : finite samples of equal shape.
-    closed : whether the last sample must be the first one again.
-
-    Raises
-    ------
-    PathError
-        Where s is not uniform from 0, samples are too few, too coarse or disagree, or the ends of a
-        closed path differ.
-    """
+    """Refuse samples that do not fit one another."""
     s, X, Y, psi, kappa = line
     if s.size < 5:
         raise PathError(f"{name}: a path needs at least 5 samples, it has {s.size}")
@@ -141,8 +111,6 @@ def _check_ends(line: Line, name: str, h: float) -> None:
         )
 
 
-# What lies between two samples of a line, from their values, slopes and second derivatives.
-
 Pair: TypeAlias = tuple[Any, Any]  # at both ends of a step, numbers or arrays
 
 
@@ -159,10 +127,7 @@ class Ends(NamedTuple):
     ) -> tuple[Any, Any, Any, Any]:
         """Return X, Y [m], ψ [rad], κ [1/m] inside the step.
 
-        Parameters
-        ----------
-        u : place in the step, 0 to 1 [-].
-        h : length of the step [m].
+        u : place in the step, 0 to 1 [-].   h : length of the step [m].
         """
         (psi_0, psi_1), (kappa_0, kappa_1) = self.psi, self.kappa
         cos_0, cos_1, sin_0, sin_1 = cos(psi_0), cos(psi_1), sin(psi_0), sin(psi_1)
@@ -177,12 +142,7 @@ class Ends(NamedTuple):
 def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
     """Return the cubic that has values and slopes given at both ends of a step.
 
-    Parameters
-    ----------
-    u : place in the step, 0 to 1 [-].
-    h : length of the step.
-    p : values at u = 0 and 1.
-    d : slopes there, per unit of h.
+    u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.
     """
     chord = p[1] - p[0]
     bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]
@@ -192,13 +152,7 @@ def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
 def quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
     """Return the quintic that has values, slopes and second derivatives given at both ends.
 
-    Parameters
-    ----------
-    u : place in the step, 0 to 1 [-].
-    h : length of the step.
-    p : values at u = 0 and 1.
-    d : slopes there, per unit of h.
-    dd : second derivatives there, per unit of h².
+    u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.
     """
     chord = p[1] - p[0]
     bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]

@@ -62,14 +62,10 @@ def walk_to_foot(
 
     The walk follows the path, so that another leg that passes close by cannot catch it.
 
-    Parameters
-    ----------
-    point_of : s [m] -> X, Y [m], ψ [rad], κ [1/m] of the path.
-    X : of the car [m].
-    Y : of the car [m].
-    near : s where the walk starts [m].
+    point_of : s [m] -> X, Y [m], ψ [rad], κ [1/m] of the path.   X : of the car [m].
+    Y : of the car [m].   near : s where the walk starts [m].
     search_distance : how far from `near` the walk may go [m]; where it must stop short, e_y is the
-        deviation there.
+    deviation there.
     """
     s = near
     for _ in range(STEPS):

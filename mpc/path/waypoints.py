@@ -32,10 +32,7 @@ HALVINGS = 40
 def smooth(points: Array, *, closed: bool, distance: float) -> Array:
     """Move points so that their third differences get small.
 
-    Parameters
-    ----------
     points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
-    closed : whether they form a ring.
     distance : root mean square of how far they may move [m].
     """
     if len(points) < 4 + closed:
@@ -106,19 +103,10 @@ def line_through(
 ) -> Line:
     """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
 
-    Parameters
-    ----------
-    X : of the way-points [m], (k,).
-    Y : of the way-points [m], (k,).
-    closed : whether the last leads back to the first.
+    X : of the way-points [m], (k,).   Y : of the way-points [m], (k,).
     spacing : longest step of the samples [m].
     smoothing : root mean square distance that the line may keep from the way-points [m].
     minimum_radius : tightest turn allowed [m].
-
-    Raises
-    ------
-    PathError
-        Where a rule is broken.
     """
     if not minimum_radius > 0.0:
         raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
@@ -145,16 +133,8 @@ def line_through(
 def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     """Sample a plane curve at equal steps of its arc length.
 
-    Parameters
-    ----------
     spline : t -> (X, Y) with `.derivative(order)`, C2, polynomial between its knots.
-    knots : rising t, (k,).
-    spacing : longest step [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing does not suit the length.
+    knots : rising t, (k,).   spacing : longest step [m].
     """
     velocity, acceleration = spline.derivative(1), spline.derivative(2)
     # Quadrature needs pieces over which the speed changes little, even between far way-points.
@@ -251,8 +231,6 @@ ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
 def read_waypoints(file: Path) -> Waypoints:
     """Read X and Y [m]; other columns, and lines that start with "#" below the header, are ignored.
 
-    Parameters
-    ----------
     file : the CSV; names in its header may be of either case, and the header may start with "#".
     """
     rows = _rows(file)
@@ -292,7 +270,6 @@ def _rows(file: Path) -> list[tuple[int, list[str]]]:
 
 
 def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> int:
-    """Return the column of an axis."""
     found = [k for k, name in enumerate(header) if name.lower() in names]
     if len(found) == 1:
         return found[0]
@@ -323,7 +300,6 @@ def _is_number(cell: str) -> bool:
 
 
 def _numbers(file: Path, name: str, column: int, points: list[tuple[int, list[str]]]) -> Array:
-    """Convert a column."""
     values = []
     for line, cells in points:
         cell = cells[column].strip() if column < len(cells) else ""

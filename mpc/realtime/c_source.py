@@ -8,18 +8,9 @@ from pathlib import Path
 
 import casadi as ca
 
+from codegen import package
 from codegen.clean_c import Statements, recognized
 from codegen.graph import graph_of
-from codegen.package import (
-    c_files,
-    defines,
-    equations_file,
-    generated,
-    header,
-    in_comment,
-    one_file,
-    precision,
-)
 from codegen.template import Values
 from codegen.tuned import tuned
 from mpc.prediction import build_axles, build_end, build_rk4, build_stage, state_size
@@ -68,62 +59,51 @@ READ: Mapping[str, str] = {
 
 
 def c_sources(
-    structure: TireStructure,
-    *,
-    horizon: int,
-    name: str,
-    single: bool = False,
-    about: Values,
+    structure: TireStructure, *, horizon: int, name: str, single: bool = False, about: Values
 ) -> dict[str, str]:
     """Return the C files by their path in a package; they depend on nothing but these arguments.
 
-    Parameters
-    ----------
-    horizon : number of stages.
     single : whether float is the default precision.
     """
+    counts = c_sizes(structure, horizon)
+    sizes = {key: (f"{count}U", words) for key, (count, words) in counts.items()}
+    version = f'"{about["version_text"]}"'
     return {
-        **c_files(C, PLACES, {PREFIX: name}),
-        f"include/{name}_config.h": header(
+        **package.c_files(C, PLACES, {PREFIX: name}),
+        f"include/{name}_config.h": package.header(
             f"{name}_config.h",
-            f"{in_comment(about['title'])}: precision and sizes.\n\n{generated(about)}",
+            f"{package.in_comment(about['title'])}: precision and sizes.\n\n"
+            f"{package.generated(about)}",
             [
-                precision(name, single=single),
-                defines(name, _sizes(structure, horizon, f'"{about["version_text"]}"')),
+                package.precision(name, single=single),
+                package.defines(
+                    name, {**sizes, "VERSION": (version, "name, hash, version of tireid")}
+                ),
             ],
         ),
-        f"src/{name}_equations.c": _equations(structure, name, generated(about)),
+        f"src/{name}_equations.c": _equations(structure, name, package.generated(about)),
     }
 
 
 def python_file(files: Mapping[str, str], *, name: str, single: bool) -> str:
-    """Return C files as one, with what Python asks of it.
-
-    Parameters
-    ----------
-    files : of `c_sources`.
-    single : whether to compute in float.
-    """
-    (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: name}).values()
+    (glue,) = package.c_files(C, {"glue.c": "."}, {PREFIX: name}).values()
     texts = [*(files[path.format(name)] for path in ORDER), glue]
-    return one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})
+    return package.one_file(texts, defines={f"{name.upper()}_SINGLE": int(single)})
 
 
-def _sizes(
-    structure: TireStructure, horizon: int, version_text: str
-) -> dict[str, tuple[object, str]]:
+def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]]:
+    """Return the sizes of a tracker and what they count, by the end of their macro."""
     n_x = state_size(structure)
     lagged = ", lagged slip in front and at the rear" if n_x > 5 else ""
     return {
-        "HORIZON": (f"{horizon}U", "stages of the plan"),
-        "STATES": (f"{n_x}U", f"e_y, e_psi, v_y, r, delta{lagged}"),
-        "WEIGHTS": (f"{structure.n_weights}U", "numbers of the tire"),
-        "ERRORS": (f"{N_ERRORS}U", "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
-        "SPEEDS": (f"{N_SPEEDS}U", "of the fall-back's table"),
-        "GAINS": (f"{N_GAINS}U", "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
-        "GRIPS": (f"{N_GRIPS}U", "frictions that are held for possible"),
-        "DOUBTS": (f"{N_DOUBTS}U", "slips at which the doubt of the forces is told"),
-        "VERSION": (version_text, "name, hash, version of tireid"),
+        "HORIZON": (horizon, "stages of the plan"),
+        "STATES": (n_x, f"e_y, e_psi, v_y, r, delta{lagged}"),
+        "WEIGHTS": (structure.n_weights, "numbers of the tire"),
+        "ERRORS": (N_ERRORS, "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
+        "SPEEDS": (N_SPEEDS, "of the fall-back's table"),
+        "GAINS": (N_GAINS, "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
+        "GRIPS": (N_GRIPS, "frictions that are held for possible"),
+        "DOUBTS": (N_DOUBTS, "slips at which the doubt of the forces is told"),
     }
 
 
@@ -147,7 +127,7 @@ def _equations(structure: TireStructure, name: str, sentence: str) -> str:
         "force[2], "
         f"{real} slip[2], {real} length[2])": _body(build_axles(structure), name, READ, "{}[{}]"),
     }
-    return equations_file(name, f"The prediction and its derivatives. {sentence}", bodies)
+    return package.equations_file(name, f"The prediction and its derivatives. {sentence}", bodies)
 
 
 def _free_motion(structure: TireStructure) -> ca.Function:

@@ -21,30 +21,10 @@ FORCE_ERROR = 0.045  # static axle loads, of 0.2 s of motion: noise, load transf
 GRIPS: Array = LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 
 
-def require_caution(name: str, caution: float) -> float:
-    """Return a caution, if it is a share.
-
-    Parameters
-    ----------
-    caution : from 0 to 1.
-    """
-    if not 0.0 <= caution <= 1.0:
-        raise ValueError(f"{name} must be from 0 to 1, it is {caution:g}")
-    return caution
-
-
 def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> None:
     """Write what the tracker fears of a tire; `max_slip` must have been written.
 
-    Parameters
-    ----------
-    params : of `mpc.realtime.instance.params_type`, written in place.
     caution : from 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        For a caution of a car with downforce: what is not known is told under static loads.
     """
     if caution > 0.0 and tire.vehicle.has_downforce:
         raise ValueError(

@@ -43,12 +43,8 @@ def fall_back(
     Minimizes Σ (e_y/`e_y`)² + (a/`acceleration`)² + (u/0.2 rad)², where a [m/s²] is the lateral
     acceleration of the steady turn that u steers: at speed, steering is worth less of it.
 
-    Parameters
-    ----------
-    period : between two steps [s].
-    delay : from a measurement until its command acts [s].
-    e_y : deviation [m] that is worth as much as `acceleration`.
-    acceleration : lateral [m/s²].
+    period : between two steps [s].   delay : from a measurement until its command acts [s].
+    e_y : deviation [m] that is worth as much as `acceleration`.   acceleration : lateral [m/s²].
     """
     rows = []
     for v_x in SPEEDS:
@@ -69,10 +65,7 @@ def fall_back(
 def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
     """Return A (5, 5) and B (5, 1) of ẋ = A x + B u at a speed.
 
-    Parameters
-    ----------
-    v_x : longitudinal speed [m/s].
-    lag : of the wheels behind what is told [s].
+    v_x : longitudinal speed [m/s].   lag : of the wheels behind what is told [s].
     """
     m, I_z, l_f, l_r, C_f, C_r = vehicle.bicycle
     moment = C_f * l_f - C_r * l_r
@@ -87,8 +80,6 @@ def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
 def steady_turn(vehicle: Vehicle, v_x: float) -> tuple[float, float]:
     """Return δ [rad m] and v_y [m²/s] of a steady turn, each a curvature.
 
-    Parameters
-    ----------
     v_x : longitudinal speed [m/s].
     """
     m, _, l_f, l_r, C_f, C_r = vehicle.bicycle
@@ -103,11 +94,7 @@ def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
     By structure-preserving doubling (Chu, Fan, Lin and Wang 2004), which converges quadratically
     and also for cars of which SciPy's Schur form is too ill-conditioned to be ordered.
 
-    Parameters
-    ----------
-    A : (n, n).
-    B : (n, m).
-    Q : (n, n), symmetric, not negative.
+    A : (n, n).   B : (n, m).   Q : (n, n), symmetric, not negative.
     R : (m, m), symmetric, positive.
     """
     P = _riccati(A, B @ _solved(R, B.T), Q)

@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import re
 from dataclasses import fields, is_dataclass
 from enum import IntEnum
 from functools import cache
@@ -17,13 +18,9 @@ from codegen.arrays import Array
 from codegen.compiler import keep, kept
 from codegen.errors import TireidError
 from mpc.prediction import state_size
-from mpc.problem import N_ERRORS, Guards, Problem
-from mpc.realtime.c_source import c_sources, python_file
-from mpc.realtime.caution import N_GRIPS
-from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.tire import N_DOUBTS, TireStructure
-
-# What goes into a tracker and what comes out.
+from mpc.problem import Guards, Problem
+from mpc.realtime.c_source import C, c_sizes, c_sources, python_file
+from mpc.tires.tire import TireStructure
 
 
 class Status(IntEnum):
@@ -70,114 +67,43 @@ class Command(NamedTuple):
     iterations: int
 
 
-# The structures of the C tracker as NumPy types: Python writes and reads them in place.
+# The structures of the C tracker as NumPy types, read from its header: Python writes and reads them
+# in place.
 
-N_COMMANDS = 32
-N_STATUSES = 9
-TIMES = ("cost_rate", "stage_time", "period", "delay")
-LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "rise", "soft_e_y", "soft_slip")
-CAUTION = (
-    "caution",
-    "grips",
-    "prior",
-    "surprise",
-    "doubt",
-    "doubt_step",
-    "force_error",
-    "stiffness",
-)
-OF_AXLES = ("max_slip", "rise", "force_error")
-GUARDS = (
-    *("widest_e_y", "widest_e_psi", "max_v_y", "max_yaw_rate", "min_speed"),
-    *("max_speed", "max_curvature", "speeds", "gains", "hold_time"),
-)
+N_COMMANDS = 32  # of the past, which a delay may reach back
+STRUCTURE = re.compile(r"typedef struct \{([^}]*)\} tireid_mpc_(\w+);")
+MEMBER = re.compile(r"(\w+)\s+(\w+)((?:\[[^]]+\])*);")
+MACRO = re.compile(r"#define TIREID_MPC_(\w+) (\d+)U\b")
 
 
-def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of the parameters.
+@cache
+def c_types(
+    structure: TireStructure, horizon: int, *, single: bool
+) -> dict[str, np.dtype[np.void]]:
+    """Return the types of `params`, `input` and `state`."""
+    text = re.sub(r"/\*.*?\*/", "", (C / "tireid_mpc.h").read_text(encoding="utf-8"), flags=re.S)
+    sizes = {f"TIREID_MPC_{name}": int(value) for name, value in MACRO.findall(text)}
+    sizes |= {f"TIREID_MPC_{key}": n for key, (n, _) in c_sizes(structure, horizon).items()}
+    kinds = {"tireid_mpc_real": np.float32 if single else np.float64, "uint32_t": np.uint32}
 
-    Parameters
-    ----------
-    single : whether numbers are float.
-    """
-    real = _real(single)
-    names = [*TIMES, *LIMITS, *CAUTION, *GUARDS, "tolerance"]
-    of_grips = dict.fromkeys(("grips", "prior"), (N_GRIPS,))
-    shapes = {
-        **dict.fromkeys(OF_AXLES, (2,)),
-        **of_grips,
-        "doubt": (2, N_DOUBTS),
-        "speeds": (N_SPEEDS,),
-        "gains": (N_SPEEDS, N_GAINS),
+    def shape(dimensions: str) -> tuple[int, ...]:
+        sums = [one.split("+") for one in re.findall(r"\[([^]]+)\]", dimensions)]
+        return tuple(
+            sum(sizes.get(part.strip()) or int(part.strip(" U")) for part in one) for one in sums
+        )
+
+    return {
+        name: np.dtype(
+            [(member, kinds[kind], shape(of)) for kind, member, of in MEMBER.findall(members)],
+            align=True,
+        )
+        for members, name in STRUCTURE.findall(text)
+        if name in ("params", "input", "state")
     }
-    numbers = [(name, real, shapes.get(name, ())) for name in names]
-    arrays = [("car", 4), ("weights", n_weights), ("cost", N_ERRORS), ("cost_end", N_ERRORS)]
-    return np.dtype(
-        [(name, real, (size,)) for name, size in arrays]
-        + numbers
-        + [(name, np.uint32) for name in ("max_iterations", "linearizations", "max_active_sets")],
-        align=True,
-    )
-
-
-def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of the state.
-
-    Parameters
-    ----------
-    horizon : number of stages.
-    n_x : states of the car.
-    single : whether numbers are float.
-    """
-    real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    watch = ("gentle", "placed", "watched", "doubted")
-    counts = (*solution, "age", "planned", "guessed", "started", *watch)
-    return np.dtype(
-        [
-            ("x", real, (horizon + 1, n_x)),
-            ("u", real, (horizon,)),
-            ("feedback", real, (horizon, n_x)),
-            ("commands", real, (N_COMMANDS,)),
-            ("lagged", real, (2,)),
-            ("zero", real),
-            ("drift", real),
-            ("turning", real),
-            ("apart", real, (2,)),
-            ("stays", real, (2,)),
-            ("last", real, (2,)),
-            ("place", real, (2,)),
-            ("grip", real),
-            ("cost", real, (N_GRIPS,)),
-            ("slips", real, (N_GRIPS, 2)),
-            ("impulse", real, (N_GRIPS, 2)),
-            ("faults", np.uint32, (N_STATUSES,)),
-            *((name, np.uint32) for name in counts),
-        ],
-        align=True,
-    )
-
-
-def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
-    """Return the type of a measurement.
-
-    Parameters
-    ----------
-    horizon : number of stages.
-    single : whether numbers are float.
-    """
-    real = _real(single)
-    numbers = [(name, real) for name in ("e_y", "e_psi", "v_y", "r")]
-    ahead = [(name, real, (horizon + 1,)) for name in ("kappa", "v_x")]
-    return np.dtype([*numbers, *ahead], align=True)
 
 
 def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
-    """Write what is to be solved and guarded; tire, timing, solver and gains of the fall-back stay.
-
-    Parameters
-    ----------
-    params : of `params_type`, written in place.
-    """
+    """Write what is to be solved and guarded; tire, timing, solver and fall-back stay."""
     cost, limits = problem.cost, problem.limits
     params["cost"], params["cost_end"] = cost.numbers(), cost.terminal_numbers()
     params["cost_rate"], params["stage_time"] = cost.R, problem.dt
@@ -190,24 +116,12 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
         params[name] = getattr(guards, name)
 
 
-def _real(single: bool) -> type[np.floating]:
-    return np.float32 if single else np.float64
-
-
-# The text of a tracker in one file, kept between runs: a second start generates nothing.
-
 NAME = "mpc"
 PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the text
 
 
 def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> str:
-    """Return the C of a tracker, generated or found again by everything that it depends on.
-
-    Parameters
-    ----------
-    horizon : number of stages.
-    single : whether to compute in float.
-    """
+    """Return the C of a tracker, generated or found again by everything that it depends on."""
     if not is_dataclass(structure):
         return _generated(structure, horizon, single)
     kind = type(structure)
@@ -264,13 +178,6 @@ class Instance:
     ----------
     horizon : number of stages.
     single : whether numbers are float.
-
-    Raises
-    ------
-    NoCompilerError
-        Where there is no C compiler.
-    CompilationError
-        Where the compiler refuses the code.
     """
 
     def __init__(self, structure: TireStructure, horizon: int, *, single: bool) -> None:
@@ -281,9 +188,10 @@ class Instance:
         self._library.mpc_sizes.restype = ctypes.c_size_t
         self._real = ctypes.c_float if single else ctypes.c_double
         n_x = state_size(structure)
-        self.params = np.zeros((), params_type(structure.n_weights, single=single))
-        self.state = np.zeros((), state_type(horizon, n_x, single=single))
-        self.input = np.zeros((), input_type(horizon, single=single))
+        types = c_types(structure, horizon, single=single)
+        self.params, self.state, self.input = (
+            np.zeros((), types[name]) for name in ("params", "state", "input")
+        )
         sizes = [library.mpc_sizes(i) for i in range(4)]
         expected = [array.nbytes for array in (self.params, self.state, self.input)]
         assert sizes[:3] == expected, f"structures of {expected} bytes are {sizes[:3]} in C"
@@ -312,8 +220,6 @@ class Instance:
     def prepare_from(self, x0: ArrayLike) -> None:
         """Do ahead of `solve` what does not ask for its state, on the road in `input`.
 
-        Parameters
-        ----------
         x0 : state that is expected (n_x,).
         """
         self.start[:] = x0
@@ -323,6 +229,12 @@ class Instance:
         """Take one iteration from the plan as it is; return the status."""
         return int(self._library.mpc_solve(*self.solve_arguments))
 
+    def command(self, steering: float, status: int, elapsed: float) -> Command:
+        """Return what to steer [rad] with the plan as it is, after a time of solving [s]."""
+        state = self.state
+        x, u = state["x"].astype(np.float64), state["u"].astype(np.float64)
+        return Command(steering, status, x, u, elapsed, int(state["iterations"]))
+
     def shift(self) -> None:
         """Move the plan ahead by a period."""
         self._library.mpc_shift(*self._step[:2])
@@ -330,8 +242,6 @@ class Instance:
     def guess(self, x0: ArrayLike) -> None:
         """Set the plan to one without a solution.
 
-        Parameters
-        ----------
         x0 : state at its beginning (n_x,).
         """
         self.start[:] = x0
@@ -340,8 +250,6 @@ class Instance:
     def late(self, steering: float) -> None:
         """Say that the last command came too late.
 
-        Parameters
-        ----------
         steering : what was steered instead [rad].
         """
         self._library.mpc_late(self._step[0], self._real(steering))
@@ -349,8 +257,6 @@ class Instance:
     def reset(self, steering: float) -> Status:
         """Begin anew, with the faults kept.
 
-        Parameters
-        ----------
         steering : angle of the wheels [rad].
         """
         return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
+from models.rules import require_within
 from mpc.problem import Guards, Problem
-from mpc.realtime.caution import require_caution, set_caution
+from mpc.realtime.caution import set_caution
 from mpc.realtime.fall_back import fall_back
 from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
 from mpc.tires.tire import PredictionTire, valid_slip
 
 TOLERANCE = {False: 1e-8, True: 1e-5}  # of the solver, by `single`
-STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged
 
 
 class Tracker:
@@ -82,7 +82,8 @@ class Tracker:
         if max_active_sets < 0:
             raise ValueError(f"max_active_sets must not be negative, it is {max_active_sets}")
         self.tire, self.problem, self.period, self.delay = tire, problem, period, delay
-        self.caution = require_caution("caution", caution)
+        require_within(ValueError, 0.0, 1.0, caution=caution)
+        self.caution = caution
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
         self._preview: Instance | None = None  # what would be planned with another tire
@@ -134,17 +135,11 @@ class Tracker:
 
     @property
     def params(self) -> NDArray[np.void]:
-        """A copy of the numbers that the C reads, of `mpc.realtime.instance.params_type`."""
+        """A copy of the numbers that the C reads, of `mpc.realtime.instance.c_types`."""
         return self.instance.params.copy()
 
     def set_tire(self, tire: PredictionTire) -> None:
-        """Go on with other weights, the car that they are of and the slip that is of use to it.
-
-        Raises
-        ------
-        ValueError
-            Where the structure is another, or a number not finite.
-        """
+        """Go on with other weights, the car that they are of and the slip that is of use to it."""
         self._write_tire(self.instance, tire)
         self.tire = tire
 
@@ -153,11 +148,6 @@ class Tracker:
 
         An instance of its own is asked, on the plan and the road of the last step; the one that
         steers is read and not written.
-
-        Raises
-        ------
-        ValueError
-            Where the structure is another, or a number not finite.
         """
         now = self.instance
         if self._preview is None:
@@ -191,14 +181,7 @@ class Tracker:
     def reset(self, steering: float = 0.0) -> None:
         """Forget what was planned and steered; faults are kept.
 
-        Parameters
-        ----------
         steering : angle of the wheels now [rad].
-
-        Raises
-        ------
-        ValueError
-            Where the angle is not finite, or beyond `Limits.steering`.
         """
         if self.instance.reset(steering) != Status.OK:
             most = self.problem.limits.steering
@@ -210,8 +193,6 @@ class Tracker:
         The step is a sweep then: its `solve_time_s` is the latency from measurement to command. On
         another road than it is told with the measurement, or without a plan, it does all itself.
 
-        Parameters
-        ----------
         kappa : curvature [1/m] that the next measurement will tell, at `times`, (N + 1,).
         v_x : speed [m/s] that it will tell, (N + 1,).
         """
@@ -234,63 +215,7 @@ class Tracker:
         if self._budget is not None and elapsed > self._budget:
             instance.late(instead)
             status, steering = int(Status.LATE), instead
-        return self._command(steering, status, elapsed)
-
-    def solve(self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> Command:
-        """Take one iteration from the plan as it is; the steering is that behind the first stage.
-
-        Parameters
-        ----------
-        x0 : state at the beginning of the first stage (n_x,).
-        kappa : curvature of the stages [1/m], (N,) or a number.
-        v_x : speed of the stages [m/s], (N,) or a number.
-        """
-        instance = self.instance
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-        instance.start[:] = x0
-        start = self._clock()
-        status = instance.solve()
-        elapsed = self._clock() - start
-        return self._command(float(instance.state["x"][1, 4]), status, elapsed)
-
-    def prepare_solution(self, kappa: ArrayLike, v_x: ArrayLike) -> float:
-        """Do ahead of `solve` what does not ask for its state, along the plan as it is; return [s].
-
-        Parameters
-        ----------
-        kappa : curvature of the stages [1/m], (N,) or a number.
-        v_x : speed of the stages [m/s], (N,) or a number.
-        """
-        instance = self.instance
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-        start = self._clock()
-        instance.prepare_from(instance.state["x"][0])
-        return self._clock() - start
-
-    def solve_converged(
-        self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike, *, most: int = 100
-    ) -> Command:
-        """Iterate from a guess until the plan stays; its status is that of the last iteration.
-
-        Parameters
-        ----------
-        x0 : state at the beginning of the first stage (n_x,).
-        kappa : curvature of the stages [1/m], (N,) or a number.
-        v_x : speed of the stages [m/s], (N,) or a number.
-        """
-        instance = self.instance
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-        instance.guess(x0)
-        for _ in range(most):
-            before = instance.state["u"].copy()
-            command = self.solve(x0, kappa, v_x)
-            if np.abs(instance.state["u"] - before).max() <= STAYS:
-                return command
-        return command._replace(status=int(Status.ITERATION_LIMIT))
-
-    def shift(self) -> None:
-        """Move the plan ahead by a period, as `step` does."""
-        self.instance.shift()
+        return instance.command(steering, status, elapsed)
 
     def _planned_steering(self) -> float:
         """Return the steering that the plan says for the next step [rad]."""
@@ -298,8 +223,3 @@ class Tracker:
         share, (u, u_next) = self.period / self.problem.dt, state["u"][:2]
         planned = float(state["commands"][0] + self.period * (u + share * (u_next - u)))
         return min(max(planned, -limit), limit)
-
-    def _command(self, steering: float, status: int, elapsed: float) -> Command:
-        state = self.instance.state
-        x, u = state["x"].astype(np.float64), state["u"].astype(np.float64)
-        return Command(steering, status, x, u, elapsed, int(state["iterations"]))

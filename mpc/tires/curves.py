@@ -4,7 +4,6 @@ Sources: Dugoff, Fancher and Segel, SAE 700377 (1970); Pacejka, Tyre and Vehicle
 (Fiala's brush) and 2nd ed., (4.49). No longitudinal slip.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,17 +12,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
-from mpc.tires.tire import (
-    Pair,
-    Point,
-    PredictionTire,
-    TireStructure,
-    no_lag,
-    not_similar,
-    one_friction,
-    small_slip,
-    wheel_slip,
-)
+from mpc.tires.tire import Pair, Point, PredictionTire, SmallSlip, TireStructure
 
 
 def _dugoff(alpha: Any, C: Any, N: Any) -> Any:
@@ -40,82 +29,48 @@ def _fiala(alpha: Any, C: Any, N: Any) -> Any:
     return ca.if_else(x < 1, gentle, N * ca.sign(demand))
 
 
-def limited(curve: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Pair, Point], Pair]:
-    """Return a method `force`: a curve of slip, stiffness and largest force at both axles, cos δ.
+@dataclass(frozen=True, slots=True)
+class LimitedAxles(TireStructure):
+    """A curve by its stiffness and its largest force; w = [C_f, N_f, C_r, N_r].
+
+    C [N/rad] and N = μ F_z [N] are of an axle.
 
     Parameters
     ----------
-    curve : α [rad], C [N/rad], N [N] to force [N].
-    """
-
-    def force(self: TireStructure, slip: Pair, at: Point) -> Pair:
-        del self
-        w, cos_delta = at.w, ca.cos(at.delta)
-        return curve(slip[0], w[0], w[1]) * cos_delta, curve(slip[1], w[2], w[3])
-
-    return force
-
-
-@dataclass(frozen=True, slots=True)
-class DugoffAxles:
-    """C tan α f(λ), f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1; w = [C_f, N_f, C_r, N_r].
-
-    C [N/rad] and N = μ F_z [N] are of an axle.
+    fiala : Fiala's brush, full sliding from C |tan α| = 3 N on; else Dugoff's C tan α f(λ),
+        f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1.
     """
 
     n_weights = 4
-    lagged = False
 
-    slip = wheel_slip
-    lag_length = no_lag
-    at_friction = one_friction
-    similar = not_similar
-    saturates = False
-    force = limited(_dugoff)
-
-
-@dataclass(frozen=True, slots=True)
-class FialaAxles:
-    """Brush tire, full sliding from C |tan α| = 3 N on; w = [C_f, N_f, C_r, N_r] as Dugoff's."""
-
-    n_weights = 4
-    lagged = False
-
-    slip = wheel_slip
-    lag_length = no_lag
-    at_friction = one_friction
-    similar = not_similar
-    saturates = False
-    force = limited(_fiala)
-
-
-@dataclass(frozen=True, slots=True)
-class MagicAxles:
-    """D sin(C atan(B α)); w = [B, C, D] of the front, then of the rear axle, [1/rad, -, N]."""
-
-    n_weights = 6
-    lagged = False
-
-    slip = wheel_slip
-    lag_length = no_lag
-    at_friction = one_friction
-    similar = not_similar
-    saturates = False
+    fiala: bool = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
-        delta, w = at.delta, at.w
-        front, rear = (
-            D * ca.sin(C * ca.atan(B * alpha))
-            for alpha, (B, C, D) in zip(
-                slip, (ca.vertsplit(w[:3]), ca.vertsplit(w[3:])), strict=True
-            )
-        )
-        return front * ca.cos(delta), rear
+        curve, w = _fiala if self.fiala else _dugoff, at.w
+        return curve(slip[0], w[0], w[1]) * ca.cos(at.delta), curve(slip[1], w[2], w[3])
 
 
 @dataclass(frozen=True, slots=True)
-class LaggedAxles:
+class MagicAxles(TireStructure):
+    """D sin(C atan(B α)); w = [B, C, D] of the front, then of the rear axle, [1/rad, -, N]."""
+
+    n_weights = 6
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body."""
+        front, rear = (
+            D * ca.sin(C * ca.atan(B * alpha))
+            for alpha, (B, C, D) in (
+                (slip[0], ca.vertsplit(at.w[:3])),
+                (slip[1], ca.vertsplit(at.w[3:])),
+            )
+        )
+        return front * ca.cos(at.delta), rear
+
+
+@dataclass(frozen=True, slots=True)
+class LaggedAxles(TireStructure):
     """A curve of lagged slip, offsets of the sensors taken off; w = [curve's, σ_f, σ_r, δ_0, b].
 
     σ [m]: relaxation lengths. δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. The tracker
@@ -128,10 +83,6 @@ class LaggedAxles:
 
     curve: TireStructure
     lagged: bool = True
-
-    saturates = False
-    at_friction = one_friction
-    similar = not_similar
 
     @property
     def n_weights(self) -> int:
@@ -155,21 +106,11 @@ class LaggedAxles:
         return at.w[n], at.w[n + 1]
 
 
-# The linear tire of the textbook: F = C α of the paper's (3), without a limit.
-
-
 @dataclass(frozen=True, slots=True)
-class LinearAxles:
+class LinearAxles(SmallSlip):
     """F = C α; w = [C_f, C_r] [N/rad]."""
 
     n_weights = 2
-    lagged = False
-
-    slip = small_slip
-    lag_length = no_lag
-    at_friction = one_friction
-    similar = not_similar
-    saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -180,8 +121,6 @@ class LinearAxles:
 def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> PredictionTire:
     """Return the tire of the linear bicycle.
 
-    Parameters
-    ----------
     stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
     """
     weights = vehicle.bicycle[4:] if stiffness is None else stiffness

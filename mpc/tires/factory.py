@@ -13,7 +13,7 @@ from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
-from mpc.tires.curves import DugoffAxles, FialaAxles, LaggedAxles, MagicAxles, linear_tire
+from mpc.tires.curves import LaggedAxles, LimitedAxles, MagicAxles, linear_tire
 from mpc.tires.ladder import axle_tire, fit_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
 from mpc.tires.tire import PredictionTire
@@ -22,19 +22,9 @@ from mpc.tires.tire import PredictionTire
 def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTire:
     """Return the prediction tire of a frozen model, of a tire of `models.tires`, or of a vehicle.
 
-    Parameters
-    ----------
     source : a frozen model; or a tire, two of which are mounted on each axle of `vehicle` at its
-        static load; or a vehicle, for the linear tire that it states. A prediction tire is
-        returned as it is.
-    vehicle : the car of the prediction; None takes that of the model.
-
-    Raises
-    ------
-    ValueError
-        Where a tire comes without a vehicle, or is one that cannot be fitted.
-    TypeError
-        Where the source is none of these.
+    static load; or a vehicle, for the linear tire that it states. A prediction tire is returned as
+    it is.   vehicle : the car of the prediction; None takes that of the model.
     """
     if isinstance(source, PredictionTire):
         return source if vehicle is None else source._replace(vehicle=vehicle)
@@ -51,7 +41,6 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
 
 
 def curve_tire(model: CurveModel) -> PredictionTire:
-    """Return the prediction tire of a frozen curve."""
     plain = _plain_curve(model)
     if not (model.lagged or model.offset.any()):
         return plain
@@ -68,7 +57,7 @@ def _plain_curve(model: CurveModel) -> PredictionTire:
     if model.curve == "magic_formula":
         return PredictionTire(MagicAxles(), q.ravel(), model.vehicle)
     limit = q[:, 1] * np.array(model.vehicle.axle_loads)
-    return PredictionTire(DugoffAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
+    return PredictionTire(LimitedAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
 
 
 def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
@@ -76,7 +65,7 @@ def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
 
 
 def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
-    structure = DugoffAxles() if isinstance(tire, DugoffTire) else FialaAxles()
+    structure = LimitedAxles(fiala=isinstance(tire, FialaTire))
     pairs = [[2.0 * tire.C_alpha, tire.friction * load] for load in vehicle.axle_loads]
     return PredictionTire(structure, np.array(pairs).ravel(), vehicle)
 

@@ -19,15 +19,7 @@ from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, load_ratio
-from mpc.tires.tire import (
-    DOUBT_STEP,
-    N_DOUBTS,
-    Pair,
-    Point,
-    PredictionTire,
-    as_it_is,
-    wheel_slip,
-)
+from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
 N_COMMON = 3
 N_AXLE = 2  # beside the w_j
@@ -42,7 +34,7 @@ class Axle(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LadderAxles:
+class LadderAxles(TireStructure):
     """Weights: [δ_0, b, σ_0], 1/α_j (n,), `Axle` in front and at the rear; where pressed, κ (2,);
     where mounted, [β, g].
 
@@ -58,7 +50,6 @@ class LadderAxles:
     """
 
     saturates = True
-    similar = as_it_is
 
     units: int
     lagged: bool = True
@@ -80,7 +71,7 @@ class LadderAxles:
         if self.mounted:
             angle, gain = at.w[self.n_weights - 2], at.w[self.n_weights - 1]
             v_y, delta = v_y - angle * at.v_x, (1 + gain) * delta
-        front, rear = wheel_slip(self, at._replace(v_y=v_y, delta=delta))
+        front, rear = TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
         return front + at.w[0], rear
 
     def force(self, slip: Pair, at: Point) -> Pair:
@@ -111,6 +102,11 @@ class LadderAxles:
         axles[:, N_AXLE:] *= ratio
         return w
 
+    def similar(self, at: Point, ratio: Any) -> Point:
+        """Return `at`: nothing but slip makes the force."""
+        del ratio
+        return at
+
     def _loads(self, at: Point) -> Pair:
         """Return λ of the axles [-]; CasADi makes nothing of a factor of 1."""
         if not self.pressed:
@@ -140,14 +136,8 @@ def ladder_weights(
 ) -> Array:
     """Return w of `LadderAxles`.
 
-    Parameters
-    ----------
-    ladder : α_j [rad], (n,).
-    W : w_j [N], front and rear (2, n).
-    compliance : s [m/N], (2,).
-    least : least lag [m], (2,).
-    shortest : σ_0 [m].
-    offset : δ_0 [rad] and b [m/s].
+    ladder : α_j [rad], (n,).   W : w_j [N], front and rear (2, n).   compliance : s [m/N], (2,).
+    least : least lag [m], (2,).   shortest : σ_0 [m].   offset : δ_0 [rad] and b [m/s].
     downforce : κ of front and rear [s²/m²] where pressed, else nothing.
     """
     axles = np.column_stack([compliance, least, W])
@@ -161,10 +151,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     The sway of its body takes k ρ'/(ω² v_x) off the slip, ρ in steady cornering the force of the
     axle over its load times g: the body gives way in series with the carcass, and k g/ω² adds to
     the compliance. That is without the inertia of the roll: ω is above what steering asks for.
-
-    Parameters
-    ----------
-    model : frozen force curves, their compliance, sway and offsets.
     """
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
@@ -187,8 +173,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
 def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
 
-    Parameters
-    ----------
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
     units = model.in_units()
@@ -203,8 +187,6 @@ def fit_tire(model: FittedModel) -> PredictionTire:
 def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
     return vehicle.downforce if vehicle.has_downforce else ()
 
-
-# A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.
 
 UNITS = 6
 NARROWEST = 0.25  # α_1 over the slip F_max/C at which the linear tire would reach the peak force
@@ -227,8 +209,6 @@ class Fit(NamedTuple):
 def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
 
-    Parameters
-    ----------
     largest : end of the grid [rad].
     """
     grid: Array = largest * (np.arange(1, SAMPLES + 1) / SAMPLES) ** 2
@@ -238,15 +218,8 @@ def slip_grid(largest: float) -> Array:
 def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     """Return slip scales α_j (n,) for curves of both axles, and w_j [N] (2, n).
 
-    Parameters
-    ----------
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
-
-    Raises
-    ------
-    CurveFitError
-        Where the largest error is above 2 % of the largest force.
     """
     first = min(int(np.searchsorted(alpha, SMALL)), alpha.size - 1)
     stiffness, peak = force[:, first] / alpha[first], np.abs(force).max(axis=1)
@@ -266,10 +239,7 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
 def fitted(alpha: Array, force: Array, ladder: Array) -> Fit:
     """Return the weights of one curve.
 
-    Parameters
-    ----------
-    alpha : slips [rad], (k,).
-    force : at these slips [N], (k,).
+    alpha : slips [rad], (k,).   force : at these slips [N], (k,).
     ladder : slip scales [rad], (n,).
     """
     T = np.tanh(alpha[:, None] / ladder)
@@ -295,19 +265,8 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     those of the static load, and forces in proportion with load. The sedan's Magic
     Formula is fitted to 0.2 % of its peak, a tire with a kink, as Dugoff's, to 1.2 %.
 
-    Parameters
-    ----------
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
-
-    Raises
-    ------
-    VehicleError
-        Where the vehicle has no chassis, or names no tire and none is given.
-    TirError
-        Where the file that the chassis names is no tire of this car.
-    CurveFitError
-        Where a curve is not fitted to 2 %.
     """
     chassis = vehicle.require_chassis()
     tire = tire_of(vehicle) if tire is None else tire
@@ -322,14 +281,7 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
 def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
 
-    Parameters
-    ----------
     vehicle : the car; it needs no chassis.
-
-    Raises
-    ------
-    CurveFitError
-        Where a curve is not fitted to 2 %.
     """
     alpha = slip_grid(LARGEST_SLIP)
     x = ca.SX.sym("alpha")
@@ -343,10 +295,7 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
 def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: float) -> Array:
     """Return the side force of an axle in steady cornering [N], (k,).
 
-    Parameters
-    ----------
-    axle : 0 in front, 1 at the rear.
-    alpha : slip angles [rad], not negative, (k,).
+    axle : 0 in front, 1 at the rear.   alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].
     """
     c, h = vehicle.require_chassis(), vehicle.roll_arm

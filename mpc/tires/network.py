@@ -11,19 +11,11 @@ from codegen.arrays import Array
 from identifier.own_network import OnnxModel, read_network
 from identifier.paper.network import NetworkModel, network_signals
 from models.bicycle import BicycleParameters
-from mpc.tires.tire import (
-    Pair,
-    Point,
-    PredictionTire,
-    no_lag,
-    not_similar,
-    one_friction,
-    small_slip,
-)
+from mpc.tires.tire import Pair, Point, PredictionTire, SmallSlip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NetworkAxles:
+class NetworkAxles(SmallSlip):
     """w = [C_f, C_r, U Ŵ by columns (2, n_h), V̂ diag(1/scale) by columns (n_h, n_in)].
 
     The force unit and the scales of the inputs are in the weights: they cost no operation.
@@ -34,9 +26,6 @@ class NetworkAxles:
     inputs : signals of x̄, of `identifier.paper.network.SIGNALS`.
     """
 
-    lagged = False
-    saturates = False
-
     hidden: int
     inputs: tuple[str, ...]
 
@@ -44,9 +33,6 @@ class NetworkAxles:
     def n_weights(self) -> int:
         """2 + 2 n_h + n_h n_in."""
         return 2 + self.hidden * (2 + len(self.inputs))
-
-    slip = small_slip
-    lag_length = no_lag
 
     def at_friction(self, weights: Array, ratio: float) -> Array | None:
         """Return `weights` (n_weights,) of another friction; None where it reads the speed."""
@@ -77,12 +63,6 @@ class NetworkAxles:
 
 
 def network_tire(model: NetworkModel) -> PredictionTire:
-    """Return the prediction tire of a frozen network.
-
-    Parameters
-    ----------
-    model : frozen weights, with the car whose linear tire they correct.
-    """
     network, scale = model.network, np.array(model.network.scale)
     weights = np.concatenate(
         [
@@ -102,7 +82,7 @@ def network_tire(model: NetworkModel) -> PredictionTire:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OnnxAxles:
+class OnnxAxles(SmallSlip):
     """Axle forces of a static network of signals; w: its constants, one after another.
 
     Parameters
@@ -111,18 +91,10 @@ class OnnxAxles:
     slip_sign : 1 where it reads slip angles in the paper's sign, -1 for ISO 8855.
     """
 
-    lagged = False
-
     program: str = field(repr=False)
     inputs: tuple[str, ...]
     slip_sign: int
     n_weights: int
-
-    slip = small_slip
-    lag_length = no_lag
-    at_friction = one_friction
-    similar = not_similar
-    saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""

@@ -6,7 +6,7 @@ of the body. Only the structure is compiled; the car and the weights are read wh
 """
 
 from functools import cache
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -37,67 +37,80 @@ class Point(NamedTuple):
     w: Any
 
 
-class TireStructure(Protocol):
+class TireStructure:
     """Formulas of the axle forces, hashable and equal where they compile to the same code.
 
     Written with `ca.tanh`, `ca.atan` and the like: the stage replaces them by our own, after it has
-    taken the derivatives.
+    taken the derivatives. Force follows the slip of the wheels at once, on one friction, where a
+    structure does not say otherwise.
     """
 
-    def __hash__(self) -> int: ...
+    __slots__ = ()
 
     @property
     def n_weights(self) -> int:
         """Numbers in w."""
+        raise NotImplementedError
 
     @property
     def lagged(self) -> bool:
         """Whether force follows a lagged slip, two more states [rad]."""
-
-    def slip(self, at: Point) -> Pair:
-        """Return the kinematic slip angles [rad], paper's sign."""
-
-    def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
-        """
-
-    def lag_length(self, slip: Pair, at: Point) -> Pair:
-        """Return the relaxation lengths [m]; asked only where `lagged`.
-
-        Parameters
-        ----------
-        slip : lagged slip [rad].
-        """
+        return False
 
     @property
     def saturates(self) -> bool:
         """Whether it is judged at any slip, not only as far as the car slipped."""
+        return False
+
+    def slip(self, at: Point) -> Pair:
+        """Return the kinematic slip angles α = δ - atan((v_y ± l r)/v_x) [rad], paper's sign."""
+        v_y, r, delta, v_x, car, _ = at
+        per_speed = 1 / v_x
+        front = delta - ca.atan((v_y + car.l_f * r) * per_speed)
+        return front, -ca.atan((v_y - car.l_r * r) * per_speed)
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body.
+
+        slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
+        """
+        raise NotImplementedError
+
+    def lag_length(self, slip: Pair, at: Point) -> Pair:
+        """Return the relaxation lengths [m] at a lagged slip [rad]; asked only where `lagged`."""
+        del slip, at
+        return 0.0, 0.0
 
     def at_friction(self, weights: Array, ratio: float) -> Array | None:
         """Return the weights where friction is another; None where that is not offered.
 
         Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and slip of the peak shrink.
 
-        Parameters
-        ----------
-        weights : (n_weights,).
-        ratio : friction over the one that the weights have [-].
+        weights : (n_weights,).   ratio : friction over the one that the weights have [-].
         """
+        del weights, ratio
+        return None
 
     def similar(self, at: Point, ratio: Any) -> Point | None:
         """Return where the force is read of which `ratio` times is that of another friction.
 
         The slip is over `ratio` there, and so is what else the force follows as it follows slip.
         None where `at_friction` is not offered.
-
-        Parameters
-        ----------
-        ratio : friction over the one that the weights have [-].
         """
+        del at, ratio
+        return None
+
+
+class SmallSlip(TireStructure):
+    """A structure whose slip is that of the paper's (3), for small angles."""
+
+    __slots__ = ()
+
+    def slip(self, at: Point) -> Pair:
+        """Return α = δ - (v_y ± l r)/v_x [rad]."""
+        v_y, r, delta, v_x, car, _ = at
+        per_speed = 1 / v_x
+        return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
 
 
 N_DOUBTS = 26
@@ -129,50 +142,6 @@ class PredictionTire(NamedTuple):
         slip = DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)
         floor = FLOOR * np.array(self.vehicle.axle_loads)[:, None]
         return np.hypot(RELATIVE * curves_at(self, slip), floor)
-
-
-def wheel_slip(self: TireStructure, at: Point) -> Pair:
-    """Return α = δ - atan((v_y ± l r)/v_x) [rad]; the rear wheels do not steer. A method `slip`."""
-    del self
-    v_y, r, delta, v_x, car, _ = at
-    per_speed = 1 / v_x
-    front = delta - ca.atan((v_y + car.l_f * r) * per_speed)
-    return front, -ca.atan((v_y - car.l_r * r) * per_speed)
-
-
-def small_slip(self: TireStructure, at: Point) -> Pair:
-    """Return α = δ - (v_y ± l r)/v_x [rad], as the paper's (3) has it. A method `slip`."""
-    del self
-    v_y, r, delta, v_x, car, _ = at
-    per_speed = 1 / v_x
-    return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
-
-
-def one_friction(self: TireStructure, weights: Array, ratio: float) -> None:
-    """Return None: another friction is not offered. A method `at_friction`.
-
-    Parameters
-    ----------
-    weights : not looked at, (n_weights,).
-    """
-    del self, weights, ratio
-
-
-def as_it_is(self: TireStructure, at: Point, ratio: Any) -> Point:
-    """Return `at`: nothing but slip makes the force. A method `similar`."""
-    del self, ratio
-    return at
-
-
-def not_similar(self: TireStructure, at: Point, ratio: Any) -> None:
-    """Return None: another friction is not offered. A method `similar`."""
-    del self, at, ratio
-
-
-def no_lag(self: TireStructure, slip: Pair, at: Point) -> Pair:
-    """Return 0 m: force follows slip at once. A method `lag_length`."""
-    del self, slip, at
-    return 0.0, 0.0
 
 
 # How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
@@ -207,8 +176,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 
     They go on straight, but never with less than 4 % of their slope at zero.
 
-    Parameters
-    ----------
     most : slip beyond which no curve is believed [rad], front and rear.
     """
     slopes = curve_slopes(tire)
@@ -220,8 +187,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 def curves_at(tire: PredictionTire, slip: Array) -> Array:
     """Return the axle forces at slips, straight ahead, (2, k) [N].
 
-    Parameters
-    ----------
     slip : of both axles [rad], (k,).
     """
     x = ca.SX.sym("slip")
@@ -240,13 +205,11 @@ def believed_force(
 ) -> Any:
     """Return the axle forces that the tracker believes where friction may be another [N], (2,).
 
-    Parameters
-    ----------
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).
-    grip : friction over the one that the weights have [-]; not looked at where the structure
-        offers no other.
+    grip : friction over the one that the weights have [-]; not looked at where the structure offers
+    no other.
     """
     there = structure.similar(at, grip)
     if there is None:
@@ -261,8 +224,6 @@ def extrapolated_force(
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).
 
-    Parameters
-    ----------
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).

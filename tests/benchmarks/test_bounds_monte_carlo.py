@@ -10,8 +10,8 @@ from benchmarks.bounds_monte_carlo import designs, driven, random_driving, recor
 from benchmarks.random_drives import random_vehicle
 from benchmarks.targets import Targets
 from identifier.certificate import Certificate
+from identifier.methods import certify
 from identifier.paper.network import Network
-from tireid.commands.certificate_table import certificate_of
 
 
 @pytest.fixture(name="case", scope="module")
@@ -27,7 +27,7 @@ def test_a_design_leaks_or_is_projected_and_its_bounds_are_those_of_the_command(
     assert first["error_bound"].value < np.inf
     assert second["projection_bound"].value < np.inf
     for design, certificate in case[1]:
-        assert certificate == certificate_of(design, vehicle)
+        assert certificate == certify(design, vehicle)
     assert leaking.gains.W_max == np.inf
     assert projected.gains.rho_W == 0.0
     assert resting.gains.W_free > 0.0 and resting.gains.V_free > 0.0
@@ -54,14 +54,14 @@ def test_a_bound_that_is_passed_misses_the_target(monkeypatch, share):
     """A certificate that states a thousandth of what it proves is found out."""
 
     def planted(design, vehicle):
-        found = certificate_of(design, vehicle)
+        found = certify(design, vehicle)
         entries = (
             replace(e, value=share * e.value) if e.name.endswith("_bound") else e
             for e in found.properties
         )
         return Certificate(properties=tuple(entries))
 
-    monkeypatch.setattr(bounds_monte_carlo, "certificate_of", planted)
+    monkeypatch.setattr(bounds_monte_carlo, "certify", planted)
     targets = Targets("bounds_monte_carlo")
     record(run(1, 4), targets)
     passed = {key: targets.values[f"{key}/passed"] for key in bounds_monte_carlo.PROVEN}

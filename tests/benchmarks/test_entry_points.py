@@ -14,11 +14,6 @@ Name = tuple[str, str]  # module, name in it
 # Formulas that a benchmark checks against another road; no number of a user comes from them.
 CHECKED = {
     ("models.recordings.reader", "runs"),  # of the library, for a user's own loop over them
-    ("identifier.axle.ellipsoid", "outer_ellipsoid"),  # of the library, for a loop while driving
-    ("identifier.stability.operation", "jacobian_feedback"),
-    ("identifier.stability.limits", "critical_frequency"),
-    ("identifier.stability.limits", "instantaneous_euler_limit"),
-    ("identifier.stability.limit_cycle", "sampled_limit_cycle"),
 }
 
 

@@ -15,7 +15,7 @@ from benchmarks.mpc_sensor_faults import (
 )
 from benchmarks.targets import Targets
 from models.faults import KINDS
-from mpc.loop import Measured
+from mpc.loop.sensing import Measured
 from tireid.commands.drive_case import conditions_of, parse_fault
 from tireid.driving.runs import FROZEN, LEARNING
 

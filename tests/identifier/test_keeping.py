@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from identifier.driving import natural_driving
-from identifier.methods import make_method
+from identifier.methods import certify, make_method
 from identifier.paper.design import VARIANTS, PaperIdentifier, design_for, with_keeping
 from identifier.run import identify
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.vehicle import sedan
-from tireid.commands.certificate_table import certificate_of
 from tireid.commands.demo_story import SENSORS
 
 CAR = sedan()
@@ -61,7 +60,7 @@ def test_every_keeping_of_a_found_design_passes_its_certificate(law, integrator)
     design = design_for(CAR, natural_driving(CAR), law=law, integrator=integrator)
     bounds = {}
     for keeping in KEEPINGS:
-        certificate = certificate_of(kept(keeping, design), CAR)
+        certificate = certify(kept(keeping, design), CAR)
         assert certificate.verdict == "pass", keeping
         loop = design.network.hidden * design.gains.eta_W  # V costs no margin
         assert certificate["gain_sampled"].value == pytest.approx(loop, rel=1e-6)

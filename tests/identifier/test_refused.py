@@ -66,7 +66,7 @@ def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
         assert not online.stale
 
 
-@pytest.mark.parametrize("name", ["axle", "rls", "integral"])
+@pytest.mark.parametrize("name", ["axle", "magic_formula_ekf", "integral"])
 def test_forces_are_right_again_three_seconds_after_a_speed_that_is_lost(name, slalom):
     rows, method = rows_of(slalom), make_method(name, CAR)
     clean = driven(method, rows)[0]
@@ -154,7 +154,7 @@ def test_no_input_brings_a_number_into_a_step_that_is_none(name):
             assert (sizes < 1e9).all(), (port, cases[np.argmin(sizes < 1e9)])  # NaN is not
 
 
-@pytest.mark.parametrize("name", ["axle", "rls", "integral", "eso"])
+@pytest.mark.parametrize("name", ["axle", "integral", "linear_kf"])
 def test_forces_are_zero_and_stale_after_half_a_second_without_a_sample(name, slalom):
     rows, method = rows_of(slalom)[:700], make_method(name, CAR)
     rows[400:500, 0] = np.nan
@@ -170,7 +170,7 @@ def test_forces_are_zero_and_stale_after_half_a_second_without_a_sample(name, sl
 
 
 def test_a_held_force_is_told_until_it_is_stale(slalom):
-    rows, method = rows_of(slalom)[:421], make_method("rls", CAR)
+    rows, method = rows_of(slalom)[:421], make_method("magic_formula_ekf", CAR)
     rows[400:, 1] = np.inf
     online = OnlineIdentifier(method, CAR, 0.01, stale_time=0.2)
     forces = np.array([update(online, row) for row in rows])
@@ -183,7 +183,7 @@ def test_a_held_force_is_told_until_it_is_stale(slalom):
 @pytest.mark.parametrize("time", [0.0, -1.0, np.nan, np.inf])
 def test_a_time_that_is_none_is_refused(time):
     with pytest.raises(ValueError, match="stale_time must be positive and finite"):
-        OnlineIdentifier(make_method("rls", CAR), CAR, 0.01, stale_time=time)
+        OnlineIdentifier(make_method("magic_formula_ekf", CAR), CAR, 0.01, stale_time=time)
 
 
 def test_a_run_that_is_begun_anew_stays_stale_until_a_sample_comes(slalom):

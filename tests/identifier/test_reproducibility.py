@@ -10,7 +10,6 @@ from identifier.paper.design import PaperIdentifier
 from identifier.prediction import predict
 from identifier.reproducibility import (
     AxleRmse,
-    MotionError,
     axle_rms,
     counted_samples,
     force_rms,
@@ -21,6 +20,7 @@ from identifier.reproducibility import (
 )
 from identifier.run import identify
 from identifier.tire_model import load_model
+from identifier.verdict.motion import MotionError
 
 
 @pytest.fixture(name="history")

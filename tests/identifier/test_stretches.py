@@ -7,13 +7,11 @@ import pytest
 
 import tireid as ti
 from identifier.axle.gate import GateState
-from identifier.compare.batch import identify_batch, replay_batch
 from identifier.methods import METHODS, make_method
 from identifier.prediction import predict
 from identifier.refused import GATE
-from identifier.reproducibility import counted_samples, motion_error
-from identifier.run import identify, learn
-from identifier.verdict.motion import Windows
+from identifier.run import identify
+from identifier.verdict.motion import Windows, motion_error
 from models.recordings import Recording, RecordingError, Repair, joined
 from models.recordings.evidence import windows
 from models.recordings.portion import portion
@@ -122,23 +120,6 @@ def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None
     second = cut.taken(cut.stretches[1])
     alone, together = tire.predict(second), tire.predict(cut)
     assert np.array_equal(together[cut.breaks[0] :], alone)
-
-
-def test_a_lane_of_a_batch_has_the_bits_of_the_run_alone(log, cut) -> None:
-    method = make_method("axle", CAR)
-    alone = identify(cut, CAR, method)
-    (lane,) = identify_batch(cut, CAR, [method], freeze_times=[float(cut.t[-300])])
-    for port, values in lane.state[np.inf].items():
-        assert np.array_equal(values, alone.state[port][-1]), port
-    t = float(cut.t[-300])
-    for port, values in lane.state[t].items():
-        assert np.array_equal(values, alone.state_at(t)[port]), port
-    model = alone.freeze()
-    counts = counted_samples(cut, model.min_speed)
-    (error,) = replay_batch(cut, [model], counts=counts)
-    told = predict(model, cut).against_truth
-    assert told is not None and error.front == pytest.approx(told.front, rel=1e-9)
-    assert learn(cut, CAR, method).to_dict() == alone.freeze().to_dict()
 
 
 def test_no_window_reaches_over_a_gap(cut) -> None:

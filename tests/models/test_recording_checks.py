@@ -385,3 +385,112 @@ def test_a_car_that_turns_to_one_side_alone_has_no_amounts() -> None:
     noise = 4.0 * np.random.default_rng(3).standard_normal(left.t.size)
     assert left.a_y is not None
     check_physics(replace(left, a_y=left.a_y + noise))
+
+
+# Everyday driving: long straights, few and gentle bends, sensors with noise.
+
+EVERYDAY_SPEEDS = {"sedan": 20.0, "truck": 16.0, "formula": 30.0, "tenth": 2.0}
+BEND = 3.0  # s
+NOISE = {"v_x": 0.03, "v_y": 0.02, "r": 0.002, "delta_f": 0.0005, "a_y": 0.05}
+
+
+def everyday(car: str, seed: int, *, every: float = 15.0, noisy: float = 1.0) -> Recording:
+    """A bend to either side in turn, of 1 m/s², with rest between them; noise in proportion."""
+    l_f, l_r = CARS[car][2:4]
+    v, L = EVERYDAY_SPEEDS[car], l_f + l_r
+    size = (L / v**2 + 0.002 * (v > 5.0)) * 1.0
+
+    def steering(t: Array) -> Array:
+        k, s = np.divmod(t - 2.0, every)
+        bend = np.sin(np.pi * np.clip(s / BEND, 0.0, 1.0)) * ((s < BEND) & (k >= 0))
+        return size * bend * np.where(k % 2 == 0, 1.0, -1.0)
+
+    made = drive(car, speed=v, steering=steering, duration=62.0)
+    rng, scale = np.random.default_rng(seed), noisy * min(L / 2.7, 1.0)
+    changed = {}
+    for name, sd in NOISE.items():
+        angle = name in ("r", "delta_f")
+        noise = sd * (noisy if angle else scale) * rng.standard_normal(len(made))
+        changed[name] = getattr(made, name) + noise
+    return replace(made, axle_force=None, **changed)
+
+
+WITHOUT = {"all": {}, "no v_y": {"v_y": None}, "no a_y": {"a_y": None}}
+EVERYDAY = {
+    "delta to the right": (scaled(delta_f=-1.0), "delta_f must turn", "sign of delta_f"),
+    "r to the right": (scaled(r=-1.0), "r contradicts ay", "change its sign"),
+    "a_y to the right": (scaled(a_y=-1.0), "ay must be", "sign of ay"),
+    "delta in degrees": (scaled(delta_f=DEGREES), "delta_f must be", "pi/180"),
+    "a hand wheel": (scaled(delta_f=15.0), "delta_f must be", "steering wheel"),
+    "rad/s read as deg/s": (scaled(r=1.0 / DEGREES), "r must be in rad/s", "180/pi"),
+    "deg/s": (scaled(r=DEGREES), "r must be in rad/s", "pi/180"),
+    "a_y in g": (scaled(a_y=1 / 9.81), "ay must be", "9.81"),
+}
+
+
+@pytest.mark.parametrize("car", EVERYDAY_SPEEDS)
+@pytest.mark.parametrize("lack", WITHOUT)
+def test_a_right_everyday_drive_passes(car: str, lack: str) -> None:
+    for seed, noisy in ((0, 1.0), (1, 1.0), (2, 0.0)):
+        made = replace(everyday(car, seed, noisy=noisy), **WITHOUT[lack])
+        check_physics(made)
+        written = {
+            name: np.round(value, 4).astype(np.float32).astype(float)
+            for name in NOISE
+            if (value := getattr(made, name)) is not None
+        }
+        check_physics(replace(made, **written))
+
+
+@pytest.mark.parametrize("error", EVERYDAY)
+@pytest.mark.parametrize("car", ["sedan", "truck", "tenth"])
+def test_an_error_of_an_everyday_drive_rings(car: str, error: str) -> None:
+    plant, start, remedy = EVERYDAY[error]
+    if car == "tenth" and error == "a hand wheel":
+        pytest.skip("a model car has none")
+    for v_y in (True, False):
+        made = everyday(car, 3)
+        message = refusal(plant(made if v_y else replace(made, v_y=None)))
+        assert message.startswith(start), message
+        assert remedy in message
+
+
+@pytest.mark.parametrize("every", [15.0, 28.0])
+def test_a_long_straight_hides_no_sign(every: float) -> None:
+    made = replace(everyday("sedan", 4, every=every), v_y=None)
+    assert refusal(replace(made, delta_f=-made.delta_f)).startswith("delta_f must turn")
+
+
+def test_a_gyro_that_holds_noise_is_named(rng: np.random.Generator) -> None:
+    made = everyday("sedan", 5)
+    noise = 0.002 * rng.standard_normal(len(made))
+    assert refusal(replace(made, r=noise)).startswith("r must be the yaw rate")
+
+
+def test_an_a_y_without_v_x_r_is_not_turned() -> None:
+    made = drive(peak=5.0)
+    lacking = np.gradient(made.v_y, made.t)
+    for part in (replace(made, a_y=lacking), replace(made, a_y=lacking, v_y=None)):
+        message = refusal(replace(part, axle_force=None))
+        assert message.startswith("ay must be")
+        assert "change the sign" not in message
+
+
+def test_an_a_y_that_is_the_yaw_rate_is_named() -> None:
+    made = replace(drive(peak=1.0), axle_force=None)
+    for factor in (1.0, 9.81, -1.0):
+        assert "a copy of the yaw rate? leave it out" in refusal(replace(made, a_y=factor * made.r))
+
+
+@pytest.mark.parametrize("axes", ["east-north", "north-east", "begun at 120 degrees"])
+@pytest.mark.parametrize("peak", [1.5, 5.0])
+def test_velocities_of_the_world_are_named(axes: str, peak: float) -> None:
+    made = drive(peak=peak, duration=30.0)
+    begin = np.radians(120.0) if axes.startswith("begun") else 0.0
+    heading = begin + np.concatenate([[0.0], np.cumsum(made.r[:-1])]) * made.dt
+    velocity = (made.v_x + 1j * made.v_y) * np.exp(1j * heading)
+    if axes == "north-east":  # as NED: y to the right, r and steering with it
+        velocity = np.conj(velocity)
+        made = replace(made, r=-made.r, delta_f=-made.delta_f)
+    world = replace(made, v_x=velocity.real, v_y=velocity.imag, a_y=None, axle_force=None)
+    assert "of the world's axes" in refusal(world)

@@ -9,7 +9,8 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.certificate import Certificate, Property
-from identifier.driving import natural_driving
+from identifier.driving import Driving, natural_driving
+from identifier.methods import certify
 from identifier.paper.design import (
     PaperIdentifier,
     design_for,
@@ -23,7 +24,6 @@ from models.vehicle import sedan
 from tireid.cli import main
 from tireid.commands.certificate_table import (
     advised,
-    certificate_of,
     certificate_text,
     number,
     unit_text,
@@ -88,7 +88,7 @@ def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path)
     assert code == 0
     assert f"wrote {path}" in said.err
     design = read_design(path)
-    phase = certificate_of(design, sedan())["phase_margin"].value
+    phase = certify(design, sedan())["phase_margin"].value
     assert phase == pytest.approx(50.0, abs=0.5)
     assert checked(capsys, *words)[0] == 2  # nothing is overwritten unasked
     assert checked(capsys, *words, "--force")[0] == 0
@@ -106,8 +106,7 @@ def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path)
         (["--tune", "d.toml", "--phase-margin", "120"], "phase margin must be in"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["--bandwidth", "0.5"], "which axle has not: add --paper, --method integral"),
-        (["--method", "rls", "--monte-carlo", "3"], "--monte-carlo asks about the gains"),
-        (["--tune", "d.toml", "--method", "rls"], "rls has none"),
+        (["--tune", "d.toml", "--method", "linear"], "linear has none"),
         (["--tune", "d.toml", "--design", "d.toml"], "give no --design FILE"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
     ],
@@ -127,7 +126,7 @@ def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
     code, said = checked(capsys, "--paper", "--along", logs / "slalom.csv", "--out", folder)
     assert code == 0
     margin = float(re.search(r"gain margin there ([\d.]+)", said.out).group(1))
-    worst = certificate_of(PaperIdentifier.for_vehicle(sedan()), sedan())["gain_sampled"].margin
+    worst = certify(PaperIdentifier.for_vehicle(sedan()), sedan())["gain_sampled"].margin
     assert margin > worst  # no recorded regressor is worse than the worst
     for name in ("locus.png", "bounds.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
@@ -139,9 +138,7 @@ def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
 
 def test_the_gains_of_the_paper_study_are_judged():
     """The instantaneous law is stable but hardly damped; the integral law has its margins."""
-    judged = {
-        law: certificate_of(paper_design(law, 0), sedan()) for law in ("instantaneous", "integral")
-    }
+    judged = {law: certify(paper_design(law, 0), sedan()) for law in ("instantaneous", "integral")}
     assert judged["instantaneous"]["damping"].value < 0.2
     assert judged["instantaneous"]["phase_margin"].value < 20.0
     assert judged["integral"]["gain_sampled"].margin > 1.5
@@ -284,3 +281,17 @@ def test_words_about_a_drive_want_a_drive(capsys, words, said):
     code, told = checked(capsys, *words)
     assert code == 2
     assert said in told.err
+
+
+def test_the_same_file_gives_the_same_verdict_and_options_are_said(tmp_path, capsys):
+    path = tmp_path / "design.toml"
+    words = ["--bandwidth", "0.5", "--slip", "0.09", "--noise-r", "0.02"]
+    assert main(["check", "--tune", str(path), *words, "--json"]) == 0
+    there = json.loads(capsys.readouterr().out)
+    assert read_design(path).driving == Driving(**there["conditions"])
+    main(["check", "--design", str(path), "--json"])
+    assert json.loads(capsys.readouterr().out) == there
+    main(["check", "--design", str(path)])
+    assert "conditions: as stored in the design\n" in capsys.readouterr().out
+    main(["check", "--design", str(path), "--slip", "0.2"])
+    assert "as stored in the design, but for --slip" in capsys.readouterr().out

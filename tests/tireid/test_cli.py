@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from identifier.methods import METHODS
+from identifier.methods import methods
 from tireid.cli import build_parser, main, one_line
 from tireid.commands import COMMANDS
 
@@ -45,8 +45,14 @@ def test_without_a_word_it_tells_what_there_is(capsys):
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
-        (["identify", "log.csv", "--vehicle", "car.toml", "--law", "rls"], "--law is --method now"),
-        (["compare", "--workers", "2"], "--workers is --jobs now"),
+        (
+            ["identify", "log.csv", "--vehicle", "car.toml", "--law", "axle"],
+            "--law is --method now",
+        ),
+        (
+            ["fleet", "learn", "l.csv", "--vehicle", "c", "--out", "o", "--workers", "2"],
+            "--workers is --jobs now",
+        ),
         (["check", "--figures", "out"], "--figures is --out now"),
         (["drive", "--nonsense"], "see tireid --help"),
     ],
@@ -108,7 +114,7 @@ def test_what_learns_is_named_alike_wherever_one_method_learns():
     options = options_of()
     for name in ("identify", "check", "export", "drive"):
         assert {name} <= set(options["--paper"]) & set(options["--design"])
-        assert options["--method"][name].choices == METHODS
+        assert options["--method"][name].choices == methods()
     assert set(options["--method"]) == {"identify", "check", "export", "drive", "compare"}
 
 
@@ -122,7 +128,7 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tireid.commands.paper.run_study", interrupted)
+    monkeypatch.setattr("identifier.paper_study.run_study", interrupted)
     assert main(["paper", "--out", str(tmp_path / "out")]) == 130
     assert "interrupted" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,5 @@
-"""A sweep on a Dask cluster of two workers is the sweep of this machine, and can be resumed."""
+"""A fleet on a Dask cluster of two workers is the fleet of this machine."""
 
-import json
 import os
 import socket
 import sys
@@ -13,9 +12,6 @@ import pytest
 
 import tireid.cluster
 from benchmarks.local_cluster import free_port, start
-from identifier.compare.course import Course
-from identifier.compare.sweep import CHUNK, sweep
-from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import ClusterError, cluster
@@ -37,31 +33,6 @@ def address(tmp_path_factory):
     for process in reversed(running):
         process.terminate()
         process.wait(timeout=20)
-
-
-@pytest.fixture(scope="module")
-def course(logs):
-    recordings = tuple(read_recording(logs / f"{name}.csv") for name in ("slalom", "quick"))
-    return Course(vehicle=sedan(), recordings=recordings, min_speed=1.0)
-
-
-NAMES = ("integral", "linear")
-
-
-def test_two_workers_find_what_this_machine_finds(address, course):
-    designs, said = CHUNK + 5, []
-    with cluster(address) as elsewhere:
-        spread = sweep(
-            NAMES,
-            course,
-            designs=designs,
-            seed=3,
-            elsewhere=elsewhere,
-            progress=said.append,
-            note=lambda _: None,  # how far it has come, on a machine that is slow
-        )
-    assert spread == sweep(NAMES, course, designs=designs, seed=3, workers=1)
-    assert any(line.startswith(f"integral: {designs} designs") for line in said)
 
 
 def where(pause, item):
@@ -158,34 +129,14 @@ def wait_until_open(port, patience=20.0):
     raise TimeoutError(port)
 
 
-@pytest.fixture
-def words(logs):
-    return ["compare", str(logs / "slalom.csv"), str(logs / "quick.csv"), "--vehicle",
-            str(logs / "car.toml"), "--method", *NAMES, "--floor", "0"]  # fmt: skip
-
-
-def test_the_command_writes_the_same_sweep_from_a_cluster(words, address, tmp_path, monkeypatch):
-    sweeps = {}
-    for name, extra in (("here", ["--jobs", "1"]), ("there", ["--scheduler", address])):
-        monkeypatch.setenv("TIREID_CACHE", str(tmp_path / f"cache {name}"))
-        out = tmp_path / name
-        assert main([*words, "--sweep", "4", "--out", str(out), *extra]) == 0
-        sweeps[name] = json.loads((out / "compare.json").read_text())["sweep"]
-        kept = list((tmp_path / f"cache {name}" / "sweeps").glob("*.json"))
-        assert len(kept) == len(NAMES)
-    assert set(sweeps["here"]) == set(NAMES)
-    assert sweeps["there"] == sweeps["here"]
-
-
-def test_the_command_names_what_is_wrong_with_the_cluster(words, tmp_path, monkeypatch, capsys):
+def test_the_command_names_what_is_wrong_with_the_cluster(logs, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
     monkeypatch.setattr(tireid.cluster, "PATIENCE", 1.0)
     nobody = f"tcp://127.0.0.1:{free_port()}"
-    out = ["--out", str(tmp_path / "out")]
-    assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2
+    words = ["fleet", "learn", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--out", str(tmp_path / "out"), "--scheduler", nobody]
+    assert main(words) == 2
     assert f"{nobody}: no Dask scheduler answers there" in capsys.readouterr().err
-    assert main([*words, *out, "--scheduler", nobody]) == 2
-    assert "--scheduler does sweeps only" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2
+    assert main(words) == 2
     assert "needs Dask: pip install dask distributed (" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()

@@ -165,3 +165,5 @@ def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():
     assert not refused.valid
     assert [one.text for one in refused.findings] == ["doctor: unit", "doctor: delay"]
     assert said(late, unit, repair=late.repair) == fine
+    assert not said(replace(unit, code="factor", channel="v_x")).valid, "it scales all forces"
+    assert said(replace(unit, code="factor", channel="a_y")).valid

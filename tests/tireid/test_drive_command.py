@@ -13,8 +13,7 @@ from models.files import digest
 from models.friction import Friction
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import CarSensors
-from mpc.loop.sensing import cornering_limit
+from mpc.loop.sensing import CarSensors, cornering_limit
 from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
 from tests.pages import faults_of, outline
@@ -200,7 +199,7 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--path", "nowhere"], "--path: there is no path 'nowhere'; iso-3888-1, iso-3888-2"),
         (["--path", "nowhere.csv"], "nowhere.csv"),
         (["--speed", "17"], "--speed 17 has no unit"),
-        (["--mu", "0"], "--mu: friction must be 0.05 to 1.5, it is 0"),
+        (["--mu", "0"], "--mu must lie between 0.05 and 1.5, it is 0"),
         (["--mu-drop", "500:0.5"], "--mu-drop 500 is beyond the path"),
         (["--delay", "15"], "--delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
         (["--laps", "2"], "--laps is for a closed path"),
@@ -209,7 +208,6 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
         (["--network-iso"], "go with --network"),
-        (["--plant", "drift", "--vehicle", "car.toml"], "--plant drift brings a car of its own"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -223,12 +221,6 @@ def test_a_car_without_a_chassis_is_refused(bend, tmp_path, capsys):
     replace(sedan(), chassis=None).to_toml(tmp_path / "flat.toml")
     words = ["--path", bend, "--vehicle", tmp_path / "flat.toml", "--out", tmp_path / "out"]
     assert "chassis" in refusal(capsys, words)
-
-
-def test_a_plant_whose_package_is_missing_says_what_to_install(bend, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "vehiclemodels.parameters_vehicle2", None)
-    words = ["--path", bend, "--plant", "multi-body", "--out", tmp_path / "out"]
-    assert "pip install commonroad-vehicle-models (" in refusal(capsys, words)
 
 
 def test_without_a_compiler_it_says_what_is_missing(bend, tmp_path, capsys, monkeypatch):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.vehicle import sedan
-from mpc.loop import Measured
-from tireid.driving import learning_drive
+from mpc.loop.sensing import Measured
+from tireid.driving.learn import learning_drive
 
 CAR, PERIOD, GRIP = sedan(), 0.01, 9.0
 

@@ -9,7 +9,7 @@ from models.faults import SensorFault
 from tireid.cli import build_parser, main
 from tireid.commands.drive_case import conditions_of, parse_drop, parse_fault, parse_speed
 from tireid.driving.runs import BacksOff
-from tireid.driving.setup import SpeedWish, require_friction
+from tireid.driving.setup import SpeedWish
 
 
 @pytest.mark.parametrize(
@@ -61,19 +61,13 @@ def test_a_drop_is_a_place_and_a_friction():
         ("nan:0.5", "wants S:MU"),
         ("-1:0.5", "the place must not be negative, it is -1 m"),
         ("inf:0.5", "the place"),
-        ("60:0", "friction must be 0.05 to 1.5, it is 0"),
+        ("60:0", "must lie between 0.05 and 1.5, it is 0"),
     ],
 )
 def test_what_is_no_drop_is_refused_with_its_rule(text, said):
     with pytest.raises(ValueError, match="--mu-drop") as refusal:
         parse_drop(text)
     assert said in str(refusal.value)
-
-
-def test_a_friction_names_the_word_that_gave_it():
-    assert require_friction("--mu", 0.5) == 0.5
-    with pytest.raises(ValueError, match="--mu: friction must be"):
-        require_friction("--mu", 2.0)
 
 
 def test_a_fault_is_a_channel_a_kind_times_and_a_size():
@@ -104,7 +98,7 @@ def test_what_is_no_fault_is_refused_with_its_rule(text, said):
 @pytest.mark.parametrize("word", ["-0.1", "0.6", "nan"])
 def test_a_weave_that_is_none_is_refused_before_anything_is_driven(tmp_path, capsys, word):
     assert main(["drive", "--dither", word, "--out", str(tmp_path / "out")]) == 2
-    assert "--dither must be 0 to 0.5 m" in capsys.readouterr().err
+    assert "--dither in m must lie between 0 and 0.5" in capsys.readouterr().err
 
 
 def test_caution_is_a_share_and_zero_by_default():
@@ -113,7 +107,7 @@ def test_caution_is_a_share_and_zero_by_default():
 
     assert conditions_of(told()).caution == 0.0
     assert conditions_of(told("--caution", "0.5")).caution == 0.5
-    with pytest.raises(ValueError, match="--caution must be from 0 to 1, it is 2"):
+    with pytest.raises(ValueError, match="--caution must lie between 0 and 1, it is 2"):
         conditions_of(told("--caution", "2"))
 
 

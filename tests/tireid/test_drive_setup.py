@@ -7,7 +7,8 @@ from models.vehicle import sedan
 from mpc.path import Path
 from tireid.commands.drive import headline
 from tireid.commands.drive_case import parse_fault
-from tireid.driving import Conditions, Setup, SpeedWish
+from tireid.driving.runs import Conditions
+from tireid.driving.setup import Setup, SpeedWish
 
 AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
 COURSE = Path.from_waypoints(90.0 * np.cos(AROUND), 40.0 * np.sin(AROUND), closed=True, name="oval")
@@ -16,7 +17,7 @@ LANE = Path.from_waypoints(LANE_X, 2.0 * np.tanh((LANE_X - 40.0) / 6.0), name="l
 
 
 def setup(path, wish, drops=(), mu=1.0):
-    return Setup(path=path, vehicle=sedan(), plant="double-track", mu=mu, drops=drops, wish=wish)
+    return Setup(path=path, vehicle=sedan(), mu=mu, drops=drops, wish=wish)
 
 
 def test_at_a_constant_speed_the_car_is_expected_after_way_over_speed_in_any_lap():

@@ -11,8 +11,8 @@ from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import prediction_tire
 from tireid.commands.drive_results import known_curves, steady_curve
-from tireid.driving import Setup, SpeedWish
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
+from tireid.driving.setup import Setup, SpeedWish
 from tireid.figures.drive import AT_THE_END
 
 CAR = sedan()
@@ -25,7 +25,6 @@ def setup():
     return Setup(
         path=LANE,
         vehicle=CAR,
-        plant="double-track",
         mu=0.9,
         drops=((60.0, 0.4),),
         wish=SpeedWish(None, 16.0),

@@ -63,7 +63,7 @@ def test_the_report_shows_the_side_slip_that_was_told(result):
     assert faults_of(page) == []
     told, text = summary_of(result)["lateral_velocity"], outline(page).text
     assert f"{told['rms_error_deg']:.2f}°" in text
-    assert "Lateral velocity, which nothing measured" in text
+    assert "Lateral velocity, which no sensor measured" in text
 
 
 def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, capsys, undrawn):  # noqa: F811

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export import processor as figures
+from codegen import processor as figures
 from identifier.export.compiled import CompiledPackage
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method
@@ -140,8 +140,8 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
         (["--method", "linear"], "formula without state"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
         (["--weights", "missing.json"], "missing.json"),
-        (["--method", "eso", "--onnx"], "--onnx"),
-        (["--method", "rls", "--with-a-y"], "has no use for a_y"),
+        (["--method", "washout", "--onnx"], "--onnx"),
+        (["--method", "magic_formula_ekf", "--with-a-y"], "has no use for a_y"),
     ],
 )
 def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, capsys):

@@ -26,23 +26,25 @@ from identifier.reproducibility import AxleRmse, Replay, Reproduction
 from identifier.run import History, identify
 from models.recordings import Recording
 from models.vehicle import Vehicle
-from tireid.figures import (
-    comparison_figure,
-    error_figure,
-    figure_png,
-    figure_svg,
+from tireid.figures.forces import (
     force_figure,
     inputs_figure,
-    learnt_axles_figure,
     prediction_figure,
-    save_figure,
-    scheme_figure,
-    slip_figure,
-    weights_figure,
+    side_by_side_figure,
 )
-from tireid.figures.forces import side_by_side_figure
-from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
-from tireid.figures.style import BLACK, force_range, force_unit_of, impulse_unit, with_own_fonts
+from tireid.figures.paper import comparison_figure, error_figure, weights_figure
+from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM, scheme_figure
+from tireid.figures.style import (
+    BLACK,
+    figure_png,
+    figure_svg,
+    force_range,
+    force_unit_of,
+    impulse_unit,
+    save_figure,
+    with_own_fonts,
+)
+from tireid.figures.tires import learnt_axles_figure, slip_figure
 
 N = 300
 CAR = Vehicle(

@@ -3,53 +3,67 @@
 import json
 import math
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from identifier.axle import AxleIdentifier
-from identifier.axle.information import TOGETHER, Information, change_from, reference_of, total
-from identifier.axle.prior import fiala_weights
+from identifier.estimate.information import GRID, SIZE, Information, coordinates
+from identifier.estimate.priors import Priors
+from identifier.estimate.solve import settled
 from identifier.frozen import vehicle_numbers
+from identifier.motion.parameters import INDEX
 from models.vehicle import sedan
-from tireid.fleet.merge import MergeError, fleet_prior, key_of, merge, sizes, usable
-from tireid.fleet.store import LogRow, Store, information_columns
-from tireid.fleet.watch import Alarm, Watching, watch
+from tireid.fleet.merge import (
+    APART,
+    CHANGES,
+    PASSES,
+    TIRES,
+    MergeError,
+    errors_of,
+    fleet_prior,
+    key_of,
+    merge,
+    sizes,
+    usable,
+)
+from tireid.fleet.store import TOLD, LogRow, Store, information_columns
+from tireid.fleet.watch import Alarm, Watching, change_from, watch
 
 pyarrow = pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
 pytest.importorskip("fsspec", reason="needs pyarrow and fsspec")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 CAR = replace(sedan(), chassis=None)
-DESIGN = AxleIdentifier.for_vehicle(CAR, dt=0.01)
-N, Q = len(DESIGN.ladder), len(DESIGN.ladder) + 3
+Q = len(TOLD)
+SCALES = np.append(np.full(20, 0.05), np.full(Q - 20, 0.02))  # of u that a residual of 1 is worth
 
 
-def told_of(theta, rng, *, samples=400, seconds=60.0, noise=0.0):
-    """Information of random regressors on parameters (2, q), and its arrays."""
-    h = rng.normal(size=(samples, 2, Q)) * np.append(np.ones(N), [0.01, 0.1, 0.01])
-    y = np.einsum("kai,ai->ka", h, theta) + noise * rng.normal(size=(samples, 2))
-    return Information(
-        matrix=np.einsum("kai,kaj->aij", h, h),
-        vector=np.einsum("kai,ka->ai", h, y),
-        square=(y**2).sum(axis=0),
-        samples=float(samples),
-        seconds=seconds,
-    )
+def told_of(p, rng, *, seconds=60.0, noise=0.0):
+    """Information of random residuals, linear in u, of parameters (p,)."""
+    u, _ = coordinates(p)
+    J = rng.normal(size=(200, Q)) / SCALES / 4.0
+    y = J @ u[TOLD] + noise * rng.normal(size=200)
+    matrix, vector = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
+    matrix[np.ix_(TOLD, TOLD)] = 0.5 * (J.T @ J + (J.T @ J).T)
+    vector[TOLD] = J.T @ y
+    return Information(matrix=matrix, vector=vector, seconds=seconds)
 
 
-def tires(front=1.0, rear=1.0, friction=1.0):
-    """Parameters (2, q) of brush tires over those of the car as it is told."""
-    theta = np.zeros((2, Q))
-    C = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear]) / CAR.axle_loads
-    for i, factor in enumerate((front, rear)):
-        theta[i, :N] = fiala_weights(C[i] * factor, 0.9 * friction, DESIGN.ladder)
-    return theta
+def tires(front=1.0, rear=1.0, friction=1.0, car=CAR):
+    """Parameters of tires stiffer than those of the prior, or on another road."""
+    p = Priors.of(car).mean.copy()
+    p[INDEX["ln_stiffness_f"]] += np.log(front)
+    p[INDEX["ln_stiffness_r"]] += np.log(rear)
+    for axle in "fr":
+        p[INDEX[f"ln_grip_{axle}"]] += np.log(friction)
+    return p
+
+
+def merged(rows, by):
+    return merge(lambda: iter(rows), by)
 
 
 def row_of(k, parts, *, car=CAR, **more):
-    excitation = np.arange(18.0).reshape(2, 9) + k * np.array([[1.0], [-1.0]])
     row = LogRow(
         log=f"{k:03d}",
         content=f"{k:032x}",
@@ -59,7 +73,7 @@ def row_of(k, parts, *, car=CAR, **more):
         date=f"2026-{k // 28 + 1:02d}-{k % 28 + 1:02d}",
         tags='{"driver": "ann"}',
         car=json.dumps(vehicle_numbers(car)),
-        excitation=excitation.ravel().tolist(),
+        reach=[0.01 * k, 0.1, 10.0 - k, 20.0, -1.0, 0.1 * k, 0.3, 0.2],
         part_begin=[60.0 * i for i in range(len(parts))],
         **information_columns(parts),
     )
@@ -68,15 +82,12 @@ def row_of(k, parts, *, car=CAR, **more):
 
 def test_what_parts_tell_comes_back_from_a_store(tmp_path):
     rng = np.random.default_rng(1)
-    parts = [told_of(rng.normal(size=(2, Q)), rng, seconds=s) for s in (60.0, 31.0)]
+    parts = [told_of(tires(), rng, seconds=s) for s in (60.0, 31.0)]
     store = Store(str(tmp_path / "store"))
     store.keep([row_of(0, parts)])
     store.settle()
     (row,) = store.rows()
-    assert (
-        row == replace(row_of(0, parts), findings=[])
-        and len(row.matrix) == 2 * 2 * Q * (Q + 1) // 2
-    )
+    assert row == replace(row_of(0, parts), findings=[]) and len(row.matrix) == 2 * Q * (Q + 1) // 2
     path = tmp_path / "store" / "logs" / row.bucket
     table = parquet.read_table(path)
     for name in ("tires", "findings"):  # as another program may leave them
@@ -85,9 +96,9 @@ def test_what_parts_tell_comes_back_from_a_store(tmp_path):
     parquet.write_table(table, path)
     assert store.rows() == [replace(row, tires="", findings=())]
     for one, back in zip(parts, row.parts, strict=True):
-        for name in ("matrix", "vector", "square"):
+        for name in ("matrix", "vector"):
             assert (getattr(back, name) == getattr(one, name)).all()
-        assert (back.samples, back.seconds) == (one.samples, one.seconds)
+        assert back.seconds == one.seconds
 
 
 def test_logs_are_spread_over_sixteen_files_and_the_runs_of_one_lie_together():
@@ -99,72 +110,72 @@ def test_logs_are_spread_over_sixteen_files_and_the_runs_of_one_lie_together():
     assert len({replace(row, content="").bucket for row in rows}) == 16
 
 
-def test_sums_are_exact_in_any_order_and_in_any_portions():
-    rng = np.random.default_rng(2)
-    some = []
-    for _ in range(2 * TOGETHER + 7):
-        wide = 10.0 ** rng.uniform(-12, 12, size=(2, Q)) * rng.choice([-1.0, 1.0], size=(2, Q))
-        some.append(replace(told_of(np.ones((2, Q)), rng, samples=3), vector=wide))
-    exact = np.array(
-        [[float(sum(Fraction(one.vector[a, i]) for one in some)) for i in range(Q)] for a in (0, 1)]
-    )
-    for order in (some, some[::-1], sorted(some, key=lambda one: one.vector[0, 0])):
-        told = total(order, Q)
-        assert (told.vector == exact).all() and told.samples == 3.0 * len(some)
-    assert (told.matrix == total(some, Q).matrix).all() and told.seconds == 60.0 * len(some)
-    assert not total([], Q).vector.any()
-
-
-def test_a_merged_model_solves_the_normal_equations_of_prior_and_logs():
+def test_a_merged_model_is_the_optimum_of_prior_and_logs():
     rng = np.random.default_rng(3)
-    parts = [told_of(tires(1.1, 0.9), rng, samples=40, noise=0.1) for _ in range(6)]
+    parts = [told_of(tires(1.1, 0.9), rng, noise=1.0) for _ in range(6)]
     rows = [row_of(k, parts[2 * k : 2 * k + 2]) for k in range(3)]
-    (one,) = merge(iter(rows), ["vehicle", "month", "driver"])
+    (one,) = merged(rows, ["vehicle", "month", "driver"])
     assert one.key == (("vehicle", CAR.name), ("month", "2026-01"), ("driver", "ann"))
-    assert (one.name, one.logs) == (f"{CAR.name} 2026-01 ann", 3)
-    assert merge(rows, [])[0].name == "all"
-    before = reference_of(DESIGN, CAR)
-    for i in (0, 1):
-        Lambda0 = np.linalg.inv(before.covariance[i])
-        mean = np.append(before.W[i], before.own[i])
-        Lambda = sum(part.matrix[i] for part in parts)
-        eta = sum(part.vector[i] for part in parts)
-        theta = np.linalg.solve(Lambda0 + Lambda, Lambda0 @ mean + eta)
-        assert np.append(one.model.W[i], one.model.own[i]) == pytest.approx(
-            theta, rel=1e-7, abs=1e-9
-        )
-        assert np.linalg.inv(one.model.covariance[i]) == pytest.approx(
-            Lambda0 + Lambda, rel=1e-6, abs=1e-3
-        )
-    theta = np.hstack([one.model.W, one.model.own])
-    squares = sum(
-        part.square
-        - 2.0 * (theta * part.vector).sum(axis=1)
-        + np.einsum("ai,aij,aj->a", theta, part.matrix, theta)
-        for part in parts
-    )
-    assert one.misfit == pytest.approx(squares / 240.0)
-    each = np.array([np.reshape(row.excitation, (2, 9)) for row in rows])
-    assert (one.model.excitation[:, 0] == each[:, :, 0].max(axis=0)).all()
-    assert (one.model.excitation[:, 1:] == each[:, :, 1:].sum(axis=0)).all()
-    assert one.told.seconds == 360.0
+    assert (one.name, one.logs, one.elsewhere) == (f"{CAR.name} 2026-01 ann", 3, 0)
+    assert merged(rows, [])[0].name == "all"
+    beliefs, model = Priors.of(CAR), one.model
+    sd = APART * beliefs.sd[[INDEX[name] for name in CHANGES]]
+
+    def cost(p):
+        """Over each log's own errors of sensors, the least."""
+        u, _ = coordinates(p)
+        total = 0.5 * (p - beliefs.mean) @ beliefs.information @ (p - beliefs.mean)
+        for part in parts:
+            along, _ = errors_of(beliefs)
+            H = along.T @ part.matrix @ along + np.diag(sd**-2.0)
+            d = -np.linalg.solve(H, along.T @ (part.matrix @ u - part.vector))
+            v = u + along @ d
+            total += 0.5 * v @ part.matrix @ v - part.vector @ v + 0.5 * np.sum((d / sd) ** 2)
+        return total
+
+    least = cost(model.p)
+    for k in np.flatnonzero(beliefs.moves):
+        step = np.zeros(model.p.size)
+        step[k] = 0.3 * np.sqrt(model.covariance[k, k])
+        for p in (model.p + step, model.p - step):
+            if beliefs.low[k] <= p[k] <= beliefs.high[k]:
+                assert cost(p) > least - 1e-3
+    assert model["ln_stiffness_f"] == pytest.approx(tires(1.1)[INDEX["ln_stiffness_f"]], abs=0.1)
+    k = INDEX["v_y_bias"]
+    assert model.covariance[k, k] > sd[CHANGES.index("v_y_bias")] ** 2  # of the next log
+    assert model.driven.tolist() == [0.02, 0.1] and model.speeds.tolist() == [8.0, 20.0]
+    assert model.a_x.tolist() == [-1.0, 0.2] and one.told.seconds == 360.0
+
+
+def test_a_log_of_a_wet_road_does_not_lower_the_grip_of_the_others():
+    rng = np.random.default_rng(7)
+    dry = [row_of(k, [told_of(tires(), rng, noise=1.0)]) for k in range(4)]
+    wet = row_of(4, [told_of(tires(friction=0.5), rng, noise=1.0)])
+    (alone,), (both,) = merged(dry, []), merged([*dry, wet], [])
+    assert (alone.elsewhere, both.elsewhere, both.logs) == (0, 1, 5)
+    far = GRID.index(0.19)
+    alone, both = (coordinates(one.model.p)[0][far] for one in (alone, both))
+    assert both == pytest.approx(alone, rel=0.03)
+    told = sum((row.parts[0] for row in [*dry, wet]), Information.nothing())
+    together = coordinates(settled(Priors.of(CAR).after(told), tires())[0])[0][far]
+    assert together < 0.95 * alone
 
 
 def test_rows_are_grouped_by_what_they_say_and_a_log_counts_once():
     rng = np.random.default_rng(4)
     rows = [row_of(k, [told_of(tires(), rng)]) for k in range(40)]
-    assert [len(merge(rows, [name])) for name in ("log", "week", "month", "tires", "setting")] == [
+    assert [len(merged(rows, [name])) for name in ("log", "week", "month", "tires", "setting")] == [
         40, 7, 2, 1, 1,
     ]  # fmt: skip
     assert key_of(rows[4], ["week", "date"]) == (("week", "2026-W02"), ("date", "2026-01-05"))
     assert key_of(row_of(0, [], date="2024-12-30T10:00"), ["week"]) == (("week", "2025-W01"),)
     again = replace(rows[3], setting="otherwise")
     with pytest.raises(MergeError, match=r"^003 was learnt with two settings, told and otherwise"):
-        merge([*rows, again], [])
-    assert len(merge([*rows, again], ["setting"])) == 2
-    assert merge([*rows, replace(rows[3], run="2")], [])[0].logs == 41
+        merged([*rows, again], [])
+    assert len(merged([*rows, again], ["setting"])) == 2
+    assert merged([*rows, replace(rows[3], run="2")], [])[0].logs == 41
     other = row_of(50, [told_of(tires(), rng)], car=replace(CAR, mass=1600.0))
-    for ask in (lambda: merge([*rows, other], []), lambda: watch([*rows, other], [], Watching())):
+    for ask in (lambda: merged([*rows, other], []), lambda: watch([*rows, other], [], Watching())):
         with pytest.raises(MergeError, match=r"^000 and 050 are of cars whose files differ"):
             ask()
 
@@ -186,44 +197,54 @@ def test_a_fleets_prior_is_where_expectation_and_maximization_rest():
     cars = [replace(CAR, name=f"{k}", mass=1400.0 + 50.0 * k, l_f=1.0 + 0.05 * k) for k in range(5)]
     rows = []
     for k, car in enumerate(cars):
-        theta = tires(*np.exp(0.1 * rng.normal(size=3)))
-        theta[:, N:] = np.abs(rng.normal(size=(2, 3))) * [0.01, 0.1, 0.002]
-        rows.append(row_of(k, [told_of(theta, rng, noise=1.0)], car=car))
-    groups = merge(rows, ["vehicle"])
+        p = tires(*np.exp(0.1 * rng.normal(size=3)), car=car)
+        rows.append(row_of(k, [told_of(p, rng, noise=1.0)], car=car))
+    groups = merged(rows, ["vehicle"])
     prior = fleet_prior(groups)
-    m, T = prior.mean, prior.between
-    means, spreads, wide = [], [], []
-    for one in groups:
-        car = one.model.vehicle
-        size = np.ones((2, Q))
-        size[:, Q - 3], size[1, Q - 1] = car.wheelbase, math.sqrt(9.81 * car.wheelbase)
-        assert sizes(car, Q) == pytest.approx(size, rel=1e-3)
-        size = sizes(car, Q)
-        before = reference_of(AxleIdentifier.for_vehicle(car, dt=0.01), car)
-        for i in (0, 1):
-            scale = np.outer(size[i], size[i])
-            Lambda, eta = one.told.matrix[i] * scale, one.told.vector[i] * size[i]
-            P = np.linalg.inv(np.linalg.inv(T[i]) + Lambda)
-            means.append(P @ (np.linalg.solve(T[i], m[i]) + eta))
-            spreads.append(P)
-            wide.append(before.covariance[i] / scale)
-    means = np.reshape(means, (5, 2, Q))
-    spreads, wide = np.reshape(spreads, (5, 2, Q, Q)), np.reshape(wide, (5, 2, Q, Q))
-    assert m == pytest.approx(means.mean(axis=0), abs=1e-3)
-    away = means - m
-    rest = (
-        2.0 * wide.mean(axis=0) + spreads.sum(axis=0) + np.einsum("vai,vaj->aij", away, away)
-    ) / 7.0
-    sd = np.sqrt(np.einsum("aii->ai", rest))
-    assert np.abs((T - rest) / (sd[:, :, None] * sd[:, None, :])).max() < 0.01
+    size = sizes(cars[0])
+    lengths = [INDEX["compliance_f"], INDEX["compliance_r"]]
+    wheelbase = cars[0].wheelbase
+    assert size.tolist() == [wheelbase if k in lengths else 1.0 for k in TIRES]
+    stiff = TIRES.index(INDEX["ln_stiffness_f"])
+    told = [one.model["ln_stiffness_f"] for one in groups]
+    assert prior.mean[stiff] == pytest.approx(np.mean(told), abs=0.1)
+    m0 = np.mean([Priors.of(car).mean[TIRES] / sizes(car) for car in cars], axis=0)
+    S0 = np.mean(
+        [
+            Priors.of(car).covariance[np.ix_(TIRES, TIRES)] / np.outer(sizes(car), sizes(car))
+            for car in cars
+        ],
+        axis=0,
+    )
+    known = []
+    for one, car in zip(groups, cars, strict=True):  # what is marginal, by the inverse of a whole
+        usual, moves = Priors.of(car), np.flatnonzero(Priors.of(car).moves)
+        _, slope, H = one.told.around(one.model.p)
+        sensors = [k for k in moves if k not in TIRES]
+        H[np.ix_(sensors, sensors)] += usual.information[np.ix_(sensors, sensors)]
+        covariance = np.linalg.inv(H[np.ix_(moves, moves)])
+        some = [list(moves).index(k) for k in TIRES]
+        matrix = np.linalg.inv(covariance[np.ix_(some, some)])
+        vector = matrix @ one.model.p[TIRES] - slope[TIRES]
+        known.append((matrix * np.outer(sizes(car), sizes(car)), vector * sizes(car)))
+    m, T = m0, S0
+    for _ in range(PASSES):
+        P = [np.linalg.inv(np.linalg.inv(T) + matrix) for matrix, _ in known]
+        means = [one @ (np.linalg.solve(T, m) + v) for one, (_, v) in zip(P, known, strict=True)]
+        M = np.linalg.inv(5.0 * np.linalg.inv(T) + np.linalg.inv(S0))
+        m = M @ (np.linalg.solve(T, np.sum(means, axis=0)) + np.linalg.solve(S0, m0))
+        away = np.array(means) - m
+        T = (2.0 * S0 + away.T @ away + np.sum(P, axis=0)) / 7.0
+    sd = np.sqrt(np.diag(T))
+    assert np.abs((prior.mean - m) / sd).max() < 1e-3
+    assert np.abs((prior.spread - T - M) / np.outer(sd, sd)).max() < 1e-3
     model = prior.model(cars[0])
-    size = sizes(cars[0], Q)
-    assert np.hstack([model.W, model.own]) == pytest.approx(m * size, rel=1e-6)
-    assert model.covariance == pytest.approx(1.2 * T * size[:, :, None] * size[:, None, :])
+    assert model.p[TIRES] == pytest.approx(m * size, abs=1e-3)
+    both = np.ix_(TIRES, TIRES)
+    assert model.covariance[both] == pytest.approx(prior.spread * np.outer(size, size))
+    off = INDEX["v_y_bias"]
+    assert model.covariance[off, off] == Priors.of(cars[0]).covariance[off, off]
     assert (prior.cars, model.vehicle) == (5, cars[0])
-    with pytest.raises(MergeError, match="curves are of other units"):
-        fleet_prior([groups[0], replace(groups[1], model=replace(
-            groups[1].model, ladder=tuple(2.0 * one for one in DESIGN.ladder)))])  # fmt: skip
 
 
 # Watching: Page's sums written out, part by part.
@@ -236,8 +257,8 @@ def driven():
     rows = []
     for name, change in (("a", 0.8), ("b", 1.0)):
         for k in range(60):
-            theta = tires(np.exp(0.02 * rng.normal()) * (change if k >= 35 else 1.0))
-            parts = [told_of(theta, rng, noise=0.5), told_of(theta, rng, seconds=4.0)]
+            p = tires(np.exp(0.02 * rng.normal()) * (change if k >= 35 else 1.0))
+            parts = [told_of(p, rng, noise=1.0), told_of(p, rng, seconds=4.0)]
             rows.append(row_of(k, parts, vehicle=name, content=f"{name}{k}"))
     rows += [row_of(k, [told_of(tires(), rng)], vehicle="c", content=f"c{k}") for k in range(20)]
     return [rows[k] for k in rng.permutation(len(rows))]
@@ -251,13 +272,12 @@ def test_the_watch_sums_log_likelihood_ratios_of_page(driven):
     for name in ("a", "b"):
         rows = sorted((row for row in driven if row.vehicle == name), key=lambda row: row.date)
         told = [row.parts[0] for row in rows]  # the other is shorter than what says anything
-        before, base = reference_of(DESIGN, CAR), total(told[:20], Q)
-        Lambda0, mean = np.linalg.inv(before.covariance), np.hstack([before.W, before.own])
-        eta = np.einsum("aij,aj->ai", Lambda0, mean) + base.vector
-        theta = np.linalg.solve(Lambda0 + base.matrix, eta[:, :, None])[:, :, 0]
-        changes = [change_from(one, theta, DESIGN, CAR) for one in told]
-        z = np.array([[c.value[0, 0], c.value[1, 0], c.value[:, 1].mean()] for c in changes])
-        S = np.array([[*c.covariance[:, 0, 0], c.covariance[:, 1, 1].sum() / 4] for c in changes])
+        beliefs, base = Priors.of(CAR), Information.nothing()
+        for one in told[:20]:
+            base += one.loosened(*errors_of(beliefs))
+        p, _ = settled(beliefs.after(base), beliefs.mean)
+        changes = [change_from(one, p, beliefs) for one in told]
+        z, S = (np.array(each) for each in zip(*changes, strict=True))
         usual = np.median(z[:20], axis=0)
         scatter = (1.4826 * np.median(np.abs(z[:20] - usual), axis=0)) ** 2
         statistics[name] = z[20:] - usual, S[20:], scatter

@@ -128,7 +128,7 @@ def test_other_signs_and_orders_are_told_by_options(words, tmp_path, undrawn):
 
 def test_compare_sets_it_beside_the_methods(logs, tmp_path, capsys, laid_out):
     path = tire_file(tmp_path / "tire.onnx")
-    words = ["compare", str(logs / "slalom.csv"), str(logs / "quick.csv"), "--floor", "0"]
+    words = ["compare", str(logs / "slalom.csv"), str(logs / "quick.csv")]
     words += ["--vehicle", str(logs / "car.toml"), "--method", "linear", "--network", str(path)]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     assert "tire.onnx" in capsys.readouterr().out

@@ -12,6 +12,7 @@ import pytest
 import tireid.commands.demo
 import tireid.commands.paper
 from benchmarks.paper_gains import random_designs
+from identifier.methods import certify
 from identifier.paper_study import (
     FREEZES,
     GAINS,
@@ -28,9 +29,8 @@ from models.vehicle import sedan
 from tests.conftest import PNG
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.commands.certificate_table import certificate_of
 from tireid.commands.paper import PAPER, table_text, write_study
-from tireid.figures import force_figure
+from tireid.figures.forces import force_figure
 
 EXPECTED = Path(__file__).parent / "expected_tables.json"
 
@@ -136,7 +136,7 @@ def test_the_gains_are_those_that_the_search_prints():
 
 
 def test_the_pattern_is_that_of_an_instantaneous_law_beyond_its_stability_limit():
-    verdict = {law: certificate_of(paper_design(law, 0), sedan()).verdict for law in LAWS}
+    verdict = {law: certify(paper_design(law, 0), sedan()).verdict for law in LAWS}
     assert verdict == {"instantaneous": "fail", "integral": "warn", "instantaneous_scaled": "warn"}
 
 
@@ -245,7 +245,7 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
 def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
     monkeypatch.setattr("tireid.commands.demo_parts.measure", lambda *_: [])  # has tests of its own
-    monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
+    monkeypatch.setattr("tireid.commands.demo_parts.drive_story", lambda *_: {})  # so has this
     monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)  # a page has SVG
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()

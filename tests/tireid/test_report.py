@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.pages import faults_of, outline
-from tireid.figures import figure_png, figure_svg
+from tireid.figures.style import figure_png, figure_svg
 from tireid.report import (
     FINE,
     STYLE,

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.compare.batch import cross_replay_batch
 from identifier.compare.course import Course, SideSlip, cross_replay, side_slip
 from identifier.methods import make_method
 from identifier.run import identify
@@ -14,7 +13,7 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.figures import side_slip_figure
+from tireid.figures.side_slip import side_slip_figure
 
 CAR = sedan()
 TOLD = ("linear_kf", "joint_ekf", "washout", "inertial")
@@ -29,7 +28,7 @@ def slalom(logs):
 def result(logs, tmp_path_factory):
     out = tmp_path_factory.mktemp("side_slip") / "out"
     words = ["compare", f"{logs / 'slalom.csv'}", f"{logs / 'quick.csv'}", "--vehicle"]
-    words += [f"{logs / 'car.toml'}", "--method", "linear", *TOLD, "--floor", "0", "--jobs", "1"]
+    words += [f"{logs / 'car.toml'}", "--method", "linear", *TOLD]
     assert main([*words, "--out", str(out)]) == 0
     return out
 
@@ -83,7 +82,7 @@ def test_the_table_has_a_column_of_side_slip_and_a_dash_for_methods_that_read_it
 
 def test_without_a_method_that_tells_there_is_no_figure(logs, tmp_path, undrawn):
     words = ["compare", f"{logs / 'slalom.csv'}", "--vehicle", f"{logs / 'car.toml'}"]
-    words += ["--method", "linear", "--floor", "0", "--jobs", "1", "--out", str(tmp_path / "out")]
+    words += ["--method", "linear", "--out", str(tmp_path / "out")]
     assert main(words) == 0
     assert not (tmp_path / "out" / "side_slip.png").exists()
 
@@ -107,15 +106,6 @@ def test_a_method_that_has_diverged_has_an_infinite_error(slalom):
     outputs = {port: np.full_like(value, np.nan) for port, value in history.outputs.items()}
     found = side_slip(replace(history, outputs=outputs), 1.0, slalom.v_y)
     assert found.rms == np.inf and found.within == 0.0
-
-
-def test_a_batch_finds_the_errors_of_force_and_records_no_side_slip(slalom):
-    course = Course(vehicle=CAR, recordings=(slalom,), min_speed=1.0)
-    method = make_method("joint_ekf", CAR)
-    alone, (batch,) = cross_replay(method, course), cross_replay_batch([method], course)
-    name = slalom.name
-    assert alone.side_slip[name].rms > 0.0 and not batch.side_slip
-    assert batch.online[name].front == pytest.approx(alone.online[name].front, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", [*TOLD, "axle"])

@@ -4,60 +4,28 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from subprocess import CalledProcessError
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib import style
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
-from codegen.arrays import Array
 from codegen.writing import naming
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
 from tireid.figures.style import LOOK
 from tireid.figures.tires import TireCurve
 from tireid.progress import say
 
-# Which instants of a drive are shown, and how fast; matplotlib's writers make the file.
-
 RATE = 10.0  # frames a second; a GIF counts in hundredths of a second
 MOST = 120  # frames: what stays small and quick to draw
-PACES = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 HOLD = 12  # frames for which the last picture stays
 DOTS = 150  # an inch
 QUALITY = 45  # of a WebP, to 100
 
 
-class Reel(NamedTuple):
-    """Instants (k,) [s] of the drive and the pace: seconds of the drive a second of the film."""
-
-    t: Array
-    pace: float
-
-
-def reel(duration: float) -> Reel:
-    """Return what to show of a drive: at the slowest pace that is not too long.
-
-    Parameters
-    ----------
-    duration : of the drive [s].
-    """
-    for pace in PACES:
-        if duration * RATE / pace <= MOST:
-            break
-    count = min(MOST, max(2, round(duration * RATE / pace)))
-    return Reel(np.linspace(0.0, duration, count), pace)
-
-
 def require_ffmpeg() -> str:
-    """Return the path of ffmpeg.
-
-    Raises
-    ------
-    ValueError
-        Where there is none.
-    """
     found = shutil.which("ffmpeg")
     if found is None:
         raise ValueError("an MP4 needs ffmpeg, and none was found: install it, or ask for a GIF")
@@ -79,20 +47,13 @@ def write_film(
 ) -> None:
     """Write the film of a drive; other drives ride along as ghosts.
 
-    Parameters
-    ----------
-    file : ends in .webp, .gif or .mp4.
-    drives : by the name in the legend, along one path; the camera follows the first.
-    drops : arc length [m] and friction from there on.
+    file : ends in .webp, .gif or .mp4.   drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.
-
-    Raises
-    ------
-    ValueError
-        For an MP4 where there is no ffmpeg, or it fails.
     """
     first = next(iter(drives.values()))
-    instants, pace = reel(float(first.t[-1] - first.t[0]))
+    duration = float(first.t[-1] - first.t[0])
+    instants = np.linspace(0.0, duration, min(MOST, max(2, round(RATE * duration))))
+    pace = RATE * duration / instants.size  # seconds of the drive a second of the film
     scene = Scene(drives, curves, drops=drops, pace=pace, title=title, known=known)
     writer = _writer(file)
     try:

@@ -9,12 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from codegen.arrays import Array
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from mpc.path import Path
 from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_look
 from tireid.figures.style import PURPLE
-
-# Where the picture looks: it goes along the path, and turns with it where the path winds.
 
 WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
 LOOK_BACK, LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]
@@ -30,8 +28,6 @@ class View(NamedTuple):
     def see(self, places: Array) -> Array:
         """Return places on the ground in the picture's meters, the last axis being (X, Y).
 
-        Parameters
-        ----------
         places : on the ground [m], (..., 2).
         """
         c, s = np.cos(self.angle), np.sin(self.angle)
@@ -41,8 +37,6 @@ class View(NamedTuple):
     def turn(self, directions: Array) -> Array:
         """Return directions on the ground as directions in the picture.
 
-        Parameters
-        ----------
         directions : (..., 2).
         """
         return View(np.zeros(2), self.angle).see(directions)
@@ -70,8 +64,6 @@ class Camera:
     def at(self, s: float) -> View:
         """Return the view of a car.
 
-        Parameters
-        ----------
         s : arc length of the car along the path [m].
         """
         X, Y, _ = self._path.pose(s)
@@ -125,10 +117,7 @@ class Ground:
         (self._line,) = axes.plot([], [], zorder=BELOW, **PATH)
         (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
         self._drops = [
-            (
-                _across(path, s),
-                axes.plot([], [], label=friction_label(mu), **DROP)[0],
-            )
+            (_across(path, s), axes.plot([], [], label=friction_label(mu), **DROP)[0])
             for s, mu in drops
         ]
         self._tracks, self._bodies, self._wheels = [], [], []
@@ -244,8 +233,6 @@ def _across(path: Path, s: float) -> Array:
 def sample_at(drive: Drive, t: float) -> int:
     """Return the sample of a drive at a time, or its last one.
 
-    Parameters
-    ----------
     t : time [s].
     """
     return min(int(np.searchsorted(drive.t, t)), drive.t.size - 1)

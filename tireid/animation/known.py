@@ -35,8 +35,6 @@ class Curves:
     def force(self, weights: Array) -> Array:
         """Return the forces of front and rear axle over `alpha` [N], (k, 2).
 
-        Parameters
-        ----------
         weights : of the tire, (n_weights,).
         """
         force: Array = np.array(self._force(self.alpha[None], weights)).T
@@ -46,8 +44,6 @@ class Curves:
 def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
     """Return the steady axle forces of a tire over slip, by sliding sideways without yawing.
 
-    Parameters
-    ----------
     v_x : speed [m/s], which a network may look at.
     """
     curves = Curves(model, v_x)
@@ -74,8 +70,6 @@ def known_over_time(
 ) -> KnownCurves | None:
     """Return the curves that were known over a drive; None where nothing learnt.
 
-    Parameters
-    ----------
     v_x : speed at which curves are drawn [m/s].
     """
     if not known:

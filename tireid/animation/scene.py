@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
 from codegen.escape import mathtext
-from mpc.loop import Drive
+from mpc.loop.record import Drive
 from tireid.animation.ground import Camera, Ground, Instant, sample_at
 from tireid.animation.known import KnownCurves
 from tireid.figures.drive import AT_THE_END, ORACLE, mark_drops, tire_look
@@ -33,8 +33,6 @@ from tireid.figures.style import (
     force_unit_of,
 )
 from tireid.figures.tires import TireCurve, axle_slip
-
-# The small panels of the film: force over slip with the learnt curve, deviation, whole course.
 
 TAIL = 80  # samples
 SMALL = 7.0  # points of the text
@@ -197,12 +195,7 @@ class Overview:
         axes.margins(0.08)
         self._dots = [
             axes.plot(
-                [],
-                [],
-                marker="o",
-                markersize=4.0,
-                linestyle="",
-                color=tire_look(label)["color"],
+                [], [], marker="o", markersize=4.0, linestyle="", color=tire_look(label)["color"]
             )[0]
             for label in drives
         ]
@@ -237,7 +230,6 @@ class Scene:
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.
-
     Attributes: figure.
     """
 
@@ -291,8 +283,6 @@ class Scene:
     def show(self, t: float) -> None:
         """Move the picture to an instant.
 
-        Parameters
-        ----------
         t : time [s].
         """
         drive = self._drive
@@ -300,7 +290,7 @@ class Scene:
         now = Instant(k, float(drive.t[k]), self._camera.at(float(drive.s[k])))
         for part in self._parts:
             part.show(now)
-        pace = "" if self._pace == 1.0 else f"  {self._pace:g} x real time"
+        pace = "" if abs(self._pace - 1.0) < 0.01 else f"  {self._pace:.2g} x real time"
         self._says.set_text(
             f"{t:5.1f} s  {drive.v_x[k]:4.1f} m/s  a_y {drive.a_y[k]:+5.1f} m/s²  "
             f"e_y {drive.e_y[k]:+5.2f} m{pace}"

@@ -38,10 +38,5 @@ INTERRUPTED = 130
 
 
 def add_command(name: str, commands: Any) -> None:
-    """Add one command with all its options to the parser.
-
-    Parameters
-    ----------
-    name : one of `COMMANDS`.
-    """
+    """Add one command with all its options to the parser."""
     importlib.import_module(f"tireid.commands.{name}").add_parser(commands)

@@ -1,18 +1,15 @@
 """A certificate as a person reads it: a table with a line of advice for what does not pass."""
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from codegen.arrays import Array
 from identifier.driving import Driving
-from identifier.methods import LIVE, certify
+from identifier.methods import LIVE
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.setup import force_unit_name
 from identifier.stability import Certificate, Property
-from identifier.stability.monte_carlo import Observed
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
@@ -20,23 +17,9 @@ ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radi
 HEADER = ("property", "value", "limit", "margin", "")
 
 
-def certificate_of(
-    design: PaperIdentifier, vehicle: Vehicle, driving: Driving | None = None
-) -> Certificate:
-    """Return the certificate of a design.
-
-    Parameters
-    ----------
-    driving : how hard it is driven; None takes `natural_driving`.
-    """
-    return certify(design, vehicle, driving)
-
-
 def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:
     """Return title with unit, value, limit, margin and status of every property.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     return [
@@ -54,8 +37,6 @@ def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[s
 def certificate_text(certificate: Certificate, force_unit: float) -> str:
     """Return the certificate as lines of text, ending with advice and the verdict.
 
-    Parameters
-    ----------
     force_unit : the unit U of the design [N].
     """
     rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
@@ -107,7 +88,6 @@ def notes(certificate: Certificate) -> list[str]:
 
 
 def verdict_line(certificate: Certificate) -> str:
-    """Return the verdict and the margins in one line."""
     gain, phase = certificate["gain_sampled"], certificate["phase_margin"]
     worst = [e.title for e in certificate.properties if e.status == certificate.verdict]
     reason = "" if certificate.verdict == "pass" else f" ({'; '.join(worst)})"
@@ -141,9 +121,6 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
 def unit_text(unit: str, force_unit: float) -> str:
     """Return a unit with the force unit written out, kN or N where it is one.
 
-    Parameters
-    ----------
-    unit : with U for the force unit.
     force_unit : U [N].
     """
     name = force_unit_name(force_unit)
@@ -155,103 +132,3 @@ def number(value: float | None) -> str:
     if value is None or math.isnan(value):
         return "-"
     return "inf" if math.isinf(value) else f"{value:.4g}"
-
-
-# `tireid check --monte-carlo`: the proven bounds beside what happened on random drives.
-
-TOLERANCE = 1e-9  # of rounding, in parts of a bound
-BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it
-    ("error_bound", "xi_tilde", "|xi - xi_hat|, by the leakage"),
-    ("projection_bound", "xi_tilde", "|xi - xi_hat|, by the projection"),
-    ("weight_bound", "W", "|W|, by the leakage"),
-    ("V_bound", "V", "|V|"),
-)
-
-
-class Row(NamedTuple):
-    """A bound beside what was seen.
-
-    name, title, unit : of the bound.   bound : its value.   largest : seen on any drive.
-    passed : drives on which it was exceeded.   tightness : bound over seen: least, median, 90 %.
-    """
-
-    name: str
-    title: str
-    unit: str
-    bound: float
-    largest: float
-    passed: int
-    tightness: tuple[float, float, float]
-
-
-def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
-    """Return every proven bound that the certificate holds, beside what was seen."""
-    known = {entry.name: entry for entry in certificate.properties}
-    rows = []
-    for name, what, title in BOUNDS:
-        if name in known and np.isfinite(known[name].value):
-            seen: Array = getattr(observed, what)
-            bound = known[name].value
-            passed = int(np.count_nonzero(~(seen <= bound * (1.0 + TOLERANCE))))
-            ratio = bound / seen[np.isfinite(seen) & (seen > 0.0)]
-            low, middle, high = np.quantile(ratio, [0.0, 0.5, 0.9]) if ratio.size else [np.nan] * 3
-            largest = float(seen.max())
-            tightness = float(low), float(middle), float(high)
-            rows.append(Row(name, title, known[name].unit, bound, largest, passed, tightness))
-    return rows
-
-
-def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit: float) -> str:
-    """Return the comparison as lines of text.
-
-    Parameters
-    ----------
-    rows : from `bound_rows`.
-    force_unit : the unit U of the design [N].
-    """
-    unit = unit_text("U s", force_unit)
-    lines = [
-        f"\n{observed.xi_tilde.size} random drives within what is judged, seed {seed} "
-        f"({observed.outside} harder ones left out): largest error "
-        f"{number(float(observed.xi_tilde.max()))} {unit}, diverged on {observed.diverged}"
-    ]
-    if not rows:
-        return "\n".join([*lines, "nothing is proven of these gains that a drive could contradict"])
-    table = [["proven bound", "value", "largest", "passed", "over seen: least", "median", "90 %"]]
-    for row in rows:
-        title = f"{row.title} [{unit_text(row.unit, force_unit)}]"
-        cells = [number(row.bound), number(row.largest), str(row.passed)]
-        table.append([title, *cells, *(number(value) for value in row.tightness)])
-    return "\n".join([*lines, text_table(table, "<>>>>>>")])
-
-
-def monte_carlo_numbers(rows: list[Row], observed: Observed, seed: int) -> dict[str, Any]:
-    """Return the comparison for JSON.
-
-    Parameters
-    ----------
-    rows : from `bound_rows`.
-    """
-    return {
-        "drives": observed.xi_tilde.size,
-        "left_out": observed.outside,
-        "seed": seed,
-        "diverged": observed.diverged,
-        "largest_error": _finite(float(observed.xi_tilde.max())),
-        "bounds": {
-            row.name: {
-                "value": row.bound,
-                "unit": row.unit,
-                "largest": _finite(row.largest),
-                "passed": row.passed,
-                "over_seen": dict(
-                    zip(("least", "median", "q90"), map(_finite, row.tightness), strict=True)
-                ),
-            }
-            for row in rows
-        },
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

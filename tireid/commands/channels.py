@@ -16,23 +16,8 @@ from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, s
 from models.logs.names import Proposal, propose
 from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, told_by
 from models.logs.units import SI, is_told
-from models.recordings import LogMap, split_log_argument
+from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
-from models.recordings.choice import (
-    as_listed,
-    aside_signals,
-    aside_text,
-    column_of,
-    column_word,
-    has_v_y,
-    has_wheels,
-    likely_signals,
-    likely_text,
-    missing_signals,
-    stand_ins,
-    standard_signals,
-    with_wheels,
-)
 from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
@@ -47,7 +32,6 @@ LONGEST_NAME = 48  # letters of a channel in the table
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "channels",
         help=COMMANDS["channels"],
@@ -76,11 +60,11 @@ def run(options: argparse.Namespace) -> int:
     listed = log.listed()
     names = [one.name for one in listed]
     proposal = propose(log, log.headings(), chosen)
-    by_map = as_listed(log, told.signals, names)
-    sure = {**standard_signals(log, names), **by_map}
-    signals = likely_signals(sure, proposal)
-    signals = with_wheels(signals, proposal)
-    missing = missing_signals(signals)
+    by_map = choice.as_listed(log, told.signals, names)
+    sure = {**choice.standard_signals(log, names), **by_map}
+    signals = choice.likely_signals(sure, proposal)
+    signals = choice.with_wheels(signals, proposal)
+    missing = choice.missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
     tell(channels_text(listed, seen, signals, proposal, frozenset(sure)))
@@ -89,11 +73,11 @@ def run(options: argparse.Namespace) -> int:
         cut = "cut out, as is told" if told.holes == CUT else CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
         told = replace(told, holes=CUT)
-    aside = [] if "v_y" in missing else aside_signals(signals, proposal)
+    aside = [] if "v_y" in missing else choice.aside_signals(signals, proposal)
     if aside:
-        tell(aside_text(signals, proposal))
-    elif not has_v_y(signals) and not missing:
-        tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
+        tell(choice.aside_text(signals, proposal))
+    elif not choice.has_v_y(signals) and not missing:
+        tell(f"{choice.column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, told, chosen)
     if rolls or missing:
         tell(missing_text(options.log, missing, proposal, signals))
@@ -118,7 +102,7 @@ def _wheels(
 ) -> tuple[str, LogMap, bool]:
     """Return what is said of wheels, the map with what is learnt, and whether v_x is known."""
     plain = replace(told, signals=signals)
-    if not has_wheels(signals):
+    if not choice.has_wheels(signals):
         return "", plain, True
     if "v_x" in signals:
         try:
@@ -129,19 +113,18 @@ def _wheels(
         return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
     try:
         for name, unit in wheel_units(log.headings(), signals).items():
-            wheel_factor(column_of(name), name, unit, told.wheels)
+            wheel_factor(choice.column_of(name), name, unit, told.wheels)
     except RecordingError as error:
         return str(error), plain, False
     return "vx is made of the wheels", plain, True
 
 
 def _without_wheels(told: LogMap) -> LogMap:
-    kept = {name: one for name, one in told.signals.items() if not has_wheels((name,))}
+    kept = {name: one for name, one in told.signals.items() if not choice.has_wheels((name,))}
     return replace(told, signals=kept)
 
 
 def _head(log: LogFile, run: str | None) -> list[str]:
-    """Return what the file is, how it was understood, and its runs."""
     runs = log.runs()
     lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in log.dialect)]
     lines += [f"  {note}" for note in log.notes]
@@ -199,26 +182,23 @@ def _meaning(
             told += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
             told += f", its sign in {visible(signal.sign)}" if signal.sign else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
-            return f"{column_of(name)}: {MEANINGS[name]}{told}{among}"
+            return f"{choice.column_of(name)}: {MEANINGS[name]}{told}{among}"
     for name, guess in proposal.guesses.items():
         for one in (guess, *proposal.rivals.get(name, ())):
             if channel in one.channel and INSTEAD.get(name) in signals:
-                return f"{column_of(name)}, not read beside {column_of(INSTEAD[name])}"
+                return (
+                    f"{choice.column_of(name)}, not read beside {choice.column_of(INSTEAD[name])}"
+                )
             if channel in one.channel and name not in signals:
                 unit = f" in {one.unit}" if one.unit and not is_told(listed.unit) else ""
                 hand = ", of the hand wheel: tell its ratio" if one.hand else ""
                 doubt = "; another is as likely" if name in proposal.rivals else ""
-                return f"perhaps {column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
+                return f"perhaps {choice.column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
     return ""
 
 
 def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
-    """Return which signals have cells without a value; nothing where none has.
-
-    Parameters
-    ----------
-    seen : channels that were read, by name.
-    """
+    """Return which signals have cells without a value; nothing where none has."""
     said = []
     for name, signal in signals.items():
         for channel in (seen[one] for one in signal.channel if one in seen):
@@ -226,8 +206,8 @@ def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> st
             if empty.size:
                 first = f"{channel.place} {channel.rows[empty[0]]}"
                 said.append(
-                    f"{column_of(name)} has no value in {empty.size} of {channel.values.size} "
-                    f"cells of {channel.name!r}, the first in {first}"
+                    f"{choice.column_of(name)} has no value in {empty.size} of "
+                    f"{channel.values.size} cells of {channel.name!r}, the first in {first}"
                 )
     return "\n".join(said)
 
@@ -241,28 +221,28 @@ def missing_text(
         needed = [name for name in NEEDED if name in there]
         if "v_y" not in there:
             needed.append("a_y")
-        return f"all that is needed is there: {', '.join(map(column_of, needed))}"
+        return f"all that is needed is there: {', '.join(map(choice.column_of, needed))}"
     lines = []
     words = []
     for name in missing:
-        likely = stand_ins(name, proposal)
-        texts = " or ".join(likely_text(one, proposal) for one in likely)
+        likely = choice.stand_ins(name, proposal)
+        texts = " or ".join(choice.likely_text(one, proposal) for one in likely)
         instead = ", ay would stand in for it" if likely == ["a_y"] and name != "a_y" else ""
         lines.append(
-            f"{column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
+            f"{choice.column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
             f"{instead}: {texts}"
             if likely
-            else f"{column_of(name)} ({MEANINGS[name]}) is missing"
+            else f"{choice.column_of(name)} ({MEANINGS[name]}) is missing"
         )
-        told = [column_word(one, proposal) for one in likely]
-        words += told or [f'"{column_of(name)}=CHANNEL"']
+        told = [choice.column_word(one, proposal) for one in likely]
+        words += told or [f'"{choice.column_of(name)}=CHANNEL"']
     return "\n".join([*lines, f"tell it: tireid channels {log} --columns {' '.join(words)}"])
 
 
 def unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:
     """Return the tables of what is missing as comments, to be completed."""
     blocks = []
-    for name in (one for lack in missing for one in stand_ins(lack, proposal) or [lack]):
+    for name in (one for lack in missing for one in choice.stand_ins(lack, proposal) or [lack]):
         guess = proposal.guesses.get(name)
         names = ("",) if guess is None else guess.channel
         channel = repr(names[0] if len(names) == 1 else list(names))

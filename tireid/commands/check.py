@@ -10,8 +10,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
@@ -27,45 +25,26 @@ from identifier.paper.design import (
 from identifier.paper.laws import LAWS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
-from identifier.stability.along import loop_along
+from identifier.stability.along import strongest_along
 from identifier.stability.certificate import judged_loop
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from identifier.stability.loop import direction_matrix
-from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from identifier.stability.operation import proven_bounds
 from models.files import write_atomically
 from models.recordings import Recording
-from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import options as shared
 from tireid.commands.certificate_table import (
-    bound_rows,
-    certificate_of,
     certificate_text,
     method_text,
-    monte_carlo_numbers,
-    monte_carlo_text,
     unit_text,
 )
-from tireid.commands.options import (
-    Chosen,
-    add_log_map,
-    add_method,
-    add_output,
-    add_seed,
-    add_vehicle,
-    chosen_method,
-    method_is_given,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
-)
-from tireid.figures import error_figure, locus_figure, save_figure
+from tireid.commands.demo_story import SLALOM, drives
+from tireid.figures.paper import error_figure, locus_figure
+from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
-from tireid.progress import Progress, say, tell
-
-# The figures of `tireid check`: root locus with its margin, bounds against a real error.
+from tireid.progress import say, tell
 
 FIGURES = ("locus.png", "bounds.png")
 BOUNDS = {
@@ -84,13 +63,7 @@ def draw_check(
     operation: Operation,
     certificate: Certificate,
 ) -> list[Path]:
-    """Draw locus.png and bounds.png; return their paths.
-
-    Parameters
-    ----------
-    folder : where to, made if missing.
-    recording : a drive, for the error to compare the bounds with.
-    """
+    """Draw locus.png and bounds.png; return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     chosen = LAWS[design.law]
     law = chosen.error(design.gains.lead)
@@ -127,15 +100,11 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_delta": "noise_delta",
 }
 OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-OF_GAINS = (
-    *(option for field, option in CONDITIONS.items() if field not in OF_ALL),
-    "monte_carlo",
-)  # options that ask about the paper's gains
+OF_GAINS = tuple(option for field, option in CONDITIONS.items() if field not in OF_ALL)
 TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
@@ -147,8 +116,8 @@ def add_parser(commands: Any) -> None:
         "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
         "--tune, find gains and write them.",
     )
-    add_vehicle(parser)
-    add_method(parser, LIVE)
+    shared.add_vehicle(parser)
+    shared.add_method(parser, LIVE)
     parser.add_argument(
         "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
     )
@@ -160,14 +129,7 @@ def add_parser(commands: Any) -> None:
             f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
         )
     parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
-    add_log_map(parser)
-    parser.add_argument(
-        "--monte-carlo",
-        type=int,
-        metavar="N",
-        help="run N random drives within what is judged: is a proven bound ever passed?",
-    )
-    add_seed(parser, "--monte-carlo")
+    shared.add_log_map(parser)
     parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
     parser.add_argument(
         "--tune", type=Path, metavar="FILE", help="find gains and write them, for --design FILE"
@@ -182,7 +144,7 @@ def add_parser(commands: Any) -> None:
         "them), a leakage with a dead zone, or a projection in its place "
         f"({DEFAULT_KEEPING})",
     )
-    add_output(parser, None)
+    shared.add_output(parser, None)
     parser.set_defaults(run=run)
 
 
@@ -190,7 +152,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 0, or 1 where the design fails."""
     _require_sense(options)
     _require_drive(options)
-    vehicle = read_vehicle(options)
+    vehicle = shared.read_vehicle(options)
     name, method = _method(options, vehicle)
     if isinstance(method, PaperIdentifier):
         return _judge_gains(options, vehicle, method)
@@ -198,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
     driving = replace(natural_driving(vehicle), **_overrides(options))
     certificate = certify(method, vehicle, driving)
     if options.along is not None:
-        drive = read_log(options.along, vehicle, told_map(options), dt=method.dt)
+        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
         along = method.certify_along(identify(drive, vehicle, method))
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
@@ -232,10 +194,10 @@ def _require_drive(options: argparse.Namespace) -> None:
             raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
 
 
-def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
+def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
-        return chosen_method(options, vehicle, online=True)
+        return shared.chosen_method(options, vehicle, online=True)
     if options.design is not None:
         raise ValueError("--tune finds gains: give no --design FILE to judge with it")
     law = options.method or REFERENCE
@@ -247,7 +209,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
     margin = options.phase_margin or PHASE_MARGIN
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
     known = found.operation(vehicle, driving)
-    return Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
+    return shared.Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
 
 
 def _refuse_gains(options: argparse.Namespace, name: str) -> None:
@@ -264,14 +226,12 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     driving = _driving(options, design, vehicle)
     if options.design is None:
         design = replace(design, driving=driving)
-    certificate = certificate_of(design, vehicle, driving)
+    certificate = certify(design, vehicle, driving)
     drive = None
     if options.along is not None:
-        drive = read_log(options.along, vehicle, told_map(options), dt=design.dt)
-    _require_free(options)
-    observed = _drive(options, vehicle, driving, design, certificate)
-    rows = [] if observed is None else bound_rows(certificate, observed)
-    passed = any(row.passed for row in rows) or (observed is not None and observed.diverged > 0)
+        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=design.dt)
+    if options.tune is not None:
+        require_free(options.tune, force=options.force)
     numbers = {
         "method": design.law,
         "conditions": asdict(driving),
@@ -284,9 +244,6 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     ]
     if drive is not None:
         texts.append(_along(drive, vehicle, design))
-    if observed is not None:
-        numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed_of(options))
-        texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
     text = "\n".join(texts)
@@ -294,12 +251,14 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
             _write_certificate(folder, text, numbers)
-            _draw(folder, vehicle, driving, design, certificate, drive)
+            learnt = drive or drives({"slalom": SLALOM})["slalom"]
+            operation = design.operation(vehicle, driving)
+            draw_check(folder, learnt, vehicle, design, operation, certificate)
         if options.tune is not None:
             write_atomically(options.tune, design_text(design))
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
-    return FAILS if certificate.verdict == "fail" or passed else DONE
+    return FAILS if certificate.verdict == "fail" else DONE
 
 
 def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
@@ -314,7 +273,7 @@ def _say_written(options: argparse.Namespace) -> None:
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    method_is_given(options)
+    shared.method_is_given(options)
     if options.tune is None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
@@ -327,12 +286,6 @@ def _require_sense(options: argparse.Namespace) -> None:
         value = getattr(options, name)
         if value is not None and not 0.0 <= value < float("inf"):
             raise ValueError(f"--{name.replace('_', '-')} must not be negative, it is {value:g}")
-    if options.seed is not None and options.monte_carlo is None:
-        raise ValueError("--seed goes with --monte-carlo")
-    seed_of(options)
-    if options.monte_carlo is not None and options.monte_carlo < 1:
-        raise ValueError(f"--monte-carlo must be at least 1, it is {options.monte_carlo}")
-    require_few(ValueError, "--monte-carlo", options.monte_carlo or 0, "runs", "runs")
     if options.slip is not None and options.slip > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
@@ -358,34 +311,6 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
     if driving == design.driving:
         return "conditions: as stored in the design"
     return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
-
-
-def _drive(
-    options: argparse.Namespace,
-    vehicle: Vehicle,
-    driving: Driving,
-    design: PaperIdentifier,
-    certificate: Certificate,
-) -> Observed | None:
-    """Run the random drives of --monte-carlo; None where there are none."""
-    if options.monte_carlo is None:
-        return None
-    count = options.monte_carlo
-    known = {entry.name: entry.value for entry in certificate.properties}
-    kept = min(known.get("weight_bound", math.inf), design.gains.W_max)
-    with Progress(f"{count} random drives") as progress:
-        return monte_carlo(
-            design,
-            vehicle,
-            driving,
-            count,
-            beginning=Beginning(
-                W=kept if math.isfinite(kept) else 0.0,
-                V=min(design.operation(vehicle, driving).V_start, design.gains.V_max),
-            ),
-            rng=np.random.default_rng(seed_of(options)),
-            progress=lambda done: progress(done / count),
-        )
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:
@@ -414,11 +339,10 @@ def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> s
     history = identify(recording, vehicle, design)
     if history.diverged_at is not None:
         return f"along {recording.name}: the law diverged at {history.diverged_at:g} s"
-    along = loop_along(history, design)
-    at = along.strongest
+    at = strongest_along(history, design)
     return (
-        f"along {recording.name}: largest loop gain {along.gain[at]:.4g} at {along.t[at]:g} s, "
-        f"gain margin there {along.margin:.3g}"
+        f"along {recording.name}: largest loop gain {at.gain:.4g} at {at.t:g} s, "
+        f"gain margin there {at.margin:.3g}"
     )
 
 
@@ -439,7 +363,7 @@ def _proposal(
         better = with_keeping(better, known, DEFAULT_KEEPING)
     except DesignError as error:
         return f"no better gains at this bandwidth: {error}"
-    gains, verdict = better.gains, certificate_of(better, vehicle, driving).verdict
+    gains, verdict = better.gains, certify(better, vehicle, driving).verdict
     return (
         f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
         f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
@@ -455,23 +379,3 @@ def _given(options: argparse.Namespace) -> str:
     return "".join(
         f" --{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in given.items()
     )
-
-
-def _draw(
-    folder: Path,
-    vehicle: Vehicle,
-    driving: Driving,
-    design: PaperIdentifier,
-    certificate: Certificate,
-    drive: Recording | None,
-) -> None:
-    from tireid.commands.demo_story import drive_to_learn
-
-    recording = drive_to_learn() if drive is None else drive
-    operation = design.operation(vehicle, driving)
-    draw_check(folder, recording, vehicle, design, operation, certificate)
-
-
-def _require_free(options: argparse.Namespace) -> None:
-    if options.tune is not None:
-        require_free(options.tune, force=options.force)

@@ -1,47 +1,23 @@
-"""`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side, fairly tuned."""
+"""`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side."""
 
 import argparse
 from collections.abc import Sequence
-from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
-from identifier.compare.study import cannot_learn, run_comparison, step_lengths
+from identifier.compare.study import cannot_learn, run_comparison
 from identifier.method import Method
-from identifier.methods import DEFAULT, METHODS
+from identifier.methods import DEFAULT, methods
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
 from identifier.verdict import Verdict
 from models.recordings import Recording, RecordingError
-from models.schema import require_few
 from models.vehicle import Vehicle
-from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE
-from tireid.commands.compare_results import (
-    comparison_text,
-    pair_tables,
-    remarks,
-    summary_rows,
-    write_comparison,
-)
+from tireid.commands import compare_results as results
+from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
-from tireid.commands.options import (
-    add_accept,
-    add_jobs,
-    add_log_reading,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    exit_code,
-    jobs_of,
-    network_model,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
-)
 from tireid.learning import identify
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
@@ -52,132 +28,91 @@ FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "compare",
         help=COMMANDS["compare"],
         description="Learn on each recording, freeze at its end and replay on all of them, with "
         "every method; write report.html, compare.json, compare.csv, tables.txt and figures. "
         "Methods that estimate lateral velocity are judged on side slip too. Where a recording has "
-        "no true forces, all are judged by the force that the motion shows, without floors and "
-        "sweep. Without a LOG the plant of the car drives slaloms, a step steer and a lane "
-        "change with noisy sensors.",
-        epilog=f"methods: {', '.join(METHODS)}",
+        "no true forces, all are judged by the force that the motion shows. Without a LOG the "
+        "plant of the car drives slaloms, a step steer and a lane change with noisy sensors.",
+        epilog=f"methods: {', '.join(methods())}",
     )
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
-    add_vehicle(parser)
+    shared.add_vehicle(parser)
     parser.add_argument(
         "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
     )
     parser.add_argument(
         "--method", nargs="+", action="extend", metavar="NAME", help="these only (all)"
     )
-    parser.add_argument(
-        "--sweep", type=int, default=0, metavar="N", help="try N random designs of each method"
-    )
-    parser.add_argument(
-        "--floor",
-        type=int,
-        default=3,
-        metavar="N",
-        help="starts of each fit to the true forces (%(default)s; 0: none)",
-    )
-    add_seed(parser, "sensor noise, sweep, floors, and the weights of networks")
-    add_jobs(parser)
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="do the sweep on the Dask cluster of this scheduler, as in tcp://host:8786",
-    )
-    add_log_reading(parser)
-    add_network_arguments(parser, "compare with this network, which learns nothing")
-    add_accept(parser)
-    add_output(parser, "compare")
+    shared.add_seed(parser, "sensor noise, and the weights of networks")
+    shared.add_log_reading(parser)
+    shared.add_network_arguments(parser, "compare with this network, which learns nothing")
+    shared.add_accept(parser)
+    shared.add_output(parser, "compare")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what the default learns on a recording is not valid."""
-    for name, least in (("sweep", 0), ("floor", 0)):
-        if getattr(options, name) < least:
-            raise ValueError(f"--{name} must be at least {least}, it is {getattr(options, name)}")
-        require_few(ValueError, f"--{name}", getattr(options, name), "runs", "runs")
-    seed, jobs = seed_of(options), jobs_of(options)
-    names = list(dict.fromkeys(options.method or METHODS))
-    unknown = [name for name in names if name not in METHODS]
+    seed, known = shared.seed_of(options), methods()
+    names = list(dict.fromkeys(options.method or known))
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise ValueError(f"--method {unknown[0]} is none of {', '.join(METHODS)}")
-    if options.scheduler and not options.sweep:
-        raise ValueError("--scheduler does sweeps only: say how many designs with --sweep N")
+        raise ValueError(f"--method {unknown[0]} is none of {', '.join(known)}")
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
-    there = cluster(options.scheduler) if options.scheduler else nullcontext()
-    vehicle = read_vehicle(options)
+    vehicle = shared.read_vehicle(options)
     others = _network(options, vehicle)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with (
         output_folder(options.out, force=options.force) as folder,
-        there as elsewhere,
         Progress("compare", parts, long=True) as work,
     ):
         recordings = _recordings(options, vehicle, seed)
         for recording in recordings:
             recording.needed("v_y")  # of the slip at which every method is asked
-        starts = options.floor
         blind = [recording.name for recording in recordings if recording.axle_force is None]
-        if blind and options.sweep:
-            raise RecordingError(f"--sweep needs the true forces Fyf, Fyr: {blind[0]} has none")
         if blind:
-            say(f"{', '.join(blind)}: no true forces; judged by the motion, without floors")
-            starts = 0
+            say(f"{', '.join(blind)}: no true forces; judged by the motion")
         left_out = cannot_learn(names, vehicle, recordings)
         for name, why in left_out.items():
             say(f"{name}: {why}")
         names = [name for name in names if name not in left_out]
         if not names:
             raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
-        lengths = step_lengths(
-            names,
-            len(recordings),
-            designs=options.sweep,
-            starts=starts,
-            others=len(others),
-        )
+        lengths = [float(len(recordings))] * (len(names) + len(others))
         comparison = run_comparison(
             names,
             vehicle,
             recordings,
             seed=seed,
-            designs=options.sweep,
-            starts=starts,
-            workers=jobs,
             progress=work.along(lengths),
-            note=say,
-            elsewhere=elsewhere,
             others=others,
             left_out=left_out,
         )
         work.begin("step times, tables and figures")
         verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}
-        figures = write_comparison(folder, comparison, verdicts)
-        rows = summary_rows(comparison)
+        figures = results.write_comparison(folder, comparison, verdicts)
+        rows = results.summary_rows(comparison)
         write_compare_report(
             folder,
             comparison,
             rows,
             figures,
             verdicts,
-            remarks=remarks(comparison),
+            remarks=results.remarks(comparison),
             command=options.words,
         )
-        told = [comparison_text(comparison)]
+        told = [results.summary_table(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
-            told.append(pair_tables(comparison))
+            told.append(results.pair_tables(comparison))
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
-    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
+    return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
@@ -187,13 +122,15 @@ def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
     """Return the network of --network as a method by the name of its file."""
-    model = network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
+    model = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
     return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    told = told_map(options)
-    recordings = [read_log(log, vehicle, told, check=not options.no_check) for log in options.logs]
+    told = shared.told_map(options)
+    recordings = [
+        shared.read_log(log, vehicle, told, check=not options.no_check) for log in options.logs
+    ]
     if options.simulate or not options.logs:
         say(f"driving the plant of {vehicle.name} with noisy sensors")
         recordings += plant_recordings(vehicle, np.random.default_rng(seed))

@@ -4,16 +4,16 @@ compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or 
 over 0.3 s that the motion shows); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
 recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
-methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio; left_out: by
-name why a method is not compared; floors: by network frozen_N and percent; sweep: by method
-designs, diverged, default, best, front, trials.
+methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio (null: it
+learns from whole logs); left_out: by
+name why a method is not compared.
 verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
 """
 
 import csv
-import math
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,46 +21,32 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
+from identifier.compare.course import Trial, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
-from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
 from identifier.frozen import vehicle_numbers
-from identifier.methods import METHODS, make_method
+from identifier.methods import make_method, methods
 from identifier.reproducibility import AxleRmse
 from identifier.verdict import Verdict
 from tireid import __version__
-from tireid.figures import (
-    matrix_figure,
-    methods_figure,
-    pareto_figure,
-    save_figure,
-    side_slip_figure,
-)
+from tireid.figures.compare import matrix_figure, methods_figure
+from tireid.figures.side_slip import side_slip_figure
+from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
-from tireid.reports.compare import HINDSIGHT
-
-# The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
-    """Return the means over recordings of every method, best on other recordings first.
-
-    Parameters
-    ----------
-    comparison : the methods; the first row is the header.
-    """
+    """Return the means over recordings of every method, best on other recordings first."""
     lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
         online = [(rec, error) for rec, error in trial.online.items()]
-        time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
+        time = NOT_TOLD
+        if name in comparison.step_times:
+            time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         cells = ["diverged" if trial.diverged_at else _mean(comparison, online)]
         told = _slip_cells(trial)
         lines.append([name, *cells, *_frozen_cells(comparison, trial), *told, time])
-    for name, frozen in comparison.floors.items():
-        cells = [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(frozen)]
-        lines.append([f"floor, {name}", "", *cells, *[""] * len(SLIP), ""])
     return lines
 
 
@@ -92,7 +78,7 @@ def remarks(comparison: Comparison) -> list[str]:
     """Return what the methods say of themselves below the table, those alike in one line."""
     told: dict[str, list[str]] = {}
     for name in comparison.trials:
-        if name in METHODS:
+        if name in methods():
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             told.setdefault(method.remark, []).append(name)
             if not method.needs_v_y:
@@ -114,49 +100,13 @@ def pair_tables(comparison: Comparison) -> str:
                     error = frozen.get(learnt, {}).get(replayed)
                     cell = "diverged" if error is None else cell_text(comparison, replayed, error)
                     lines.append([name, cell])
-            for name, frozen in comparison.floors.items():
-                cell = cell_text(comparison, replayed, frozen[learnt][replayed])
-                lines.append([f"floor, {name}", cell])
             blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
     return "\n".join(blocks)
-
-
-def sweep_table(comparison: Comparison) -> str:
-    """Return the best design of every method's sweep [% of rms, both axles]."""
-    lines = [["method", "designs", "diverged", "default", "best", "online then", "on the front"]]
-    for name, candidates in comparison.sweeps.items():
-        best, own = best_candidate(candidates), frozen_share(comparison.shares(name))
-        lost = sum(bool(candidate.diverged_on) for candidate in candidates)
-        cells = ["signal", "signal", "signal"]
-        if best is None:
-            cells = [percent(own), "diverged", ""]
-        elif own is not None:
-            cells = [percent(own), percent(frozen_share(best.shares)), percent(best.shares.online)]
-        elif frozen_share(best.shares) is None:
-            cells = ["", "", percent(best.shares.online)]
-        front = len(pareto_front(candidates))
-        lines.append([name, str(len(candidates)), str(lost), *cells, str(front or "")])
-    title = "Sweep: frozen error elsewhere, % of rms of both axles, mean over recordings"
-    return _text(title, lines) + HINDSIGHT + "\n"
-
-
-def percent(value: float | None) -> str:
-    """Return a share as text.
-
-    Parameters
-    ----------
-    value : [%], infinite where a run diverged, None where there is none.
-    """
-    if value is None:
-        return ""
-    return f"{value:.1f} %" if np.isfinite(value) else "diverged"
 
 
 def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
     """Return an error as percent of the rms force and in newtons, front / rear.
 
-    Parameters
-    ----------
     error : over it [N].
     """
     return _mean(comparison, [(name, error)])
@@ -165,8 +115,6 @@ def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
 def newton_text(value: float) -> str:
     """Return a force with three digits, more where it is above 1000 N.
 
-    Parameters
-    ----------
     value : [N].
     """
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
@@ -208,36 +156,21 @@ def write_comparison(
 ) -> dict[str, Figure]:
     """Write everything that was found out into a folder; return the figures by their file's name.
 
-    Parameters
-    ----------
-    folder : an empty folder.
     verdicts : on what the default learns, by recording.
     """
     numbers = comparison_numbers(comparison)
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
-    write_file(folder / "tables.txt", comparison_text(comparison) + pair_tables(comparison))
+    write_file(folder / "tables.txt", summary_table(comparison) + pair_tables(comparison))
     _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
-    if comparison.sweeps:
-        _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
     say("drawing figures")
     figures = {"methods": methods_figure(comparison)}
     if any(trial.frozen for trial in comparison.trials.values()):
         figures["matrix"] = matrix_figure(comparison)
-    if comparison.sweeps:
-        figures["pareto"] = pareto_figure(comparison)
     if any(trial.side_slip for trial in comparison.trials.values()):
         told = {name: trial.side_slip for name, trial in comparison.trials.items()}
         figures["side_slip"] = side_slip_figure(comparison.course.recordings, told)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
-
-
-def comparison_text(comparison: Comparison) -> str:
-    """Return the summary, and that of the sweep, as lines of text."""
-    text = summary_table(comparison)
-    return text + (sweep_table(comparison) if comparison.sweeps else "")
+    return save_figures(folder, figures)
 
 
 def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
@@ -248,26 +181,13 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             recording.name: {
                 "samples": len(recording),
                 "duration_s": recording.duration,
-                "rms_force_N": _axles(course.size(recording)),
+                "rms_force_N": asdict(course.size(recording)),
             }
             for recording in course.recordings
         },
         "judged_by": "motion" if course.by_motion else "truth",
         "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
         "left_out": dict(comparison.left_out),
-        "floors": {
-            name: {
-                "frozen_N": _pairs(frozen),
-                "percent": dict(
-                    zip(("in_sample", "other"), frozen_shares(frozen, course), strict=True)
-                ),
-            }
-            for name, frozen in comparison.floors.items()
-        },
-        "sweep": {
-            name: _sweep_numbers(comparison, name, candidates)
-            for name, candidates in comparison.sweeps.items()
-        },
         "vehicle": vehicle_numbers(course.vehicle),
         "min_speed_m_s": course.min_speed,
         "seed": comparison.seed,
@@ -276,59 +196,24 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
 
 
 def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
-    trial = comparison.trials[name]
+    trial, timed = comparison.trials[name], name in comparison.step_times
     return {
-        "online_N": {recording: _axles(error) for recording, error in trial.online.items()},
+        "online_N": {recording: asdict(error) for recording, error in trial.online.items()},
         "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
         "diverged_at_s": dict(trial.diverged_at),
-        "percent": _percent(comparison.shares(name)),
+        "percent": comparison.shares(name)._asdict(),
         "side_slip": {
-            recording: {"rms_deg": _finite(one.rms), "within_two_sigma_percent": one.within}
+            recording: {"rms_deg": one.rms, "within_two_sigma_percent": one.within}
             for recording, one in trial.side_slip.items()
         },
-        "step_s": comparison.step_times[name],
-        "step_ratio": comparison.time_ratio(name),
+        "step_s": comparison.step_times[name] if timed else None,
+        "step_ratio": comparison.time_ratio(name) if timed else None,
     }
 
 
-def _sweep_numbers(
-    comparison: Comparison, name: str, candidates: tuple[Candidate, ...]
-) -> dict[str, Any]:
-    best = best_candidate(candidates)
+def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
     return {
-        "designs": len(candidates),
-        "diverged": sum(bool(candidate.diverged_on) for candidate in candidates),
-        "default": _percent(comparison.shares(name)),
-        "best": None if best is None else _candidate(best),
-        "front": [_candidate(candidate) for candidate in pareto_front(candidates)],
-        "trials": [_candidate(candidate) for candidate in candidates],
-    }
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    return {
-        "values": dict(candidate.values),
-        "percent": _percent(candidate.shares),
-        "diverged_on": list(candidate.diverged_on),
-    }
-
-
-def _percent(found: Shares) -> dict[str, float | None]:
-    return {name: _finite(share) for name, share in found._asdict().items()}
-
-
-def _axles(error: AxleRmse) -> dict[str, float | None]:
-    return {"front": _finite(error.front), "rear": _finite(error.rear)}
-
-
-def _finite(error: float | None) -> float | None:
-    """Return an error; None where a law that diverged has an infinite one."""
-    return error if error is not None and math.isfinite(error) else None
-
-
-def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float | None]]]:
-    return {
-        learnt: {name: _axles(error) for name, error in replays.items()}
+        learnt: {name: asdict(error) for name, error in replays.items()}
         for learnt, replays in frozen.items()
     }
 
@@ -343,15 +228,6 @@ ERROR_COLUMNS = (
     "front_percent",
     "rear_percent",
     "both_percent",
-)
-SWEEP_COLUMNS = (
-    "method",
-    "number",
-    "diverged",
-    "online_percent",
-    "in_sample_percent",
-    "other_percent",
-    "values",
 )
 
 
@@ -372,20 +248,6 @@ def _error_rows(comparison: Comparison) -> Iterator[Row]:
         for name, error in trial.online.items():
             yield row(method, "online", name, name, error)
         yield from frozen_rows(method, "frozen", trial.frozen or {})
-    for network, frozen in comparison.floors.items():
-        yield from frozen_rows(network, "floor", frozen)
-
-
-def _sweep_rows(comparison: Comparison) -> Iterator[Row]:
-    for method, candidates in comparison.sweeps.items():
-        for number, candidate in enumerate(candidates):
-            found = ["" if value is None else value for value in candidate.shares]
-            values = _words(candidate.values)
-            yield method, number, " ".join(candidate.diverged_on), *found, values
-
-
-def _words(values: Mapping[str, float]) -> str:
-    return " ".join(f"{name}={value:.6g}" for name, value in values.items())
 
 
 def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:

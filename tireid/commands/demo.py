@@ -11,31 +11,12 @@ from matplotlib.figure import Figure
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict, judge, judge_prediction
-from tireid.commands import COMMANDS
-from tireid.commands.certificate_table import (
-    HEADER,
-    advised,
-    certificate_rows,
-    certificate_text,
-    notes,
-    verdict_line,
-)
+from tireid import report as page
+from tireid.commands import COMMANDS, certificate_table, demo_parts
+from tireid.commands import options as shared
 from tireid.commands.check import draw_check
-from tireid.commands.demo_parts import (
-    FOLDER,
-    Driven,
-    Shipped,
-    drive_numbers,
-    drive_section,
-    drive_story,
-    drive_text,
-    package_section,
-    ship,
-    shipped_text,
-)
 from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
 from tireid.commands.identify_results import write_results
-from tireid.commands.options import add_output
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -46,20 +27,9 @@ from tireid.commands.paper import (
     table_text,
     write_study,
 )
-from tireid.figures import side_by_side_figure
+from tireid.figures.forces import side_by_side_figure
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
-from tireid.report import (
-    Block,
-    Paragraph,
-    Picture,
-    Report,
-    Section,
-    Subheading,
-    Table,
-    printed,
-    write_report,
-)
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.reports.identify import (
     curve_drawing,
@@ -75,8 +45,6 @@ from tireid.verdicts import (
     verdict_warnings,
 )
 
-# The demo's report: what was driven, learnt, frozen and predicted, in order.
-
 REFERENCE = (
     'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire '
     'Forces"'
@@ -86,22 +54,17 @@ REFERENCE = (
 def demo_report(
     story: Story,
     verdict: Verdict,
-    shipped: Shipped,
+    shipped: demo_parts.Shipped,
     study: Study,
-    driven: dict[str, Driven],
+    driven: dict[str, demo_parts.Driven],
     figures: Mapping[str, Mapping[str, Figure]],
     folder: Path,
     command: str,
-) -> Report:
-    """Return the report: the product first, the paper's study folded.
-
-    Parameters
-    ----------
-    shipped : what was learnt, as a C package.
-    """
+) -> page.Report:
+    """Return the report: the product first, the paper's study folded."""
     learnt = story.axle.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
-    return Report(
+    return page.Report(
         title=TITLE,
         summary=SUMMARY,
         numbers=[
@@ -109,16 +72,16 @@ def demo_report(
             *missed_headline(verdict),
             *number_headlines(verdict),
             *identify_headlines(model, runs, story.axle.frozen[FREEZE]),
-            *drive_numbers(driven),
+            *demo_parts.drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
         sections=[
             verdict_section(verdict),
-            drive_section(driven, folder),
+            demo_parts.drive_section(driven, folder),
             _learn(figures["identify"], model, verdict),
             _predict(story),
-            package_section(shipped),
-            Section(
+            demo_parts.package_section(shipped),
+            page.Section(
                 heading="The paper's study",
                 blocks=[
                     *_certify(story, folder / "paper_network"),
@@ -133,18 +96,18 @@ def demo_report(
     )
 
 
-def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> Section:
-    return Section(
+def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> page.Section:
+    return page.Section(
         heading="What was learnt",
         blocks=[
-            Paragraph(
+            page.Paragraph(
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
                 f"drives a slalom at {SPEED:g} m/s. The identifier sees what any log has, speed, "
                 "lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it never "
                 "sees a force."
             ),
-            Paragraph(
+            page.Paragraph(
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
@@ -164,14 +127,14 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
     )
 
 
-def _predict(story: Story) -> Section:
-    blocks: list[Block] = [
-        Paragraph(
+def _predict(story: Story) -> page.Section:
+    blocks: list[page.Block] = [
+        page.Paragraph(
             text="Reproducing the drive that was learnt is the easier half. The same frozen "
             "weights predict two other maneuvers, beside them the paper's network and law, learnt "
             "on the same slalom with gains from the phase margin of their loop."
         ),
-        Table(
+        page.Table(
             caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
             header=[
@@ -192,33 +155,34 @@ def _predict(story: Story) -> Section:
         figure = side_by_side_figure(story.side_by_side(name))
         caption = f"Both methods, frozen after the slalom, asked about the {said}."
         blocks.append(drawing(figure, caption, READ["replay"]))
-    return Section(heading="Drives that were not learnt are predicted", blocks=blocks)
+    return page.Section(heading="Drives that were not learnt are predicted", blocks=blocks)
 
 
-def _certify(story: Story, learning: Path) -> list[Block]:
+def _certify(story: Story, learning: Path) -> list[page.Block]:
     certificate, unit = story.certificate, story.design.force_unit
-    said = [f"{e.title}: {e.status}; {e.advice}." for e in advised(certificate)]
-    said += [f"Note: {remark}." for remark in notes(certificate)]
+    said = [f"{e.title}: {e.status}; {e.advice}." for e in certificate_table.advised(certificate)]
+    said += [f"Note: {remark}." for remark in certificate_table.notes(certificate)]
     return [
-        Subheading(text="The gains of the paper's law are judged before it learns"),
-        Paragraph(
+        page.Subheading(text="The gains of the paper's law are judged before it learns"),
+        page.Paragraph(
             text="The certificate follows from the gains, the network and how hard the car is "
-            f"driven, not from a run. {printed(verdict_line(certificate)).capitalize()}."
+            "driven, not from a run. "
+            f"{page.printed(certificate_table.verdict_line(certificate)).capitalize()}."
         ),
-        Table(
+        page.Table(
             caption="Properties of the learning loop at the worst regressor; those without a "
             "limit are stated, not judged.",
-            header=list(HEADER),
-            rows=[[printed(c) if isinstance(c, str) else c for c in row]
-                  for row in certificate_rows(certificate, unit)],
+            header=list(certificate_table.HEADER),
+            rows=[[page.printed(c) if isinstance(c, str) else c for c in row]
+                  for row in certificate_table.certificate_rows(certificate, unit)],
         ),
-        *(Paragraph(text=printed(one)) for one in said),
-        Picture(
+        *(page.Paragraph(text=page.printed(one)) for one in said),
+        page.Picture(
             image=learning / "locus.png",
             caption="Poles of the sampled loop at any gain, and at the gain of the design.",
             read="All poles inside the circle: it is stable; far inside: it is damped.",
         ),
-        Picture(
+        page.Picture(
             image=learning / "bounds.png",
             caption="Proven bounds on the error norm, and the error that happened.",
             read="The error stays below each bound; the gap is what the proof gives away.",
@@ -226,11 +190,11 @@ def _certify(story: Story, learning: Path) -> list[Block]:
     ]  # fmt: skip
 
 
-def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
+def _network(story: Story, paper: Mapping[str, Figure]) -> list[page.Block]:
     design, gains = story.design, story.design.gains
     return [
-        Subheading(text="The paper's network on the same slalom"),
-        Paragraph(
+        page.Subheading(text="The paper's network on the same slalom"),
+        page.Paragraph(
             text="At every sample an observer predicts the motion; its error drives the weights of "
             f"a network of {design.network.hidden} hidden units, which corrects the linear tire. "
             "The law is the integral law of the paper: A_d is "
@@ -247,21 +211,21 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
     ]
 
 
-def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
-    blocks: list[Block] = [
-        Subheading(text="The frozen-weight reproducibility test: slalom"),
-        Paragraph(
+def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
+    blocks: list[page.Block] = [
+        page.Subheading(text="The frozen-weight reproducibility test: slalom"),
+        page.Paragraph(
             text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets what it learnt before. "
-            f"{printed(MEASURES_MEAN)}"
+            f"{page.printed(MEASURES_MEAN)}"
         ),
-        Table(
+        page.Table(
             caption="Table II of the paper beside ours, RMSE of the axle force [kN]: median "
             f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
-            header=[printed(word) for word in header()],
+            header=[page.printed(word) for word in header()],
             rows=rows("slalom", study),
         ),
-        Paragraph(text=printed(MEANING)),
+        page.Paragraph(text=page.printed(MEANING)),
     ]
     return [
         *blocks,
@@ -275,36 +239,36 @@ def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
                 "error).",
             },
         ),
-        Paragraph(text=printed(settings(GAINS, NETWORK).splitlines()[0])),
+        page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),
     ]
 
 
-def _step(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
+def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
     return [
-        Subheading(text="The frozen-weight reproducibility test: step steer"),
-        Paragraph(
+        page.Subheading(text="The frozen-weight reproducibility test: step steer"),
+        page.Paragraph(
             text="The step is held from 29 s on and goes back to half its angle at 36 s. By "
             "the paper's measure the order of the laws is the reverse of the slalom's; against "
             "truth it is not: what the integral law said online on the ramp was further from "
             "the truth than what its frozen weights say of it. After 36 s, at "
             "an angle that was not learnt, all of them miss more than the linear tire."
         ),
-        Table(
+        page.Table(
             caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
-            header=[printed(word) for word in header()],
+            header=[page.printed(word) for word in header()],
             rows=rows("step_steer", study),
         ),
         *_drawn(
             figures,
             {
                 "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
-                "The drives are Figs. 2 and 3 in the folder paper.",
+                "The drives are Figs. 2 and 3 in the folder paper."
             },
         ),
     ]
 
 
-def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[Block]:
+def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[page.Block]:
     """Return the figures that there are: a law that diverged on every seed has none."""
     return [
         drawing(figures[name], caption) for name, caption in captions.items() if name in figures
@@ -325,7 +289,6 @@ PARTS = {LEARNING: 15.0, EXPORTING: 20.0, TESTING: 20.0, DRIVING: 40.0, REPORTIN
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "demo",
         help=COMMANDS["demo"],
@@ -333,12 +296,11 @@ def add_parser(commands: Any) -> None:
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
         "tables, and steer the car along a path on what it learnt; leaves one report.html to read.",
     )
-    add_output(parser, "demo")
+    shared.add_output(parser, "demo")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     watch = Stopwatch()
     with (
         output_folder(options.out, force=options.force) as folder,
@@ -367,22 +329,22 @@ def run(options: argparse.Namespace) -> None:
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
         work.begin(EXPORTING)
-        shipped = ship(story, folder / FOLDER)
+        shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
         study = run_study(SEEDS, partial(work.begin(TESTING).step, STEPS))
         figures["paper"] = write_study(folders["paper"], study)
         work.begin(DRIVING)
-        driven = drive_story(story, folder)
+        driven = demo_parts.drive_story(story, folder)
         work.begin(REPORTING)
         report = demo_report(
             story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
         )
-        write_report(folder / REPORT, report)
+        page.write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),
-            f"{certificate_text(story.certificate, story.design.force_unit)}\n",
+            f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
             f"{story.text()}\n",
-            f"{shipped_text(shipped)}\n",
-            drive_text(driven),
+            f"{demo_parts.shipped_text(shipped)}\n",
+            demo_parts.drive_text(driven),
         ]
     tell("\n".join(told))
     tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

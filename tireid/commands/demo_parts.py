@@ -8,31 +8,22 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen import find_compiler
+from codegen.processor import CROSS_COMPILER, EMULATOR, Cost, missing_tools
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import Package, build_package
-from identifier.export.processor import (
-    CROSS_COMPILER,
-    EMULATOR,
-    Cost,
-    figures_text,
-    measure,
-    missing_tools,
-)
+from identifier.export.processor import figures_text, measure
 from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
 from tireid.commands.demo_story import FREEZE, Story
 from tireid.commands.drive import headline, inputs_of
-from tireid.commands.drive_results import drive_table as drive_lines
-from tireid.commands.drive_results import known_curves, write_drives
-from tireid.driving import Conditions, Run, Setup, SpeedWish, run_drive
-from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
+from tireid.commands.drive_results import drive_lines, known_curves, write_drives
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions, Run, run_drive
+from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Verdict, self_test, write_files
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
-from tireid.reports.drive import drive_table, known_blocks
-
-# The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
+from tireid.reports.drive import SCORES, known_blocks, score_rows
 
 LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 FILM = FORMATS[0]
@@ -70,7 +61,6 @@ def drive_text(driven: dict[str, Driven]) -> str:
 
 
 def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
-    """Return the section of the report."""
     heading = "The car drives on what it learnt"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
@@ -89,7 +79,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
             caption="The drive of the learning car; outlines are the others.",
             read=READ["film"],
         ),
-        drive_table(slippery.runs, f"{headline(slippery.conditions)}."),
+        _scores(slippery),
         drawing(slippery.figures["errors"], "Deviation and the rest along the path.",
                 READ["errors"]),
         *known_blocks(slippery.runs, slippery.figures),
@@ -98,15 +88,19 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
             "can give: told of the frozen model the tracker drives as well as one that is told of "
             f"the true tires. The film is {LANE_CHANGE}/drive.{FILM}."
         ),
-        drive_table(lane.runs, f"{headline(lane.conditions)}."),
+        _scores(lane),
         drawing(lane.figures["errors"], "Deviation and the rest along the lane change.",
                 READ["errors"]),
     ]  # fmt: skip
     return Section(heading=heading, blocks=blocks)
 
 
+def _scores(one: Driven) -> Table:
+    caption = f"{headline(one.conditions)}."
+    return Table(caption=caption, header=SCORES, rows=score_rows(one.runs))
+
+
 def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
-    """Return the headline numbers of the drives."""
     said = {
         LANE_CHANGE: "in the lane change at 90 % of the grip",
         SLIPPERY: "where friction drops to half",
@@ -122,12 +116,7 @@ def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
 
 def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, float], ...]) -> Setup:
     return Setup(
-        path=BUILT_IN[path](),
-        vehicle=story.car,
-        plant="double-track",
-        mu=1.0,
-        drops=drops,
-        wish=SpeedWish(share, None),
+        path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=SpeedWish(share, None)
     )
 
 
@@ -146,8 +135,6 @@ def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> D
     )
     return Driven(conditions, runs, figures)
 
-
-# What was exported, beside Python.
 
 FOLDER = "package"
 NOT_BUILT = (
@@ -178,17 +165,7 @@ class Shipped(NamedTuple):
 
 
 def ship(story: Story, folder: Path) -> Shipped:
-    """Export what the axle identifier learnt, compile it and test it.
-
-    Parameters
-    ----------
-    folder : an empty folder for the package.
-
-    Raises
-    ------
-    SelfTestError
-        Where the package does not compile or does not pass.
-    """
+    """Export what the axle identifier learnt, compile it and test it."""
     learnt = story.axle.learnt
     model = learnt.freeze(FREEZE)
     package = build_package(learnt.design, story.car, model)
@@ -217,8 +194,7 @@ def shipped_text(shipped: Shipped) -> str:
         for check in shipped.checks
     ] or [f"  {NOT_BUILT}"]
     lines += [
-        f"  {cost.processor}, {_precision(cost)}: {cost.replay.instructions} instructions a step, "
-        f"{cost.flash} B flash, {cost.replay.stack} B stack"
+        f"  {cost.processor}, {cost.precision}: {cost.words}"
         for cost in shipped.costs
         if cost.single
     ]
@@ -226,7 +202,6 @@ def shipped_text(shipped: Shipped) -> str:
 
 
 def package_section(shipped: Shipped) -> Section:
-    """Return the section of the report."""
     name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(
@@ -236,56 +211,30 @@ def package_section(shipped: Shipped) -> Section:
             "tireid export writes."
         )
     ]
-    if shipped.checks:
-        blocks.append(
-            Table(
-                caption="The package, compiled and run on this machine: its self-test, and the "
-                "slalom again beside Python, which begins with the same model.",
-                header=["precision", "self-test", "its vectors", "from Python [N]", "refused"],
-                rows=[
-                    [
-                        check.precision,
-                        check.verdict.verdict,
-                        check.verdict.difference,
-                        f"{check.difference:.2g}",
-                        f"{check.refused} of {check.samples}",
-                    ]
-                    for check in shipped.checks
-                ],
-            )
+    checks = [
+        [one.precision, test.verdict, test.difference, f"{one.difference:.2g}", of]
+        for one in shipped.checks
+        for test, of in [(one.verdict, f"{one.refused} of {one.samples}")]
+    ]
+    if checks:
+        caption = (
+            "The package, compiled and run on this machine: its self-test, and the slalom again "
+            "beside Python, which begins with the same model."
         )
+        header = ["precision", "self-test", "its vectors", "from Python [N]", "refused"]
+        blocks.append(Table(caption=caption, header=header, rows=checks))
     else:
         blocks.append(Paragraph(text=NOT_BUILT))
     if shipped.costs:
-        blocks.append(
-            Table(
-                caption=f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}.",
-                header=[
-                    "processor",
-                    "precision",
-                    "instructions",
-                    "flash [B]",
-                    "RAM [B]",
-                    "stack [B]",
-                ],
-                rows=[
-                    [
-                        cost.processor,
-                        _precision(cost),
-                        f"{cost.replay.instructions}",
-                        f"{cost.flash}",
-                        f"{cost.replay.state + cost.replay.params}",
-                        f"{cost.replay.stack}",
-                    ]
-                    for cost in shipped.costs
-                ],
-            )
-        )
+        caption = f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}."
+        header = ["processor", "precision", "instructions", "flash [B]", "RAM [B]", "stack [B]"]
+        rows = [
+            [one.processor, one.precision, *(f"{n}" for n in numbers)]
+            for one in shipped.costs
+            for numbers in [(one.replay.instructions, one.flash, one.ram, one.replay.stack)]
+        ]
+        blocks.append(Table(caption=caption, header=header, rows=rows))
     else:
         missing = ", ".join(missing_tools())
         blocks.append(Paragraph(text=f"Costs on Arm are not measured, missing: {missing}."))
     return Section(heading="What was learnt becomes C for a controller", blocks=blocks)
-
-
-def _precision(cost: Cost) -> str:
-    return "float" if cost.single else "double"

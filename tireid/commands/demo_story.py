@@ -4,12 +4,12 @@ It learns while it drives: with the axle identifier, the default in a car, and w
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identifier.method import Method
-from identifier.methods import LIVE, REFERENCE, make_method
+from identifier.methods import LIVE, REFERENCE, certify, make_method
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import Replay, force_rms, online_error, replay, reproduce
 from identifier.run import History, identify
@@ -19,7 +19,6 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.commands.certificate_table import certificate_of
 from tireid.output import text_table
 
 SPEED = 20.0  # m/s
@@ -28,21 +27,25 @@ FREEZE = 30.0  # s, the end of the first drive
 
 RATE_LIMIT = np.radians(30.0)  # rad/s at the road wheels
 SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms
-LEARN: Maneuver = Slalom(
+SLALOM = Slalom(
     amplitude=np.radians(4.0), frequency=0.5, onset=2.0, rate_limit=RATE_LIMIT, duration=30.0
 )
-PREDICT: Mapping[str, Maneuver] = {
-    "double_lane_change": DoubleLaneChange(
-        amplitude=np.radians(4.5),
-        frequency=0.6,
-        pause=1.0,
-        onset=2.0,
-        rate_limit=RATE_LIMIT,
-        duration=10.0,
-    ),
-    "step_steer": StepSteer(
-        amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0
-    ),
+LANE_CHANGE = DoubleLaneChange(
+    amplitude=np.radians(4.5),
+    frequency=0.6,
+    pause=1.0,
+    onset=2.0,
+    rate_limit=RATE_LIMIT,
+    duration=10.0,
+)
+STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
+FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
+PREDICT: Mapping[str, Maneuver] = {"double_lane_change": LANE_CHANGE, "step_steer": STEP}
+DRIVES: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]
+    "slalom_20": (SLALOM, 20.0),
+    "step_steer": (STEP, 20.0),
+    "lane_change": (LANE_CHANGE, 20.0),
+    "slalom_25": (FASTER, 25.0),
 }
 
 
@@ -62,12 +65,7 @@ class Learning:
     frozen: Mapping[float, Mapping[str, Replay]]
 
     def errors(self, drive: History) -> tuple[float, float, float]:
-        """Return online and frozen error of both axles [kN], and the frozen share of the rms [-].
-
-        Parameters
-        ----------
-        drive : `learnt`, or one of `others`.
-        """
+        """Return online and frozen error of both axles [kN], and its share of the rms [-]."""
         frozen = self.frozen[FREEZE][drive.recording.name].against_truth
         online, size = online_error(drive), force_rms(drive)
         assert size is not None and frozen is not None and online is not None
@@ -86,7 +84,7 @@ class Story:
     @property
     def certificate(self) -> Certificate:
         """What is known of the paper's design before the car drives."""
-        return certificate_of(self.design, self.car)
+        return certify(self.design, self.car)
 
     def rows(self) -> list[list[str]]:
         """Return by drive, for axle and paper: online and frozen error, share of the force."""
@@ -130,19 +128,13 @@ def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
 
 
 def drive_to_learn() -> Recording:
-    """Return the slalom of the demo."""
-    return drives({"slalom": LEARN})["slalom"]
+    return drives({"slalom": SLALOM})["slalom"]
 
 
 def run_story(progress: Callable[[], None] = lambda: None) -> Story:
-    """Drive, learn, freeze and predict, with both methods.
-
-    Parameters
-    ----------
-    progress : called after each method has learnt on a drive, six times.
-    """
+    """Drive, learn, freeze and predict, with both methods."""
     car = sedan()
-    recordings = drives({"slalom": LEARN, **PREDICT})
+    recordings = drives({"slalom": SLALOM, **PREDICT})
     design = PaperIdentifier.for_vehicle(car)
     return Story(
         car=car,
@@ -175,52 +167,12 @@ def _learning(
     )
 
 
-SLALOM = Slalom(
-    amplitude=np.radians(4.0), frequency=0.5, onset=2.0, rate_limit=RATE_LIMIT, duration=30.0
-)
-DRIVES: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]
-    "slalom_20": (SLALOM, 20.0),
-    "step_steer": (
-        StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0),
-        20.0,
-    ),
-    "lane_change": (
-        DoubleLaneChange(
-            amplitude=np.radians(4.5),
-            frequency=0.6,
-            pause=1.0,
-            onset=2.0,
-            rate_limit=RATE_LIMIT,
-            duration=10.0,
-        ),
-        20.0,
-    ),
-    "slalom_25": (
-        Slalom(
-            amplitude=np.radians(3.5),
-            frequency=0.6,
-            onset=2.0,
-            rate_limit=RATE_LIMIT,
-            duration=20.0,
-        ),
-        25.0,
-    ),
-}
-
-
 def plant_recordings(
     vehicle: Vehicle, rng: np.random.Generator | None = None
 ) -> tuple[Recording, ...]:
     """Drive the plant of a vehicle through every maneuver.
 
-    Parameters
-    ----------
     rng : of the noise of `SENSORS`; None measures exactly.
-
-    Raises
-    ------
-    VehicleError
-        Where the vehicle has no chassis or no tire file.
     """
     plant = Plant(vehicle)
     sensors = None if rng is None else SENSORS

@@ -8,15 +8,7 @@ from models.recordings import Repair
 from models.recordings.reader import repair_text
 from tireid import __version__
 from tireid.commands import COMMANDS, DONE, NOT_VALID
-from tireid.commands.options import (
-    add_accept,
-    add_log_map,
-    add_output,
-    add_vehicle,
-    read_log,
-    read_vehicle,
-    told_map,
-)
+from tireid.commands import options as shared
 from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
 from tireid.figures.forces import draw_diagnosis
 from tireid.figures.style import save_figure
@@ -25,7 +17,6 @@ from tireid.progress import say, tell
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "doctor",
         help=COMMANDS["doctor"],
@@ -36,12 +27,12 @@ def add_parser(commands: Any) -> None:
         "be (--log FILE).",
     )
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
-    add_vehicle(parser, required=True)
+    shared.add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    add_log_map(parser)
+    shared.add_log_map(parser)
     add_repair(parser, "and write it to")
-    add_accept(parser)
-    add_output(parser, None)
+    shared.add_accept(parser)
+    shared.add_output(parser, None)
     parser.set_defaults(run=run)
 
 
@@ -51,8 +42,8 @@ def run(options: argparse.Namespace) -> int:
         if options.repair.suffix.lower() != ".toml":
             raise ValueError(f"{options.repair}: the name must end in .toml")
         require_free(options.repair, force=options.force)
-    vehicle, told = read_vehicle(options), told_map(options)
-    recording = read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
+    vehicle, told = shared.read_vehicle(options), shared.told_map(options)
+    recording = shared.read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
@@ -77,11 +68,7 @@ def run(options: argparse.Namespace) -> int:
     return DONE if left.healthy or options.accept else NOT_VALID
 
 
-def _tell_repair(
-    options: argparse.Namespace,
-    repair: Repair,
-    after: Diagnosis | None,
-) -> None:
+def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
     """Say what the repair is, and what is left after it."""
     if after is None:
         tell(f"nothing is sure enough to be repaired: with {options.repair} the log stays as it is")
@@ -93,8 +80,6 @@ def _tell_repair(
 def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> dict[str, Any]:
     """Return what summary.json holds.
 
-    Parameters
-    ----------
     after : diagnosis of the repaired log, None where nothing was repaired.
     """
     return {

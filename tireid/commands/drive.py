@@ -17,35 +17,18 @@ from models.vehicle import Vehicle
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
+from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
-from tireid.commands.drive_results import NO_FILM, drive_table, known_curves, write_drives
-from tireid.commands.options import (
-    add_method,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    add_weights,
-)
+from tireid.commands.drive_results import NO_FILM, drive_lines, known_curves, write_drives
+from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION
-from tireid.driving.runs import (
-    FROZEN,
-    FULL,
-    IMU,
-    ORACLE,
-    SENSORS,
-    TIRES,
-    Conditions,
-    require_compiler,
-    run_drive,
-)
-from tireid.driving.setup import PERIOD, PLANTS
+from tireid.driving.setup import PERIOD, PLANT
 from tireid.output import output_folder
 from tireid.progress import say, tell
 from tireid.reports.drive import write_drive_report
 
 
-def headline(conditions: Conditions) -> str:
+def headline(conditions: driving.Conditions) -> str:
     """Return a case in one line."""
     setup = conditions.setup
     v = setup.speeds()
@@ -55,25 +38,20 @@ def headline(conditions: Conditions) -> str:
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
     noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
-    noise += ", no v_y" if conditions.kind == IMU else ""
+    noise += ", no v_y" if conditions.kind == driving.IMU else ""
     noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
-        f"{setup.plant} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
         f"{noise}, seed {conditions.seed}"
     )
 
 
 def inputs_of(
-    conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
+    conditions: driving.Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
 ) -> dict[str, Any]:
-    """Return all that goes into drives, ready for JSON.
-
-    Parameters
-    ----------
-    source : where the frozen tires come from.
-    """
+    """Return all that goes into drives, ready for JSON."""
     setup = conditions.setup
     v = setup.speeds()
     return {
@@ -90,13 +68,13 @@ def inputs_of(
         "tires": list(labels),
         "frozen": source,
         "weights_hash": None if learnt is None else digest(learnt.to_dict()),
-        "plant": setup.plant,
+        "plant": PLANT,
         "vehicle": vehicle_numbers(setup.vehicle),
         "chassis": _chassis(setup.vehicle),
         "delay_ms": 1e3 * PERIOD * conditions.delay,
         "period_ms": 1e3 * PERIOD,
         "noise": conditions.noise,
-        **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
+        **({"sensors": conditions.kind} if conditions.kind != driving.FULL else {}),
         **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
         **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
         "faults": [_finite(asdict(fault)) for fault in conditions.faults],
@@ -132,7 +110,6 @@ EPILOG = (
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "drive",
         help=COMMANDS["drive"],
@@ -165,22 +142,15 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--tires",
         nargs="+",
-        choices=(*TIRES, ALL),
-        default=[FROZEN],
+        choices=(*driving.TIRES, ALL),
+        default=[driving.FROZEN],
         metavar="NAME",
-        help=f"what the tracker is told: {', '.join(TIRES)}, or {ALL}; the first leads ({FROZEN})",
+        help=f"tires that the tracker plans with: {', '.join(driving.TIRES)}, or {ALL}; "
+        f"the first leads ({driving.FROZEN})",
     )
-    add_weights(parser, "the frozen tires, as identified")
-    add_method(parser)
-    add_vehicle(parser)
-    parser.add_argument(
-        "--plant",
-        choices=PLANTS,
-        default=PLANTS[0],
-        metavar="NAME",
-        help=f"what is driven: {', '.join(PLANTS)}; the last two need commonroad-vehicle-models "
-        "(%(default)s)",
-    )
+    shared.add_weights(parser, "the frozen tires, as identified")
+    shared.add_method(parser)
+    shared.add_vehicle(parser)
     parser.add_argument(
         "--delay",
         type=float,
@@ -189,15 +159,12 @@ def add_parser(commands: Any) -> None:
         help="from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
     )
     parser.add_argument(
-        "--noise",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="of the sensors (on)",
+        "--noise", action=argparse.BooleanOptionalAction, default=True, help="of the sensors (on)"
     )
     parser.add_argument(
         "--sensors",
-        choices=SENSORS,
-        default=FULL,
+        choices=driving.SENSORS,
+        default=driving.FULL,
         metavar="NAME",
         help="full: v_y is measured; imu: yaw rate and a_y of an inertial unit on the body (0.003 "
         "rad/s and 0.1 m/s² of noise, biases of 0.001 and 0.05), wheel speed (0.03 m/s), steering, "
@@ -228,7 +195,7 @@ def add_parser(commands: Any) -> None:
         help="of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
         "plans with the least grip that its motion leaves possible (%(default)g)",
     )
-    add_seed(parser, "noise and learning")
+    shared.add_seed(parser, "noise and learning")
     parser.add_argument(
         "--laps", type=float, default=1.0, metavar="N", help="of a closed path (%(default)g)"
     )
@@ -239,8 +206,8 @@ def add_parser(commands: Any) -> None:
         metavar="NAME",
         help=f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)",
     )
-    add_network_arguments(parser, "steer on this frozen network")
-    add_output(parser, "drive")
+    shared.add_network_arguments(parser, "steer on this frozen network")
+    shared.add_output(parser, "drive")
     parser.set_defaults(run=run)
 
 
@@ -251,15 +218,15 @@ def run(options: argparse.Namespace) -> int:
     setup = conditions.setup
     if options.film == "mp4":
         require_ffmpeg()
-    require_compiler()
+    driving.require_compiler()
     with output_folder(options.out, force=options.force) as folder:
         say(headline(conditions))
-        if ORACLE in labels:
+        if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions)
         if learnt is not None:
             learnt.save(folder / "weights.json")
-        runs = [run_drive(label, conditions, learnt) for label in labels]
+        runs = [driving.run_drive(label, conditions, learnt) for label in labels]
         inputs = inputs_of(conditions, labels, source, learnt)
         figures = write_drives(
             folder,
@@ -279,7 +246,7 @@ def run(options: argparse.Namespace) -> int:
             film=folder / f"drive.{options.film}" if options.film in SHOWN else None,
             command=options.words,
         )
-        told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
+        told = f"{headline(conditions)}\ntires: {source}\n{drive_lines(runs)}"
     tell(told)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else NOT_COMPLETED

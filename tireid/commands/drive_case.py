@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
@@ -11,62 +10,44 @@ import numpy as np
 from identifier.frozen import VEHICLE_KEYS
 from identifier.tire_model import TireModel, load_model
 from models.faults import SIZED, FaultError, SensorFault
+from models.rules import require_within
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
-from mpc.loop import CarSensors, FaultySensors, imu_and_localization
+from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
-from mpc.realtime.caution import require_caution
-from tireid.commands.options import chosen_method, network_model, read_vehicle, seed_of
-from tireid.driving.learn import learning_drive
-from tireid.driving.runs import (
-    FROZEN,
-    FULL,
-    IMU,
-    LEARNING,
-    LINEAR,
-    ORACLE,
-    Conditions,
-    require_dither,
+from tireid.commands.options import (
+    chosen_method,
+    network_model,
+    number_with_unit,
+    read_vehicle,
+    seed_of,
 )
-from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
+from tireid.driving import runs
+from tireid.driving.learn import learning_drive
+from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.learning import identify
 from tireid.progress import Progress
 from tireid.verdicts import warn_of, warn_of_stored
 
-# Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
-
-PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
 def parse_speed(text: str) -> SpeedWish:
     """Return what --speed says.
 
-    Parameters
-    ----------
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
-
-    Raises
-    ------
-    ValueError
-        Where it is none of these, or not a speed for a car.
     """
-    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text)
-    try:
-        value = float(found[1]) if found else math.nan
-    except ValueError:
-        value = math.nan
-    unit = found[2] if found else None
+    value, unit = number_with_unit(text, "%", "m/s", "km/h")
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
     if unit is None and value > PLAIN:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
-    if unit in (METERS, KILOMETERS):
-        speed = value / (3.6 if unit == KILOMETERS else 1.0)
+    if unit in ("m/s", "km/h"):
+        speed = value / (3.6 if unit == "km/h" else 1.0)
         if not 3.0 <= speed <= 100.0:
             raise ValueError(f"--speed must be 3 to 100 m/s, it is {speed:.3g} m/s")
         return SpeedWish(None, speed)
-    share = value / (100.0 if unit == PERCENT else 1.0)
+    share = value / (100.0 if unit == "%" else 1.0)
     if not 0.05 <= share <= PLAIN:
         raise ValueError(f"--speed must be 5 to 150 % of the grip, it is {100.0 * share:.3g} %")
     return SpeedWish(share, None)
@@ -75,14 +56,7 @@ def parse_speed(text: str) -> SpeedWish:
 def parse_drop(text: str) -> tuple[float, float]:
     """Return the place [m] and the friction from there on [-] of --mu-drop S:MU.
 
-    Parameters
-    ----------
     text : such as 60:0.5.
-
-    Raises
-    ------
-    ValueError
-        Where it is not such a pair, or the numbers are not those of a road.
     """
     place, colon, friction = text.partition(":")
     try:
@@ -93,21 +67,15 @@ def parse_drop(text: str) -> tuple[float, float]:
         raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
     if not (math.isfinite(s) and s >= 0.0):
         raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
-    return s, require_friction("--mu-drop", mu)
+    require_within(ValueError, *FRICTIONS, **{"friction of --mu-drop": mu})
+    return s, mu
 
 
-def parse_fault(text: str, kind: str = FULL) -> SensorFault:
+def parse_fault(text: str, kind: str = runs.FULL) -> SensorFault:
     """Return what --fault says of a sensor.
 
-    Parameters
-    ----------
     text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
     kind : of the sensors, of `SENSORS`.
-
-    Raises
-    ------
-    ValueError
-        Where it is not of that form, or not a fault that a sensor of the loop can have.
     """
     words = text.split(":")
     try:
@@ -120,7 +88,7 @@ def parse_fault(text: str, kind: str = FULL) -> SensorFault:
         ) from None
     try:
         fault = SensorFault(channel=channel, kind=how, start=start, duration=duration, size=most)
-        sensors = imu_and_localization(None) if kind == IMU else CarSensors()
+        sensors = imu_and_localization(None) if kind == runs.IMU else CarSensors()
         FaultySensors(sensors, [fault])  # refuses what is no channel
     except FaultError as error:
         raise ValueError(f"--fault {text}: {error}") from None
@@ -129,52 +97,43 @@ def parse_fault(text: str, kind: str = FULL) -> SensorFault:
     return fault
 
 
-# The words of `tireid drive` made into a case.
-
 ALL = "all"
 LONGEST_DELAY = 100.0  # ms
 
 
 def labels_of(words: Sequence[str]) -> list[str]:
     """Return the tires in order, each once; all begins with the frozen ones."""
-    wanted = [FROZEN, LINEAR, ORACLE, LEARNING] if ALL in words else list(words)
+    wanted = [runs.FROZEN, runs.LINEAR, runs.ORACLE, runs.LEARNING] if ALL in words else list(words)
     return list(dict.fromkeys(wanted))
 
 
-def conditions_of(options: argparse.Namespace) -> Conditions:
-    """Return what is to be driven.
-
-    Raises
-    ------
-    ValueError
-        Where a word or a file is not right.
-    """
+def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_dither("--dither", options.dither)
+    require_within(ValueError, *runs.WEAVES, **{"--dither in m": options.dither})
+    require_within(ValueError, *FRICTIONS, **{"--mu": options.mu})
+    require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     path = named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
     _require_one_source(options)
-    _require_its_own(options.plant, options.vehicle)
     setup = make_setup(
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
-        plant=options.plant,
-        mu=require_friction("--mu", options.mu),
+        mu=options.mu,
         drops=[parse_drop(text) for text in options.mu_drop],
         wish=parse_speed(options.speed),
     )
     hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
     require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
-    return Conditions(
+    return runs.Conditions(
         setup=setup,
         delay=_periods(options.delay),
         noise=options.noise,
         seed=seed_of(options),
         laps=options.laps,
         faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
-        caution=require_caution("--caution", options.caution),
+        caution=options.caution,
         kind=options.sensors,
         dither=options.dither,
     )
@@ -201,13 +160,7 @@ def _require_one_source(options: argparse.Namespace) -> None:
 
 
 def named_path(name: str) -> Path:
-    """Return a built-in path, or one from way-points in a file.
-
-    Raises
-    ------
-    ValueError
-        Where it is neither, or the file is no path.
-    """
+    """Return a built-in path, or one from way-points in a file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:
@@ -219,57 +172,30 @@ def make_setup(
     path: Path,
     *,
     vehicle: Vehicle | None,
-    plant: str,
     mu: float,
     drops: Sequence[tuple[float, float]],
     wish: SpeedWish,
 ) -> Setup:
     """Return a car at the start of a path.
 
-    Parameters
-    ----------
-    vehicle : the car; None takes the built-in sedan, or the car of the plant.
-    plant : of `PLANTS`.
-    mu : friction before the first drop [-].
+    vehicle : the car; None takes the built-in sedan.   mu : friction before the first drop [-].
     drops : arc length [m] and friction from there on.
-
-    Raises
-    ------
-    ValueError
-        Where the plant brings its own car, or a drop is beyond the path.
     """
     ordered = tuple(sorted(drops))
     for s, _ in ordered:
         if not path.closed and s >= path.length:
             raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
-    if plant == "double-track":
-        car = vehicle or sedan()
-        car.require_chassis()
-    else:
-        _require_its_own(plant, vehicle)
-        from mpc.cars.bmw import bmw
-
-        car = bmw()
-    return Setup(path=path, vehicle=car, plant=plant, mu=mu, drops=ordered, wish=wish)
-
-
-def _require_its_own(plant: str, vehicle: object | None) -> None:
-    if plant != "double-track" and vehicle is not None:
-        raise ValueError(f"--plant {plant} brings a car of its own: give no --vehicle with it")
+    car = vehicle or sedan()
+    car.require_chassis()
+    return Setup(path=path, vehicle=car, mu=mu, drops=ordered, wish=wish)
 
 
 def frozen_tires(
-    options: argparse.Namespace, labels: Sequence[str], conditions: Conditions
+    options: argparse.Namespace, labels: Sequence[str], conditions: runs.Conditions
 ) -> tuple[str, TireModel | None]:
-    """Return where frozen tires come from, and the model where one is needed.
-
-    Raises
-    ------
-    ValueError
-        Where a file cannot be used, or a law runs away.
-    """
+    """Return where frozen tires come from, and the model where one is needed."""
     setup = conditions.setup
-    if not {FROZEN, LEARNING} & set(labels):
+    if not {runs.FROZEN, runs.LEARNING} & set(labels):
         return "nothing was learnt", None
     if options.weights is not None:
         model = load_model(options.weights)
@@ -305,11 +231,6 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
     if learnt.bicycle == setup.vehicle.bicycle:
         return
     mine = f"{options.weights} was learnt on the car {learnt.name!r}, driven is "
-    if setup.plant != "double-track":
-        raise ValueError(
-            f"{mine}the {setup.vehicle.name!r} that --plant {setup.plant} brings: leave --weights "
-            "out to learn on it first"
-        )
     driven = setup.vehicle
     apart = "; ".join(
         f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"

@@ -12,27 +12,26 @@ from codegen.arrays import Array
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.files import digest
-from mpc.loop import Drive, told_scores
+from mpc.loop.record import Drive, told_scores
 from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film
 from tireid.animation.known import known_over_time, steady_curve
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run
 from tireid.driving.setup import Setup
-from tireid.figures import (
-    axle_slip,
+from tireid.figures.drive import (
+    AT_THE_END,
     drive_errors_figure,
-    drive_lateral_figure,
     drive_path_figure,
     drive_solve_figure,
     drive_steering_figure,
-    drive_tires_figure,
-    save_figure,
 )
-from tireid.figures.drive import AT_THE_END
-from tireid.figures.tires import TireCurve
-from tireid.output import text_table, write_csv, write_json
+from tireid.figures.side_slip import drive_lateral_figure
+from tireid.figures.style import save_figures
+from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
+from tireid.output import axle_columns, text_table, write_csv, write_json
 from tireid.progress import say
+from tireid.reports.drive import SCORES, score_rows
 
 NO_FILM = "none"
 
@@ -49,12 +48,7 @@ def write_drives(
 ) -> dict[str, Figure]:
     """Write everything about drives along one path; return the figures by the name of their file.
 
-    Parameters
-    ----------
-    folder : an empty folder.
-    inputs : all that went in, ready for JSON.
-    drops : arc length [m] and friction from there on.
-    film : webp, gif, mp4 or none.
+    drops : arc length [m] and friction from there on.   film : webp, gif, mp4 or none.
     """
     first = runs[0]
     write_json(folder / "summary.json", summarize_drives(runs, inputs))
@@ -79,8 +73,7 @@ def write_drives(
     }
     if first.drive.told:
         figures["lateral"] = drive_lateral_figure(first.drive)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
+    save_figures(folder, figures)
     if film != NO_FILM:
         title = f"{first.drive.path.name}: {first.label} tires"
         write_film(
@@ -95,12 +88,7 @@ def write_drives(
 
 
 def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds: scores of the first drive and of each, and what went in.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    """
+    """Return what summary.json holds: scores of the first drive and of each, and what went in."""
     by_label = {run.label: _scores(run) for run in runs}
     return {
         **by_label[runs[0].label],
@@ -129,44 +117,31 @@ COLUMNS_TOLD = {
 }
 
 
+UNITS = {  # of signals of a drive, by their name
+    **dict.fromkeys(("s", "X", "Y", "e_y"), "m"),
+    **dict.fromkeys(("psi", "delta", "command", "e_psi"), "rad"),
+    **dict.fromkeys(("v_x", "v_y", "v_ref"), "m_s"),
+    **dict.fromkeys(("a_x", "a_y"), "m_s2"),
+    **{"t": "s", "r": "rad_s", "kappa": "1_m"},
+}
+SIGNALS = (
+    *("t", "s", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "command"),
+    *("e_y", "e_psi", "kappa", "v_ref"),
+)
+
+
 def drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
-    slip = axle_slip(drive)
-    units = {"t": "s", "psi": "rad", "r": "rad_s", "delta": "rad", "v_x": "m_s", "v_y": "m_s"}
-    measured = {
-        f"{name}_measured_{units.get(name, 'm_s2' if name == 'a_y' else 'm')}": values
-        for name, values in drive.measured.items()
-        if name != "t"
-    }
+    slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
     return {
-        "t_s": drive.t,
-        "s_m": drive.s,
-        "X_m": drive.X,
-        "Y_m": drive.Y,
-        "psi_rad": drive.psi,
-        "v_x_m_s": drive.v_x,
-        "v_y_m_s": drive.v_y,
-        "r_rad_s": drive.r,
-        "a_x_m_s2": drive.a_x,
-        "a_y_m_s2": drive.a_y,
-        "delta_rad": drive.delta,
-        "command_rad": drive.command,
-        "e_y_m": drive.e_y,
-        "e_psi_rad": drive.e_psi,
-        "kappa_1_m": drive.kappa,
-        "v_ref_m_s": drive.v_ref,
-        "alpha_f_rad": slip[:, 0],
-        "alpha_r_rad": slip[:, 1],
-        "Fyf_N": drive.axle_force[:, 0],
-        "Fyr_N": drive.axle_force[:, 1],
+        **{f"{name}_{UNITS[name]}": getattr(drive, name) for name in SIGNALS},
+        **axle_columns("alpha_{}_rad", slip),
+        **axle_columns("Fy{}_N", drive.axle_force),
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
-        **measured,
+        **{f"{name}_measured_{UNITS[name]}": values for name, values in measured if name != "t"},
         **{COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
     }
-
-
-# What a tracker is told of the tires, as curves.
 
 
 def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
@@ -187,22 +162,9 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
     return [steady_curve(label, model, v_x) for label, model in models.items()]
 
 
-# What `tireid drive` prints: one line a drive.
-
-TIMES = "wall time: median / p99 / max"
-COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", TIMES)
-
-
-def drive_table(runs: Sequence[Run]) -> str:
+def drive_lines(runs: Sequence[Run]) -> str:
     """Return the scores of drives as lines of text."""
-    rows = [list(COLUMNS)]
-    for run in runs:
-        score = run.scores
-        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
-        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
-        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
-        rows.append([run.label, *off, _completed(run), failures, f"{times} ms"])
-    lines = [text_table(rows, "<>><>>")]
+    lines = [text_table([SCORES, *score_rows(runs)], "<>><>>")]
     lines += [f"{run.label}: {told_words(run)}" for run in runs if run.drive.told]
     for run in runs:
         lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
@@ -218,9 +180,3 @@ def told_words(run: Run) -> str:
         f"{told.rms_deg:.2f} degrees rms; {100.0 * told.within_two_sd:.0f} % of the errors within "
         f"two standard deviations"
     )
-
-
-def _completed(run: Run) -> str:
-    if run.scores.completed:
-        return "yes"
-    return f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"

@@ -6,26 +6,16 @@ from typing import Any
 from identifier.method import Method
 from identifier.methods import LIVE, continuing
 from identifier.tire_model import TireModel, load_model
+from models.rules import require_within
 from models.vehicle import Vehicle
-from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS
-from tireid.commands.options import (
-    add_method,
-    add_output,
-    add_vehicle,
-    add_weights,
-    chosen_method,
-    method_is_given,
-    read_vehicle,
-    say_estimates,
-)
-from tireid.exporting import export_method
+from tireid.commands import options as shared
+from tireid.exporting import export
 from tireid.progress import say
 from tireid.verdicts import warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "export",
         help=COMMANDS["export"],
@@ -33,9 +23,9 @@ def add_parser(commands: Any) -> None:
         "README with its cost on Arm processors where the tools are there, and a JSON file of all "
         "that went in.",
     )
-    add_vehicle(parser)
-    add_method(parser, LIVE)
-    add_weights(parser, "begin with it, as identified")
+    shared.add_vehicle(parser)
+    shared.add_method(parser, LIVE)
+    shared.add_weights(parser, "begin with it, as identified")
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
     parser.add_argument("--single", action="store_true", help="float unless the build says double")
     parser.add_argument(
@@ -61,25 +51,24 @@ def add_parser(commands: Any) -> None:
         help="of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
         "number of its parameters (%(default)g)",
     )
-    add_output(parser, "export")
+    shared.add_output(parser, "export")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
-    caution = require_caution("--caution", options.caution)
-    if caution and not options.mpc:
+    require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
+    if options.caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
     start = None if options.weights is None else load_model(options.weights)
     if options.weights is not None:
         warn_of_stored(options.weights)
     vehicle = _vehicle(options, start)
     method = _method(options, vehicle, start)
-    exported = export_method(
+    exported = export(
         method,
-        vehicle,
-        start,
         options.out,
+        start=start,
+        vehicle=vehicle,
         name=options.name,
         single=options.single,
         with_a_y=options.with_a_y,
@@ -87,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
         fmu=options.fmu,
         onnx=options.onnx,
         mpc=options.mpc,
-        caution=caution,
+        caution=options.caution,
         overwrite=options.force,
     )
     for line in str(exported).splitlines():
@@ -96,13 +85,13 @@ def run(options: argparse.Namespace) -> None:
 
 def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
     if start is None or options.vehicle is not None:
-        return read_vehicle(options)
-    say_estimates(start.vehicle, options.weights)
+        return shared.read_vehicle(options)
+    shared.say_estimates(start.vehicle, options.weights)
     return start.vehicle
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     """Return the method that is asked for; else the one that goes on from the model."""
-    if start is None or method_is_given(options):
-        return chosen_method(options, vehicle, online=True).method
+    if start is None or shared.method_is_given(options):
+        return shared.chosen_method(options, vehicle, online=True).method
     return continuing(start, vehicle)

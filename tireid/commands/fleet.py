@@ -12,13 +12,7 @@ from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.options import (
-    add_force,
-    add_jobs,
-    add_log_map,
-    jobs_of,
-    told_map,
-)
+from tireid.commands.options import add_force, add_jobs, add_log_map, jobs_of, told_map
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, COLUMNS, Merged, fleet_prior, merge, usable
@@ -82,14 +76,13 @@ def _add_learn(tasks: Any) -> None:
         help="name logs as they lie under this folder or address, not by their absolute paths",
     )
     parser.add_argument(
-        "--weights", type=Path, metavar="FILE", help="stored model or prior: begin with it"
+        "--weights", type=Path, metavar="FILE", help="fit or prior that is believed before"
     )
     parser.add_argument(
         "--judge",
-        choices=("motion", "full", "none"),
+        choices=("motion", "none"),
         default="motion",
-        help="verdict of each log: does the model give its motion back, all that tireid identify "
-        "asks (ten times as long), or none (%(default)s)",
+        help="verdict of each log: does the model give its motion back, or none (%(default)s)",
     )
     parser.add_argument(
         "--part",
@@ -316,7 +309,7 @@ class _Used:
     """The rows of a store that --where takes and that can be used, counted as they are read."""
 
     def __init__(self, options: argparse.Namespace) -> None:
-        self.options, self.store = options, Store(options.store)
+        self.options, self.store, self.told = options, Store(options.store), False
         self.by = [one for one in options.by.split(",") if one]
         self.store.require()
 
@@ -332,11 +325,13 @@ class _Used:
                 f"{self.options.store}: none of {of} logs can be used"
                 + ("" if self.options.all else "; --all takes those too that the verdict refuses")
             )
-        say(f"{used} of {of} logs")
+        if not self.told:
+            say(f"{used} of {of} logs")
+        self.told = True
 
     @property
     def groups(self) -> list[Merged]:
-        return merge(self.rows(), self.by)
+        return merge(self.rows, self.by)
 
 
 def _watch(options: argparse.Namespace) -> int:
@@ -387,11 +382,14 @@ def _merge(options: argparse.Namespace) -> int:
                     "learning_s": one.told.seconds,
                     "cornering_stiffness_N_rad": C.tolist(),
                     "known_slip_rad": one.model.known_slip.tolist(),
-                    "error_over_told": one.misfit.tolist(),
+                    "on_another_road": one.elsewhere,
                 }
             )
         write_json(folder / "models.json", table)
     tell(_table(groups))
+    for one in groups:
+        if one.elsewhere:
+            say(f"{one.name}: {one.elsewhere} of {one.logs} logs are of another road than the rest")
     say(f"wrote {options.out}/")
     return DONE
 

@@ -22,54 +22,16 @@ from identifier.reproducibility import (
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict, judge, judge_prediction
-from models.recordings import (
-    Recording,
-    Repair,
-    check_against_vehicle,
-    check_physics,
-    joined,
-)
+from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
+from tireid.commands import identify_results as results
+from tireid.commands import options as shared
 from tireid.commands.certificate_table import resumed_line, verdict_line
-from tireid.commands.identify_results import (
-    NETWORK,
-    AskedBound,
-    error_cells,
-    file_name,
-    guaranteed_text,
-    network_table,
-    no_truth,
-    write_network_results,
-    write_results,
-)
-from tireid.commands.options import (
-    add_accept,
-    add_log_reading,
-    add_method,
-    add_network_arguments,
-    add_output,
-    add_seed,
-    add_vehicle,
-    add_weights,
-    chosen_method,
-    exit_code,
-    network_model,
-    read_log,
-    read_vehicle,
-    seed_of,
-    told_map,
-)
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify, with_v_y
-from tireid.output import (
-    output_folder,
-    require_curves,
-    require_free,
-    text_table,
-    write_json,
-)
+from tireid.output import output_folder, require_curves, require_free, text_table, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import asked_text, verdict_text, warn_of_stored
@@ -79,7 +41,6 @@ OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
         help=COMMANDS["identify"],
@@ -95,9 +56,9 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
     )
-    add_vehicle(parser, required=True)
+    shared.add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    add_method(parser)
+    shared.add_method(parser)
     parser.add_argument(
         "--freeze",
         nargs="+",
@@ -122,12 +83,12 @@ def add_parser(commands: Any) -> None:
         help="state forces that are guaranteed where no force differs from the best curve by more "
         "than E static axle loads, or, with a second number, is late by more [s] (estimated)",
     )
-    add_log_reading(parser)
+    shared.add_log_reading(parser)
     add_repair(parser, "learn on what is left, and write it to")
-    add_weights(parser, "begin learning with it")
-    add_seed(parser, "the initial weights of the paper's network")
-    add_network_arguments(parser, "freeze nothing, judge this network instead")
-    add_accept(parser)
+    shared.add_weights(parser, "begin learning with it")
+    shared.add_seed(parser, "the initial weights of the paper's network")
+    shared.add_network_arguments(parser, "freeze nothing, judge this network instead")
+    shared.add_accept(parser)
     parser.add_argument(
         "--curves",
         choices=("csv", "parquet"),
@@ -135,19 +96,19 @@ def add_parser(commands: Any) -> None:
         help="as what curves over time are written (csv); parquet is smaller, sooner written and "
         "has all digits",
     )
-    add_output(parser, "identify")
+    shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
-    vehicle = read_vehicle(options)
-    seed = None if options.seed is None else seed_of(options)
+    vehicle = shared.read_vehicle(options)
+    seed = None if options.seed is None else shared.seed_of(options)
     beside = options.network is not None  # of which something learns online
-    law, design = chosen_method(options, vehicle, seed, online=beside)
+    law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
-    bound = None if options.bound is None else AskedBound.of(options.bound)
+    bound = None if options.bound is None else results.AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
         raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
     start = None if options.weights is None else load_model(options.weights)
@@ -163,7 +124,7 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        law, design = chosen_method(options, vehicle, seed, without_v_y=True)
+        law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):
         check_recording(one, design)
@@ -173,13 +134,15 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
-        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y, online=beside)
+        law, design = shared.chosen_method(
+            options, vehicle, seed, without_v_y=without_v_y, online=beside
+        )
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
             check_against_vehicle(one, vehicle)
     recording = joined(logs)
-    network = network_model(options, vehicle, design.min_speed)
+    network = shared.network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
     if network is None:
@@ -209,11 +172,11 @@ def run(options: argparse.Namespace) -> int:
             verdict = with_doctor(verdict, diagnosis, repair)
             asked = _asked(network, others)
             progress.begin(DRAWING)
-            replays, figures = write_network_results(
+            replays, figures = results.write_network_results(
                 folder, options.network, law, network, histories, verdict, asked, options.curves
             )
-            by_key = {NETWORK: replays}
-            told = network_table(law, histories, replays)
+            by_key = {results.NETWORK: replays}
+            told = results.network_table(law, histories, replays)
         else:
             learnt = histories[0]
             for t in freeze_times:
@@ -222,7 +185,7 @@ def run(options: argparse.Namespace) -> int:
             verdict = with_doctor(judge(learnt, freeze_times[-1]), diagnosis, repair)
             asked = _asked(learnt.freeze(freeze_times[-1]), others)
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
-            figures = write_results(
+            figures = results.write_results(
                 folder,
                 law,
                 learnt,
@@ -240,7 +203,7 @@ def run(options: argparse.Namespace) -> int:
             told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
         doctor = doctor_text(diagnosis, repair, options.repair)
         model = network or load_model(folder / "weights.json")
-        sure = "" if bound is None else guaranteed_text(model)
+        sure = "" if bound is None else results.guaranteed_text(model)
         of_others = asked_text(asked)
         parts_told = (told, sure, doctor, of_others, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
@@ -259,11 +222,11 @@ def run(options: argparse.Namespace) -> int:
             asked=asked,
         )
     if repair:
-        write_repair(options.repair, told_map(options), diagnosis)
+        write_repair(options.repair, shared.told_map(options), diagnosis)
         say(f"wrote {options.repair}")
     tell(told)
     say(f"wrote {options.out}/")
-    return max(exit_code(one, options) for one in (verdict, *asked.values()))
+    return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
 
 
 def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
@@ -314,10 +277,10 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
 def _read(
     log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
 ) -> Recording:
-    recording = read_log(
+    recording = shared.read_log(
         log,
         vehicle,
-        told_map(options),
+        shared.told_map(options),
         run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,
@@ -327,7 +290,7 @@ def _read(
 
 
 def _require_distinct(recordings: list[Recording]) -> None:
-    files = [file_name(recording) for recording in recordings]
+    files = [results.file_name(recording) for recording in recordings]
     for recording, name in zip(recordings, files, strict=True):
         if files.count(name) > 1:
             raise ValueError(
@@ -360,8 +323,6 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     Under the recording that was learnt stands the paper's measure: its past, t < T_freeze, against
     what was identified online.
 
-    Parameters
-    ----------
     frozen : freeze time [s] to recording name to replay.
     """
     sizes = {history.recording.name: force_rms(history) for history in histories}
@@ -369,10 +330,12 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            note = no_truth(error, sizes[name])
-            cells = error_cells(error, sizes[name])
+            note = results.no_truth(error, sizes[name])
+            cells = results.error_cells(error, sizes[name])
             rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
             sides = result.reproduction
             if sides is not None and sides.past_against_online is not None:
-                rows.append(["", OWN_PAST, *error_cells(sides.past_against_online, sizes[name])])
+                rows.append(
+                    ["", OWN_PAST, *results.error_cells(sides.past_against_online, sizes[name])]
+                )
     return text_table(rows, "><>>")

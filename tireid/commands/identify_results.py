@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +19,6 @@ from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
-    Reproduction,
     force_rms,
     freeze_key,
     online_error,
@@ -31,36 +31,19 @@ from identifier.verdict import Verdict, calibrated, guaranteed
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
-from tireid.figures import (
-    error_figure,
-    force_figure,
-    inputs_figure,
-    learnt_axles_figure,
-    prediction_figure,
-    save_figure,
-    side_slip_figure,
-    slip_figure,
-    weights_figure,
-)
+from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
+from tireid.figures.paper import error_figure, weights_figure
+from tireid.figures.side_slip import side_slip_figure
+from tireid.figures.style import save_figures
 from tireid.figures.thinned import DrawnRun
-from tireid.figures.tires import drawn_tracks
-from tireid.output import text_table, write_csv, write_json, write_table
+from tireid.figures.tires import drawn_tracks, learnt_axles_figure, slip_figure
+from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 from tireid.reports.identify import guaranteed_sentence
 
-# The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
 
-
-def _axles(error: AxleRmse | None) -> dict[str, float] | None:
-    return None if error is None else {"front": error.front, "rear": error.rear}
-
-
-def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
-    return {
-        "past_against_online": _axles(sides.past_against_online),
-        "past_against_truth": _axles(sides.past_against_truth),
-        "after_against_truth": _axles(sides.after_against_truth),
-    }
+def _told(error: AxleRmse | None) -> dict[str, float] | None:
+    return None if error is None else asdict(error)
 
 
 def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | None:
@@ -75,14 +58,11 @@ def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | No
 
 
 def summarize(
-    *,
     law: str,
-    learnt: History,
-    others: Sequence[History],
-    frozen: Mapping[float, Mapping[str, Replay]],
-    verdict: Verdict,
+    runs: Sequence[History],
+    frozen: Mapping[str, Mapping[str, Replay]],
+    verdict: Verdict | None,
     asked: Mapping[str, Verdict],
-    parts: Sequence[History] = (),
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
@@ -91,40 +71,25 @@ def summarize(
     the recording that was learnt at the freeze, and its `past_against_online` is the measure of the
     paper's section IV-A.
 
-    Parameters
-    ----------
-    frozen : freeze time [s] to recording name to replay.
-    parts : of the online run, over each of several logs that were learnt on.
+    runs : the first of them was learnt.   frozen : freeze time [s] to recording name to replay.
     """
-    by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict, asked)
-
-
-def summarize_replays(
-    law: str,
-    runs: Sequence[History],
-    frozen: Mapping[str, Mapping[str, Replay]],
-    verdict: Verdict | None,
-    asked: Mapping[str, Verdict],
-) -> dict[str, Any]:
-    """Return the same of any replays."""
     learnt = runs[0]
     return {
         "verdict": None if verdict is None else verdict.to_dict(),
         "replay_verdicts": {name: one.to_dict() for name, one in asked.items()},
-        "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
+        "rms_force_N": {h.recording.name: _told(force_rms(h)) for h in runs},
         "rmse_N": {
-            "online": {h.recording.name: _axles(online_error(h)) for h in runs},
+            "online": {h.recording.name: _told(online_error(h)) for h in runs},
             "frozen": {
-                key: {name: _axles(r.against_truth) for name, r in replays.items()}
+                key: {name: _told(r.against_truth) for name, r in replays.items()}
                 for key, replays in frozen.items()
             },
             "frozen_against_online": {
-                key: {name: _axles(r.against_online) for name, r in replays.items()}
+                key: {name: _told(r.against_online) for name, r in replays.items()}
                 for key, replays in frozen.items()
             },
             "reproducibility": {
-                key: {name: _sides(r.reproduction) for name, r in replays.items() if r.reproduction}
+                key: {name: asdict(r.reproduction) for name, r in replays.items() if r.reproduction}
                 for key, replays in frozen.items()
             },
         },
@@ -146,14 +111,7 @@ class AskedBound(NamedTuple):
     def of(cls, numbers: Sequence[float]) -> "AskedBound":
         """Return what words of the command ask.
 
-        Parameters
-        ----------
         numbers : error [static axle loads] and lateness [s], or the first of them, or none.
-
-        Raises
-        ------
-        ValueError
-            Where there are more, or a number is impossible.
         """
         if len(numbers) > 2:
             raise ValueError(
@@ -166,7 +124,6 @@ class AskedBound(NamedTuple):
 
 
 def guaranteed_text(model: TireModel) -> str:
-    """Return what is guaranteed of a model, in words."""
     sentence = guaranteed_sentence(model)
     return sentence or (
         "no guaranteed band: it takes --method axle, a lateral velocity that "
@@ -201,36 +158,16 @@ def write_results(
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
-    Parameters
-    ----------
-    folder : an empty folder.
-    others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
-    parts : of the online run, over each of several logs that were learnt on.
-    curves : "csv" or "parquet", as what curves over time are written.
     bound : of the guaranteed band of the last freeze; None asks for none.
     progress : told how far it is; None tells nobody.
-
-    Raises
-    ------
-    BoundViolatedError
-        Where no curve keeps a bound that was told.
     """
     tire = calibrated(learnt, max(frozen))
     if bound is not None:
         tire = guaranteed(learnt, bound.told, max(frozen), tire)
-    write_json(
-        folder / "summary.json",
-        summarize(
-            law=law,
-            learnt=learnt,
-            others=others,
-            frozen=frozen,
-            verdict=verdict,
-            asked=asked,
-            parts=parts,
-        ),
-    )
+    by_key = {freeze_key(t): replays for t, replays in frozen.items()}
+    summary = summarize(law, [learnt, *parts, *others], by_key, verdict, asked)
+    write_json(folder / "summary.json", summary)
     for t in frozen:
         last = "" if t == max(frozen) else f"_{freeze_key(t)}s"
         model = learnt.freeze(t) if last else tire
@@ -246,17 +183,13 @@ def write_results(
 
 
 def file_name(recording: Recording) -> str:
-    """Return the name of a recording as part of a file name."""
     return re.sub(r"[^\w.-]+", "_", recording.name)
 
 
 def no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
     """Return the note beside an error: against what, where there is no true force.
 
-    Parameters
-    ----------
-    error : None where there is none.
-    size : rms of the true forces [N], None without truth.
+    error : None where there is none.   size : rms of the true forces [N], None without truth.
     """
     if size is not None:
         return ""
@@ -266,10 +199,7 @@ def no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
 def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str]:
     """Return front and rear error as text, with their share of the rms force where it is known.
 
-    Parameters
-    ----------
-    error : [N]; None leaves a dash.
-    size : rms of the true forces [N], None without truth.
+    error : [N]; None leaves a dash.   size : rms of the true forces [N], None without truth.
     """
     if error is None:
         return "-", "-"
@@ -316,13 +246,10 @@ def _write_curves(
 
 
 def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
-    observed, z = block.outputs[OBSERVED], block.before["z"]
     return {
         "t_s": learnt.recording.t[block.part],
-        "xi_tilde_f_Us": observed[:, 0],
-        "xi_tilde_r_Us": observed[:, 1],
-        "z_f_Us2": z[:, 0],
-        "z_r_Us2": z[:, 1],
+        **axle_columns("xi_tilde_{}_Us", block.outputs[OBSERVED]),
+        **axle_columns("z_{}_Us2", block.before["z"]),
     }
 
 
@@ -346,9 +273,6 @@ def write_forces(
 ) -> None:
     """Write the curves of forces.csv: slip angles, true, online and frozen forces.
 
-    Parameters
-    ----------
-    replays : replays of the same recording by the name of their columns.
     progress : called now and then with the share that is done, 0 to 1.
     """
     n = len(history.recording)
@@ -379,8 +303,7 @@ def _force_columns(
         "r_rad_s": recording.r[part],
         "delta_f_rad": recording.delta_f[part],
         "delta_r_rad": recording.delta_r[part],
-        "alpha_f_rad": alpha[:, 0],
-        "alpha_r_rad": alpha[:, 1],
+        **axle_columns("alpha_{}_rad", alpha),
     }
     columns |= {name: values[part] for name, values in told.items()}
     curves = {"online": history.axle_force} if history.online else {}
@@ -388,7 +311,7 @@ def _force_columns(
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
     for name, force in curves.items():
-        columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
+        columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
     return columns
 
 
@@ -408,18 +331,14 @@ def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str
     end = min(FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, CURVE_POINTS)
     force = model.force(slip)
-    columns = {"slip_rad": slip, "Fyf_N": force[:, 0], "Fyr_N": force[:, 1]}
+    columns = {"slip_rad": slip, **axle_columns("Fy{}_N", force)}
     if known is not None:
         inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
     band = model.band(slip)
-    if band is not None:
-        for side, bound in zip(("low", "high"), band, strict=True):
-            columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
-    sure = model.guaranteed_band(slip)
-    if sure is not None:
-        for side, bound in zip(("least", "most"), sure, strict=True):
-            columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
+    for sides, found in (("low", "high"), band), (("least", "most"), model.guaranteed_band(slip)):
+        for side, bound in zip(sides, found or (), strict=found is not None):
+            columns |= axle_columns(f"Fy{{}}_{side}_N", bound)
     return columns
 
 
@@ -449,9 +368,7 @@ def _draw(
     for other in others:
         replay = frozen[last][other.recording.name]
         figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, _beside(other))
-    for label, figure in figures.items():
-        save_figure(figure, folder / f"{label}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def _beside(run: History) -> History | None:
@@ -477,20 +394,10 @@ def write_network_results(
     asked: Mapping[str, Verdict],
     curves: str = "csv",
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
-    """Write everything that is known of a network into a folder; return replays and figures.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    curves : "csv" or "parquet", as what curves over time are written.
-    """
+    """Write everything that is known of a network into a folder; return replays and figures."""
     replays = {history.recording.name: replay(model, history) for history in histories}
-    about = {
-        "file": file.name,
-        "inputs": list(model.signals),
-        "slip_sign": model.slip_sign,
-    }
-    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict, asked)
+    about = {"file": file.name, "inputs": list(model.signals), "slip_sign": model.slip_sign}
+    summary = summarize(law, histories, {NETWORK: replays}, verdict, asked)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json", valid=verdict.valid)
     columns = curve_columns(model, [history.recording for history in histories])
@@ -505,9 +412,7 @@ def write_network_results(
         figures[f"slip{last}"] = slip_figure(model, recording, _beside(history))
         figures[f"replay_{name}"] = prediction_figure(own, _beside(history))
     figures["inputs"] = inputs_figure(histories[0].recording)
-    for label, figure in figures.items():
-        save_figure(figure, folder / f"{label}.png")
-    return replays, figures
+    return replays, save_figures(folder, figures)
 
 
 def network_table(law: str, histories: Sequence[History], replays: Mapping[str, Replay]) -> str:

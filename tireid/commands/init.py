@@ -13,7 +13,6 @@ from tireid.progress import say
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "init",
         help=COMMANDS["init"],
@@ -27,7 +26,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     if options.file.suffix.lower() != ".toml":
         raise ValueError(f"{options.file}: the name must end in .toml")
     require_free(options.file, force=options.force)

@@ -6,7 +6,9 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
 import argparse
+import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +18,11 @@ from identifier.method import Method
 from identifier.methods import (
     DEFAULT,
     LIVE,
-    METHODS,
     REFERENCE,
     WITHOUT_V_Y,
     draws_weights,
     make_method,
+    methods,
 )
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
@@ -45,13 +47,6 @@ RENAMED = {  # options that had another word in some command
 def add_vehicle(
     parser: argparse.ArgumentParser, *, required: bool = False, default: str = "the sedan"
 ) -> None:
-    """Add --vehicle.
-
-    Parameters
-    ----------
-    required : whether it cannot be left out.
-    default : what it is where it is left out.
-    """
     text = f"car as TOML, tireid init writes one ({'needed' if required else default})"
     parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
 
@@ -89,8 +84,6 @@ def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
 def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
     """Add --out and --force: the folder of results.
 
-    Parameters
-    ----------
     command : its name, which the folder bears by default; None writes a folder only where asked.
     """
     folder = None if command is None else Path(f"tireid-{command}")
@@ -100,7 +93,6 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add --force."""
     parser.add_argument("--force", action="store_true", help="replace what is there")
 
 
@@ -114,17 +106,10 @@ def add_accept(parser: argparse.ArgumentParser) -> None:
 
 
 def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
-    """Return the exit code that a verdict makes.
-
-    Parameters
-    ----------
-    options : with `accept`.
-    """
     return DONE if verdict.valid or options.accept else NOT_VALID
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --weights."""
     parser.add_argument("--weights", type=Path, metavar="FILE", help=f"stored model: {what}")
 
 
@@ -142,7 +127,6 @@ def seed_of(options: argparse.Namespace) -> int:
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Add --jobs."""
     count = os.cpu_count() or 1
     parser.add_argument(
         "--jobs", type=int, default=count, metavar="N", help="processes (%(default)s)"
@@ -150,13 +134,6 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
 
 
 def jobs_of(options: argparse.Namespace) -> int:
-    """Return --jobs.
-
-    Raises
-    ------
-    ValueError
-        Where there are none, or more than `Limits` allows.
-    """
     jobs = int(options.jobs)
     if jobs < 1:
         raise ValueError(f"--jobs must be at least 1, it is {jobs}")
@@ -164,21 +141,26 @@ def jobs_of(options: argparse.Namespace) -> int:
     return jobs
 
 
-# What learns: a method by its name, the paper's, or the design in a file.
+def number_with_unit(text: str, *units: str) -> tuple[float, str | None]:
+    """Return a number and its unit, None where it has none; NaN where the text is neither."""
+    known = "|".join(map(re.escape, units))
+    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({known})?\s*", text, re.ASCII)
+    try:
+        return (float(found[1]), found[2]) if found else (math.nan, None)
+    except ValueError:
+        return math.nan, None
 
 
 def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
-    Parameters
-    ----------
     usual : the default.
     """
     parser.add_argument(
         "--method",
-        choices=METHODS,
+        choices=methods(),
         metavar="NAME",
-        help=f"what learns: {', '.join(METHODS)} (default: {usual})",
+        help=f"what learns: {', '.join(methods())} (default: {usual})",
     )
     parser.add_argument(
         "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"
@@ -196,13 +178,7 @@ class Chosen(NamedTuple):
 
 
 def method_is_given(options: argparse.Namespace) -> bool:
-    """Return whether a command is told what learns.
-
-    Raises
-    ------
-    ValueError
-        Where it is told so twice.
-    """
+    """Return whether a command is told what learns."""
     given = [word for word in ("method", "paper", "design") if getattr(options, word)]
     if len(given) > 1:
         raise ValueError(f"give only one of {', '.join('--' + word for word in given)}")
@@ -219,16 +195,9 @@ def chosen_method(
 ) -> Chosen:
     """Return what --method, --paper or --design say, the default where none is given.
 
-    Parameters
-    ----------
     seed : of initial weights; None where nobody asks for one.
     without_v_y : whether a log has no lateral velocity, which changes the default.
     online : whether the default is the one that learns sample by sample.
-
-    Raises
-    ------
-    ValueError
-        Where there are several, a seed would change nothing, or the file is no design.
     """
     method_is_given(options)
     if options.design is not None:
@@ -241,9 +210,6 @@ def chosen_method(
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
     return Chosen(name, make_method(name, vehicle, seed or 0))
-
-
-# Logs: recordings that are judged against physics and the vehicle.
 
 
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
@@ -273,9 +239,7 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
     parser.add_argument(
-        "--dbc",
-        metavar="FILE",
-        help="DBC that tells the signals in the frames of a CAN log",
+        "--dbc", metavar="FILE", help="DBC that tells the signals in the frames of a CAN log"
     )
     parser.add_argument(
         "--rate",
@@ -308,13 +272,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 
 def told_map(options: argparse.Namespace) -> LogMap:
-    """Return how logs are read by --log, and by the other options, which come first.
-
-    Raises
-    ------
-    RecordingError
-        Where the file or a word is not right.
-    """
+    """Return how logs are read by --log, and by the other options, which come first."""
     told = with_columns(map_of(_map_path(options)), column_words(options.columns))
     if options.cut_holes:
         told = replace(told, holes=CUT)
@@ -336,16 +294,7 @@ def read_log(
 ) -> Recording:
     """Read a recording, repair it where the map says so, and say what was read and done.
 
-    Parameters
-    ----------
-    run_name : run of the file, if `log` does not name it.
-    check : whether a log that contradicts physics or the vehicle is refused.
     dt : sampling interval that it is brought to [s].
-
-    Raises
-    ------
-    ValueError
-        One line, where the words or the file are not right.
     """
     path, named = split_log_argument(log)
     if named is not None and run_name is not None and named != run_name:
@@ -360,17 +309,7 @@ def read_log(
 
 
 def column_words(pairs: Sequence[str]) -> dict[str, str]:
-    """Return what is told of columns by the name that they are read as.
-
-    Parameters
-    ----------
-    pairs : NAME=COLUMN, with what may stand behind it.
-
-    Raises
-    ------
-    ValueError
-        Where a word is not such a pair.
-    """
+    """Return what is told of columns by the name that they are read as."""
     columns = {}
     for pair in pairs:
         name, equals, column = pair.partition("=")
@@ -381,8 +320,6 @@ def column_words(pairs: Sequence[str]) -> dict[str, str]:
         columns[name] = column
     return columns
 
-
-# `--network FILE.onnx`: a tire network of one's own in place of one that was learnt.
 
 CONVENTIONS = (
     "A network of --network is static: its outputs are the lateral forces F_yf, F_yr of both tires "
@@ -416,14 +353,7 @@ def network_model(
 ) -> OnnxModel | None:
     """Return the network as a frozen model, None where there is none.
 
-    Parameters
-    ----------
     min_speed : below this speed [m/s] the forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where the file cannot be used, or options belong to a network that is not given.
     """
     if options.network is None:
         if options.network_inputs or options.network_iso:

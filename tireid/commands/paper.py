@@ -9,34 +9,21 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from codegen.writing import write_file
+from identifier import paper_study
+from identifier.methods import certify
 from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
-from identifier.paper_study import (
-    AFTER,
-    ALL,
-    FREEZES,
-    GAINS,
-    LAWS,
-    NETWORK,
-    ONLINE,
-    ONSETS,
-    PAST,
-    PAST_ONLINE,
-    STEPS,
-    Study,
-    columns,
-    frozen_column,
-    paper_design,
-    run_study,
-)
 from identifier.reproducibility import freeze_key
 from models.schema import require_few
 from models.vehicle import sedan
 from tireid.commands import COMMANDS
-from tireid.commands.certificate_table import certificate_of, verdict_line
+from tireid.commands.certificate_table import verdict_line
 from tireid.commands.options import add_output
-from tireid.figures import comparison_figure, force_figure, save_figure, scheme_figure
+from tireid.figures.forces import force_figure
+from tireid.figures.paper import comparison_figure
+from tireid.figures.scheme import scheme_figure
+from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, say, tell
 
@@ -66,10 +53,10 @@ TITLES = {
     "slalom": "Table II, slalom: RMSE of the axle force [kN]",
 }
 MEASURES = {
-    PAST_ONLINE: "past, against online (the paper's measure)",
-    PAST: "past, against truth",
-    AFTER: "after, against truth",
-    ALL: "all, against truth",
+    paper_study.PAST_ONLINE: "past, against online (the paper's measure)",
+    paper_study.PAST: "past, against truth",
+    paper_study.AFTER: "after, against truth",
+    paper_study.ALL: "all, against truth",
 }
 MEASURES_MEAN = (
     "Frozen weights are measured in two ways. The paper's section IV-A compares the past, t < "
@@ -90,50 +77,38 @@ MEANING = (
 
 
 def row_labels(maneuver: str) -> dict[str, str]:
-    """Return the label of every row of a table, by its column in the study.
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    """
-    labels = {ONLINE: "online, against truth"}
-    for t in FREEZES[maneuver]:
+    """Return the label of every row of a table, by its column in the study."""
+    labels = {paper_study.ONLINE: "online, against truth"}
+    for t in paper_study.FREEZES[maneuver]:
         for measure, words in MEASURES.items():
-            labels[frozen_column(measure, t)] = f"frozen at {freeze_key(t)} s: {words}"
-    return {name: labels[name] for name in columns(maneuver)}
+            labels[paper_study.frozen_column(measure, t)] = f"frozen at {freeze_key(t)} s: {words}"
+    return {name: labels[name] for name in paper_study.columns(maneuver)}
 
 
 def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
-    """Return what the paper prints by law and column, beside the measure that it defines [kN].
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    """
-    beside = {ONLINE: ONLINE}
-    beside |= {freeze_key(t): frozen_column(PAST_ONLINE, t) for t in FREEZES[maneuver]}
+    """Return what the paper prints by law and column, beside the measure that it defines [kN]."""
+    beside = {paper_study.ONLINE: paper_study.ONLINE}
+    beside |= {
+        freeze_key(t): paper_study.frozen_column(paper_study.PAST_ONLINE, t)
+        for t in paper_study.FREEZES[maneuver]
+    }
     return {
         law: {beside[name]: value for name, value in row.items()}
         for law, row in PAPER[maneuver].items()
     }
 
 
-def rows(maneuver: str, study: Study) -> list[list[str]]:
+def rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     """Return the cells of a table: the label, and ours and the paper's value for each law.
 
     Medians and quartiles are those of the seeds that did not diverge; the last row counts those
     that did.
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    study : its errors over all seeds.
     """
     table, paper = study.tables()[maneuver], printed_values(maneuver)
     cells = []
     for name, label in row_labels(maneuver).items():
         row = [label]
-        for law in LAWS:
+        for law in paper_study.LAWS:
             if table[law]:
                 q = table[law][name]
                 row.append(f"{q['median']:.3f} ({q['q25']:.3f}-{q['q75']:.3f})")
@@ -143,26 +118,22 @@ def rows(maneuver: str, study: Study) -> list[list[str]]:
             row.append("" if printed is None else f"{printed:.4f}")
         cells.append(row)
     lost = study.diverged()[maneuver]
-    counts = [(f"{lost[law]} of {len(study.errors[maneuver][law])}", "") for law in LAWS]
+    counts = [
+        (f"{lost[law]} of {len(study.errors[maneuver][law])}", "") for law in paper_study.LAWS
+    ]
     return [*cells, ["seeds that diverged", *(cell for pair in counts for cell in pair)]]
 
 
 def header() -> list[str]:
     """Return the head of the table's columns."""
     names = ["condition"]
-    for law in LAWS:
+    for law in paper_study.LAWS:
         names += [VARIANTS[law].title, "" if VARIANTS[law].scaled else "paper"]
     return names
 
 
-def table_text(maneuver: str, study: Study) -> str:
-    """Return a table as lines of text, with the number of seeds.
-
-    Parameters
-    ----------
-    maneuver : "step_steer" or "slalom".
-    study : its errors over all seeds.
-    """
+def table_text(maneuver: str, study: paper_study.Study) -> str:
+    """Return a table as lines of text, with the number of seeds."""
     lines = [header(), *rows(maneuver, study)]
     seeds = len(study.errors[maneuver]["integral"])
     title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
@@ -170,12 +141,7 @@ def table_text(maneuver: str, study: Study) -> str:
 
 
 def settings(gains: Gains, network: Network) -> str:
-    """Return every gain in one paragraph, what the measures ask, and what the third column means.
-
-    Parameters
-    ----------
-    gains : of both laws; the third column divides the learning rates by the forgetting factor.
-    """
+    """Return every gain, what the measures ask, and what the third column means."""
     a = -gains.A_d[0][0]
     scaled = gains.scaled_by_forgetting()
     return (
@@ -188,8 +154,6 @@ def settings(gains: Gains, network: Network) -> str:
     )
 
 
-# The files of `tireid paper`: tables as JSON and text, seeds that diverged, Figs. 1-5 as PNG.
-
 SCHEME = "fig1_scheme"
 FIGURES = {  # number of the paper's figure, by maneuver and law
     ("step_steer", "instantaneous"): "fig2",
@@ -199,32 +163,23 @@ FIGURES = {  # number of the paper's figure, by maneuver and law
 }
 
 
-def study_text(study: Study) -> str:
-    """Return the tables, every gain, and the verdict of each law's certificate as lines of text.
-
-    Parameters
-    ----------
-    study : its errors over all seeds.
-    """
+def study_text(study: paper_study.Study) -> str:
+    """Return the tables, every gain, and the verdict of each law's certificate as lines of text."""
     tables = [table_text(maneuver, study) for maneuver in study.errors]
-    return "\n".join([*tables, settings(GAINS, NETWORK), *verdicts()])
+    return "\n".join([*tables, settings(paper_study.GAINS, paper_study.NETWORK), *verdicts()])
 
 
 def verdicts() -> list[str]:
     """Return for each law one line with the verdict on the gains of the study."""
     return [
-        f"{VARIANTS[law].title}: {verdict_line(certificate_of(paper_design(law, seed=0), sedan()))}"
-        for law in LAWS
+        f"{VARIANTS[law].title}: {verdict_line(certify(design, sedan()))}"
+        for law in paper_study.LAWS
+        for design in [paper_study.paper_design(law, seed=0)]
     ]
 
 
-def write_study(folder: Path, study: Study) -> dict[str, Figure]:
-    """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures.
-
-    Parameters
-    ----------
-    study : its errors over all seeds.
-    """
+def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
+    """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures."""
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
     write_file(folder / "tables.txt", study_text(study) + "\n")
@@ -232,12 +187,10 @@ def write_study(folder: Path, study: Study) -> dict[str, Figure]:
     figures = {SCHEME: scheme_figure()}
     for maneuver in study.errors:
         figures |= _draw(study, maneuver)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
-def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
+def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
     """Draw what did not diverge."""
     figures = {}
     labels = _compared(maneuver)
@@ -251,9 +204,9 @@ def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
     }
     if any(results.values()):
         figures[f"{maneuver}_errors"] = comparison_figure(results, printed)
-    onset = ONSETS[maneuver]
+    onset = paper_study.ONSETS[maneuver]
     window = (onset - 1.0, float(study.recordings[maneuver].t[-1]))
-    for law in LAWS:
+    for law in paper_study.LAWS:
         trial = study.typical(maneuver, law)
         if trial is None:
             say(f"{maneuver}: the {law} law diverged on every seed, no figure")
@@ -267,11 +220,11 @@ def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
 
 def _compared(maneuver: str) -> dict[str, str]:
     """Return the columns of the figure, both measures side by side, with their labels."""
-    labels = {ONLINE: "online,\nto truth"}
-    for t in FREEZES[maneuver]:
+    labels = {paper_study.ONLINE: "online,\nto truth"}
+    for t in paper_study.FREEZES[maneuver]:
         frozen = f"frozen at {freeze_key(t)} s,"
-        labels[frozen_column(PAST_ONLINE, t)] = f"{frozen}\npast to online"
-        labels[frozen_column(ALL, t)] = f"{frozen}\nall to truth"
+        labels[paper_study.frozen_column(paper_study.PAST_ONLINE, t)] = f"{frozen}\npast to online"
+        labels[paper_study.frozen_column(paper_study.ALL, t)] = f"{frozen}\nall to truth"
     return labels
 
 
@@ -279,7 +232,6 @@ STUDY, DRAWING = "the study", "figures"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "paper",
         help=COMMANDS["paper"],
@@ -292,7 +244,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
@@ -301,7 +252,9 @@ def run(options: argparse.Namespace) -> None:
         output_folder(options.out, force=options.force) as folder,
         Progress("paper", parts, long=True) as progress,
     ):
-        study = run_study(options.seeds, partial(progress.begin(STUDY).step, STEPS))
+        study = paper_study.run_study(
+            options.seeds, partial(progress.begin(STUDY).step, paper_study.STEPS)
+        )
         progress.begin(DRAWING)
         write_study(folder, study)
         told = study_text(study)

@@ -16,40 +16,21 @@ from identifier.tire_model import load_model
 from models.files import digest
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
-from tireid import __version__
+from tireid import __version__, planning
 from tireid.commands import COMMANDS
-from tireid.commands.options import (
-    add_output,
-    add_seed,
-    add_vehicle,
-    read_vehicle,
-    say_estimates,
-    seed_of,
-)
-from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
+from tireid.commands import options as shared
+from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
+from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_csv, write_json
-from tireid.planning import (
-    FRICTION,
-    LONGEST_LAG,
-    MARGIN,
-    RATE,
-    SHARE,
-    SHORTEST_LAG,
-    TIME,
-    plan,
-    rehearsals,
-)
 from tireid.progress import Progress, say, tell
-from tireid.reports.plan import plan_words, write_plan_report
+from tireid.reports.plan import RIVALS, plan_words, rival_rows, write_plan_report
 from tireid.verdicts import warn_of_stored
 
 PERIOD = 0.01  # s, of steering.csv
 RUN_UP = 1.0  # s straight ahead, before each pass
-METERS, KILOMETERS = "m/s", "km/h"
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "plan",
         help=COMMANDS["plan"],
@@ -58,7 +39,7 @@ def add_parser(commands: Any) -> None:
         "30 %, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
         "and report.html, which compares it with a slalom and with random steering.",
     )
-    add_vehicle(parser, default="the sedan; with --after that of the model")
+    shared.add_vehicle(parser, default="the sedan; with --after that of the model")
     parser.add_argument(
         "--area", required=True, metavar="LxW", help="length and width [m], as 40x40"
     )
@@ -68,7 +49,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--time",
         type=float,
-        default=TIME,
+        default=planning.TIME,
         metavar="S",
         help="of steering, over as many passes as the area takes (%(default)g)",
     )
@@ -79,12 +60,15 @@ def add_parser(commands: Any) -> None:
         help="weights.json, as identified: plan what is still unknown",
     )
     parser.add_argument(
-        "--mu", type=float, metavar="MU", help=f"friction, a guess within 30 %% ({FRICTION:g})"
+        "--mu",
+        type=float,
+        metavar="MU",
+        help=f"friction, a guess within 30 %% ({planning.FRICTION:g})",
     )
     parser.add_argument(
         "--grip",
         type=float,
-        default=100.0 * SHARE,
+        default=100.0 * planning.SHARE,
         metavar="PERCENT",
         help="share of the grip that is used at most (%(default)g)",
     )
@@ -92,13 +76,13 @@ def add_parser(commands: Any) -> None:
         "--margin",
         type=float,
         metavar="M",
-        help=f"from the car to the edge of the area ({MARGIN:g} wheelbases)",
+        help=f"from the car to the edge of the area ({planning.MARGIN:g} wheelbases)",
     )
     parser.add_argument(
         "--steering-rate",
         type=float,
         metavar="DEG/S",
-        help=f"largest, of the front wheels ({math.degrees(RATE):.0f} over sqrt(L/g))",
+        help=f"largest, of the front wheels ({math.degrees(planning.RATE):.0f} over sqrt(L/g))",
     )
     parser.add_argument(
         "--steering-angle",
@@ -125,8 +109,8 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="nobody holds the course, steering alone is played: takes more room",
     )
-    add_seed(parser, "the search")
-    add_output(parser, "plan")
+    shared.add_seed(parser, "the search")
+    shared.add_output(parser, "plan")
     parser.set_defaults(run=run)
 
 
@@ -137,18 +121,18 @@ def run(options: argparse.Namespace) -> int:
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
     _require_ranges(options)
-    seed, model = seed_of(options), None
+    seed, model = shared.seed_of(options), None
     if options.after is not None:
         model = load_model(options.after)
         warn_of_stored(options.after)
     if model is not None and options.vehicle is None:
         vehicle = model.vehicle
-        say_estimates(vehicle, options.after)
+        shared.say_estimates(vehicle, options.after)
     else:
-        vehicle = read_vehicle(options)
+        vehicle = shared.read_vehicle(options)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
-            found = plan(
+            found = planning.plan(
                 vehicle,
                 area=area,
                 speed=speed,
@@ -164,7 +148,7 @@ def run(options: argparse.Namespace) -> int:
                 seed=seed,
                 progress=progress,
             )
-        driven = rehearsals(found)
+        driven = planning.rehearsals(found)
         inputs = inputs_of(options, vehicle, area, speed)
         write_plan(folder, found, inputs, ratio)
         figures = {
@@ -172,12 +156,11 @@ def run(options: argparse.Namespace) -> int:
             "steering": plan_steering_figure(found, ratio),
             "band": plan_band_figure(found),
         }
-        for name, figure in figures.items():
-            save_figure(figure, folder / f"{name}.png")
+        save_figures(folder, figures)
         write_plan_report(
             folder, found, figures, inputs=inputs, command=options.words, driven=driven
         )
-    tell("\n".join([*plan_words(found, driven), plan_table(found)]))
+    tell("\n".join([*plan_words(found, driven), text_table([RIVALS, *rival_rows(found)], "<>>>")]))
     say(f"wrote {options.out}/")
     return 0
 
@@ -189,7 +172,7 @@ def _require_ranges(options: argparse.Namespace) -> None:
         ("--grip", 20.0, 100.0 * REAR),
         ("--margin", 0.0, 1e3),
         ("--steering-angle", 1.0, 60.0),
-        ("--steering-lag", SHORTEST_LAG, LONGEST_LAG),
+        ("--steering-lag", planning.SHORTEST_LAG, planning.LONGEST_LAG),
     ):
         value = vars(options)[word.removeprefix("--").replace("-", "_")]
         if value is not None:
@@ -205,14 +188,7 @@ def _radians(degrees: float | None) -> float | None:
 def parse_area(text: str) -> tuple[float, float]:
     """Return length and width [m] of --area.
 
-    Parameters
-    ----------
     text : such as 40x40 or 60x20.5m.
-
-    Raises
-    ------
-    ValueError
-        Where it is no area, or none that a car fits in and somebody has.
     """
     found = re.fullmatch(r"\s*([\d.]+)\s*m?\s*[xX×*]\s*([\d.]+)\s*m?\s*", text, re.ASCII)
     try:
@@ -227,27 +203,11 @@ def parse_area(text: str) -> tuple[float, float]:
 
 
 def parse_speed(text: str) -> float:
-    """Return the speed [m/s] of --speed.
-
-    Parameters
-    ----------
-    text : 15, 15m/s or 54km/h.
-
-    Raises
-    ------
-    ValueError
-        Where it is no speed of a car.
-    """
-    found = re.fullmatch(r"\s*([\d.]+)\s*(m/s|km/h)?\s*", text, re.ASCII)
-    try:
-        value = float(found[1]) if found else math.nan
-    except ValueError:
-        value = math.nan
-    speed = value / (3.6 if found and found[2] == KILOMETERS else 1.0)
+    """Return the speed [m/s] of --speed: 15, 15m/s or 54km/h."""
+    value, unit = shared.number_with_unit(text, "m/s", "km/h")
+    speed = value / (3.6 if unit == "km/h" else 1.0)
     if not 0.1 <= speed <= 100.0:
-        raise ValueError(
-            f"--speed wants 0.1 to 100 m/s (15, 15{METERS}, 54{KILOMETERS}), not {text!r}"
-        )
+        raise ValueError(f"--speed wants 0.1 to 100 m/s (15, 15m/s, 54km/h), not {text!r}")
     return speed
 
 
@@ -256,10 +216,7 @@ def inputs_of(
 ) -> dict[str, Any]:
     """Return all that went into a plan, ready for JSON.
 
-    Parameters
-    ----------
-    area : length and width [m].
-    speed : [m/s].
+    area : length and width [m].   speed : [m/s].
     """
     return {
         "vehicle": vehicle_numbers(vehicle),
@@ -274,15 +231,13 @@ def inputs_of(
         "steering_angle_deg": options.steering_angle,
         "steering_lag_s": options.steering_lag,
         "blind": options.blind,
-        "seed": seed_of(options),
+        "seed": shared.seed_of(options),
     }
 
 
 def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """Return the columns of steering.csv: pass by pass from its entry on, with the course.
 
-    Parameters
-    ----------
     ratio : hand wheel over front wheels; None tells no hand wheel.
     """
     rows = []
@@ -302,8 +257,6 @@ def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
 def path_columns(found: Plan, k: int) -> dict[str, Array]:
     """Return way-points of a pass for `tireid drive --path`, with its straight run-up.
 
-    Parameters
-    ----------
     k : which pass, from 0.
     """
     one, car = found.passes[k], found.tires.vehicle
@@ -316,13 +269,7 @@ def path_columns(found: Plan, k: int) -> dict[str, Array]:
 
 
 def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
-    """Write steering.csv, a path for each pass and summary.json.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    inputs : all that went in, ready for JSON.
-    """
+    """Write steering.csv, a path for each pass and summary.json."""
     write_csv(folder / "steering.csv", steering_columns(found, ratio))
     for k in range(len(found.passes)):
         name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
@@ -331,12 +278,7 @@ def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float |
 
 
 def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    """
+    """Return what summary.json holds."""
     slips, before, after = found.deviations()
     hold = hold_of(found.tires, found.space.speed)
     return {
@@ -367,15 +309,3 @@ def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
         "hash": digest(inputs),
         "version": __version__,
     }
-
-
-def plan_table(found: Plan) -> str:
-    """Return the plan beside slalom and random steering, as text."""
-    rows = [["", "time", "room", "expected error"]]
-    space = found.space
-    room = f"{space.length:g} x {space.width:g} m"
-    rows.append(["plan", f"{found.time:.1f} s", room, f"{100.0 * found.error:.1f} %"])
-    for one in found.rivals:
-        wide = f"{one.length:.0f} x {one.width:.1f} m"
-        rows.append([one.name, f"{found.time:.1f} s", wide, f"{100.0 * one.error:.1f} %"])
-    return text_table(rows, "<>>>")

@@ -17,37 +17,21 @@ from identifier.reproducibility import beyond_known
 from identifier.tire_model import UNCALIBRATED, TireModel, load_model
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
-from tireid import __version__
+from tireid import __version__, output
 from tireid.commands import COMMANDS
+from tireid.commands import options as shared
 from tireid.commands.identify_results import error_cells
-from tireid.commands.options import (
-    add_accept,
-    add_log_reading,
-    add_output,
-    add_vehicle,
-    exit_code,
-    read_log,
-    read_vehicle,
-    repaired_vehicle,
-    say_estimates,
-    told_map,
-)
-from tireid.figures import (
-    friction_figure,
-    motion_figure,
-    prediction_figure,
-    save_figure,
-    slip_figure,
-)
+from tireid.figures.forces import prediction_figure
+from tireid.figures.predict import friction_figure, motion_figure
+from tireid.figures.style import save_figures
+from tireid.figures.tires import slip_figure
 from tireid.learning import replay
-from tireid.output import output_folder, text_table, write_csv, write_json, write_long_csv
 from tireid.progress import say, tell
 from tireid.reports.predict import write_predict_report
 from tireid.verdicts import verdict_text, warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "predict",
         help=COMMANDS["predict"],
@@ -59,21 +43,21 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
-    add_vehicle(parser, default="that of the model")
+    shared.add_vehicle(parser, default="that of the model")
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    add_log_reading(parser)
-    add_accept(parser)
-    add_output(parser, "predict")
+    shared.add_log_reading(parser)
+    shared.add_accept(parser)
+    shared.add_output(parser, "predict")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where the model does not give back the drive's motion."""
     model = _model(options)
-    recording = read_log(
+    recording = shared.read_log(
         options.log,
         model.vehicle,
-        told_map(options),
+        shared.told_map(options),
         run_name=options.run_name,
         check=not options.no_check,
     )
@@ -83,16 +67,16 @@ def run(options: argparse.Namespace) -> int:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict
     half, friction = model.half_band_over(recording), verdict.friction
-    with output_folder(options.out, force=options.force) as folder:
+    with output.output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))
-        write_long_csv(
+        output.write_long_csv(
             folder / "forces.csv", (force_columns(model, prediction, half, part) for part in parts)
         )
         if friction is not None:
             columns = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
             columns |= {"another": friction.another, "unexplained": friction.unexplained}
-            write_csv(folder / "friction.csv", columns)
-        write_json(folder / "summary.json", summary(model, prediction, verdict, half))
+            output.write_csv(folder / "friction.csv", columns)
+        output.write_json(folder / "summary.json", summary(model, prediction, verdict, half))
         lines = prediction_text(model, prediction, half, friction)
         say("drawing figures")
         figures = draw(folder, prediction, verdict)
@@ -108,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     table = error_table(prediction)
     tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
     say(f"wrote {options.out}/")
-    return exit_code(verdict, options)
+    return shared.exit_code(verdict, options)
 
 
 def _model(options: argparse.Namespace) -> TireModel:
@@ -116,10 +100,10 @@ def _model(options: argparse.Namespace) -> TireModel:
     model = load_model(options.model)
     warn_of_stored(options.model)
     if options.vehicle is None:
-        say_estimates(model.vehicle, options.model)
-        vehicle = repaired_vehicle(model.vehicle, options)
+        shared.say_estimates(model.vehicle, options.model)
+        vehicle = shared.repaired_vehicle(model.vehicle, options)
     else:
-        vehicle = read_vehicle(options)
+        vehicle = shared.read_vehicle(options)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:
@@ -135,8 +119,6 @@ def _model(options: argparse.Namespace) -> TireModel:
 def truth_within_band(prediction: Prediction, half: Array | None) -> Array | None:
     """Return in which share of samples the true force lies in the band, (2,); None: nobody knows.
 
-    Parameters
-    ----------
     half : width of its band (n, 2) [N]; samples without one do not count.
     """
     truth = prediction.recording.axle_force
@@ -152,21 +134,15 @@ def force_columns(
 ) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
 
-    Parameters
-    ----------
     half : width of its band (n, 2) [N]; None where the model has none.
     """
     recording, car = prediction.recording, model.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
     columns = {"t_s": recording.t[part], "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
-    forces = {
-        "predicted": prediction.axle_force,
-        "half_band": half,
-        "true": recording.axle_force,
-    }
+    forces = {"predicted": prediction.axle_force, "half_band": half, "true": recording.axle_force}
     for name, force in forces.items():
         if force is not None:
-            columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
+            columns |= output.axle_columns(f"Fy{{}}_{name}_N", force[part])
     return columns
 
 
@@ -175,8 +151,6 @@ def summary(
 ) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known.
 
-    Parameters
-    ----------
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
@@ -208,10 +182,7 @@ def summary(
         "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
         "friction": None
         if friction is None
-        else {
-            "as_taught": friction.as_taught,
-            "roads": [one._asdict() for one in friction.roads],
-        },
+        else {"as_taught": friction.as_taught, "roads": [one._asdict() for one in friction.roads]},
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
@@ -228,9 +199,7 @@ def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Fi
         figures["motion"] = motion_figure(verdict.shown, prediction.model.vehicle)
     if verdict.friction is not None:
         figures["friction"] = friction_figure(verdict.friction)
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+    return save_figures(folder, figures)
 
 
 def error_table(prediction: Prediction) -> str:
@@ -239,19 +208,16 @@ def error_table(prediction: Prediction) -> str:
     if error is None:
         return ""
     name = visible(prediction.recording.name)
-    return text_table([["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>")
+    return output.text_table(
+        [["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>"
+    )
 
 
 def prediction_text(
-    model: TireModel,
-    prediction: Prediction,
-    half: Array | None,
-    friction: RoadFriction | None,
+    model: TireModel, prediction: Prediction, half: Array | None, friction: RoadFriction | None
 ) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
-    Parameters
-    ----------
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
     friction : of the drive's road; None where nobody can tell.
     """
@@ -298,12 +264,7 @@ def prediction_text(
 
 
 def contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
-    """Return whether a drive contradicts what is guaranteed, in words.
-
-    Parameters
-    ----------
-    t, broken : from `contradictions`.
-    """
+    """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
         return "no moment of the drive contradicts the forces that are guaranteed"
     front, rear = 100.0 * broken.mean(axis=0)

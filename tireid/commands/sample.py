@@ -7,13 +7,12 @@ from typing import Any
 from models.recordings import write_recording
 from tireid.commands import COMMANDS
 from tireid.commands.options import add_force, add_seed, add_vehicle, read_vehicle, seed_of
-from tireid.driving import sample_recording
+from tireid.driving.learn import sample_recording
 from tireid.output import require_free
 from tireid.progress import say
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "sample",
         help=COMMANDS["sample"],
@@ -32,7 +31,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command."""
     seed = seed_of(options)
     if not options.log.name.lower().endswith((".csv", ".csv.gz")):
         raise ValueError(f"{options.log}: the name must end in .csv or .csv.gz")

@@ -12,7 +12,7 @@ from codegen.arrays import Array
 from identifier.method import CannotFreezeError
 from identifier.run import DivergedError
 from mpc.handover.learner import Learner
-from mpc.loop import Measured
+from mpc.loop.sensing import Measured
 from mpc.tires import PredictionTire, prediction_tire
 
 EVERY = 8  # samples between two looks

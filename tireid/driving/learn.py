@@ -9,11 +9,10 @@ from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from mpc.cars import Car, DoubleTrackCar
-from mpc.loop import Measured, Measures, TellsLateral, cornering_limit, inertial_unit
+from mpc.loop.lateral import TellsLateral
+from mpc.loop.sensing import Measured, Measures, cornering_limit, inertial_unit
 from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
-
-# The drive to learn on: the same car on an open field, steered at random and ever harder.
 
 DURATION = 40.0  # s
 SPEED = 20.0  # m/s
@@ -38,12 +37,9 @@ def learning_drive(
 ) -> Recording:
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
 
-    Parameters
-    ----------
     grip : largest lateral acceleration [m/s²], which sizes the steering.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-        they show.
-    progress : called with the share of the time.
+    they show.
     """
     # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
     amplitude = car.vehicle.wheelbase * grip / SPEED**2 + SLIP

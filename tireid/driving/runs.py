@@ -14,34 +14,30 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.friction import Friction
+from models.rules import require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
-from mpc.loop import (
+from mpc.loop.dither import Dither
+from mpc.loop.drive import LearningTires
+from mpc.loop.drive import drive as drive_tracker
+from mpc.loop.lateral import LateralVelocity
+from mpc.loop.record import Drive, Scores, scores
+from mpc.loop.sensing import (
     CarSensors,
-    Dither,
-    Drive,
     FaultySensors,
-    LateralVelocity,
-    LearningTires,
     Measured,
     Measures,
-    Scores,
     imu_and_localization,
     inertial_unit,
-    scores,
 )
-from mpc.loop import drive as drive_tracker
 from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
-from mpc.realtime.caution import require_caution
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.known import Known, Witness
-from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
+from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.progress import Progress
-
-# What may change the tire of a tracker on the way: learning, or being told the true friction.
 
 
 class Informer:
@@ -95,12 +91,7 @@ def friction_now(friction: Friction, measured: Measured) -> float:
 
 
 def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
-    """Return what tells v_y where no sensor shows it, and learns the tires for it.
-
-    Parameters
-    ----------
-    learnt : what it begins with, where these are curves of axles; else it begins afresh.
-    """
+    """Return what tells v_y where no sensor shows it, and learns the tires for it."""
     method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
     start = learnt if learnt is not None and method.resumes(learnt) else None
     return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
@@ -110,11 +101,6 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
     v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
-
-    Raises
-    ------
-    ValueError
-        Where no method can go on from there, or its law has no certificate.
     """
     learnt = learnt.beside_v_y()
     try:
@@ -155,7 +141,7 @@ def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
 FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
-WIDEST_WEAVE = 0.5  # m
+WEAVES = (0.0, 0.5)  # m
 PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
@@ -226,30 +212,8 @@ class Run:
         )
 
 
-def require_dither(name: str, dither: float) -> None:
-    """Refuse a weave that is none, or wider than a car drives for the sake of knowing.
-
-    Parameters
-    ----------
-    dither : deviation that it may make [m].
-
-    Raises
-    ------
-    ValueError
-        Where it is not 0 to 0.5 m.
-    """
-    if not 0.0 <= dither <= WIDEST_WEAVE:
-        raise ValueError(f"{name} must be 0 to {WIDEST_WEAVE:g} m, it is {dither:g}")
-
-
 def require_compiler() -> None:
-    """Say that there is no C compiler for the tracker before anything is learnt or driven.
-
-    Raises
-    ------
-    ValueError
-        Where there is none.
-    """
+    """Say that there is no C compiler for the tracker before anything is learnt or driven."""
     if find_compiler() is None:
         raise ValueError(
             "no C compiler found: the tracker cannot be built; install gcc or clang, or name one "
@@ -258,13 +222,7 @@ def require_compiler() -> None:
 
 
 def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
-    """Return the tire that a tracker is told at the start.
-
-    Parameters
-    ----------
-    label : of `TIRES`.
-    learnt : what was learnt before the drive, for `frozen` and, where there is any, `learning`.
-    """
+    """Return the tire that a tracker is told at the start."""
     if label == LINEAR:
         return prediction_tire(setup.vehicle)
     if label == ORACLE:
@@ -274,23 +232,9 @@ def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionT
 
 
 def run_drive(
-    label: str,
-    conditions: Conditions,
-    learnt: TireModel | None,
-    *,
-    linearizations: int = 1,
+    label: str, conditions: Conditions, learnt: TireModel | None, *, linearizations: int = 1
 ) -> Run:
-    """Drive the path once with the tracker told of a tire.
-
-    Parameters
-    ----------
-    label : of `TIRES`.
-
-    Raises
-    ------
-    ValueError
-        Where there is no C compiler for the tracker.
-    """
+    """Drive the path once with the tracker told of a tire."""
     setup, problem = conditions.setup, Problem()
     model = told_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
@@ -421,13 +365,14 @@ def drive(
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_dither("dither", dither)
+    require_within(ValueError, *WEAVES, **{"dither in m": dither})
+    require_within(ValueError, *FRICTIONS, friction=friction)
+    require_within(ValueError, 0.0, 1.0, caution=caution)
     vehicle.require_chassis()
     setup = Setup(
         path=path,
         vehicle=vehicle,
-        plant="double-track",
-        mu=require_friction("friction", friction),
+        mu=friction,
         drops=(),
         wish=SpeedWish(share if speed is None else None, speed),
     )
@@ -439,7 +384,7 @@ def drive(
         laps=laps,
         kind=sensors,
         dither=dither,
-        caution=require_caution("caution", caution),
+        caution=caution,
     )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN
     return run_drive(label, conditions, tire)

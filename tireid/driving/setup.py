@@ -3,7 +3,7 @@
 Grip is that of the true tire in steady cornering on the friction of the start.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple, cast
@@ -15,15 +15,15 @@ from models.friction import Friction, FrictionChange
 from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.cars import Car, DoubleTrackCar
-from mpc.loop import SpeedProfile
-from mpc.loop.sensing import cornering_limit
+from mpc.loop.sensing import SpeedProfile, cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
 
-PLANTS = ("double-track", "multi-body", "drift")
+PLANT = "double-track"
 FASTEST = 30.0  # on a closed course [m/s]
 ACCELERATION, BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
 PERIOD = 0.01  # control period [s]
+FRICTIONS = (0.05, 1.5)  # least and most over that of the tire's measurement [-]
 
 
 class SpeedWish(NamedTuple):
@@ -39,14 +39,12 @@ class Setup:
 
     Parameters
     ----------
-    plant : which equations drive, of `PLANTS`.
     mu : friction of the road over that of the tire's measurement, before the first drop [-].
     drops : arc length [m] and friction from there on.
     """
 
     path: Path
     vehicle: Vehicle
-    plant: str
     mu: float
     drops: tuple[tuple[float, float], ...]
     wish: SpeedWish
@@ -54,18 +52,11 @@ class Setup:
     def car(self, *, open_field: bool = False) -> Car:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
-        if self.plant == "double-track":
-            return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
-        from mpc.cars.commonroad import drift_car, multi_body_car
-
-        make: Callable[..., Car] = multi_body_car if self.plant == "multi-body" else drift_car
-        return make(friction=friction, period=PERIOD)
+        return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
 
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
 
-        Parameters
-        ----------
         mu : its friction; None is that of the start.
         """
         tire = cast(Hashable, self._tire())
@@ -122,8 +113,6 @@ class Setup:
     def time_at(self, s: float) -> float:
         """Return when the car is expected at a place, at the wanted speed [s].
 
-        Parameters
-        ----------
         s : arc length [m]; a closed course counts laps.
         """
         v = self.speeds()
@@ -140,20 +129,3 @@ class Setup:
 @cache
 def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
     return oracle_tire(vehicle, cast(Tire, tire), mu)
-
-
-def require_friction(word: str, mu: float) -> float:
-    """Return a friction over that of the tire's measurement, if a road can have it.
-
-    Parameters
-    ----------
-    mu : the friction [-].
-
-    Raises
-    ------
-    ValueError
-        Where no road has it.
-    """
-    if not 0.05 <= mu <= 1.5:
-        raise ValueError(f"{word}: friction must be 0.05 to 1.5, it is {mu:g}")
-    return mu

@@ -11,23 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from codegen.escape import mathtext
-from identifier.compare.course import Shares, where_learnt_and_elsewhere
+from identifier.compare.course import where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
-from identifier.compare.sweep import Candidate, frozen_share, pareto_front
 from identifier.reproducibility import AxleRmse
-from tireid.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PAGE,
-    legend_above,
-    new_figure,
-    note,
-    styled,
-)
-
-# Labels and scales that the figures of a comparison share.
+from tireid.figures import style
 
 TICKS = ((1, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 1.5, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,))
 MOST = 6  # ticks of an axis
@@ -50,11 +37,7 @@ def method_label(name: str) -> str:
 def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from low to high, at most to FARTHEST, with ticks in percent.
 
-    Parameters
-    ----------
-    which : "x" or "y".
-    low : smallest value shown [%].
-    high : largest value shown [%].
+    low : smallest value shown [%].   high : largest value shown [%].
     """
     axis = axes.xaxis if which == "x" else axes.yaxis
     limits = low / 1.2, min(high, FARTHEST) * 1.2
@@ -75,46 +58,43 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 ONLINE, OWN, OTHER = "online", "frozen, where learnt", "frozen, other recordings"
-KINDS = {ONLINE: (BLUE, "o", -0.22), OWN: (GREEN, "D", 0.0), OTHER: (ORANGE, "s", 0.22)}
+KINDS = {
+    ONLINE: (style.BLUE, "o", -0.22),
+    OWN: (style.GREEN, "D", 0.0),
+    OTHER: (style.ORANGE, "s", 0.22),
+}
 ROW = 0.3  # height of a method [in]
 
 
-@styled
+@style.styled
 def methods_figure(comparison: Comparison) -> Figure:
-    """Draw a row for each method: means over recordings, lines from the best to the worst.
-
-    Parameters
-    ----------
-    comparison : the methods; floors are rows at the end.
-    """
+    """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
-    floors = {f"floor, {name}": floor_errors(comparison, name) for name in comparison.floors}
-    figure = new_figure(PAGE, 0.9 + ROW * (len(rows) + len(floors)))
+    figure = style.new_figure(style.PAGE, 0.9 + ROW * len(rows))
     axes = figure.subplots()
-    every = [v for row in (*rows.values(), *floors.values()) for vs in row.values() for v in vs]
+    every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
     percent_axis(axes, "x", min(finite, default=1.0), max(finite, default=100.0))
-    for position, (label, errors) in enumerate((rows | floors).items()):
+    for position, (label, errors) in enumerate(rows.items()):
         _draw_row(axes, position, errors)
         if label in lost:
             axes.text(
                 0.995,
                 position,
                 "diverged",
-                color=GREY,
+                color=style.GREY,
                 ha="right",
                 va="center",
                 transform=axes.get_yaxis_transform(),
             )
         axes.axhline(position + 0.5, color="#DDDDDD", linewidth=0.5)
-    axes.axhline(len(rows) - 0.5, color=GREY, linewidth=0.8)
-    axes.set_yticks(range(len(rows) + len(floors)), [*rows, *floors])
+    axes.set_yticks(range(len(rows)), list(rows))
     axes.tick_params(axis="y", length=0.0)
     axes.grid(visible=False, axis="y")
-    axes.set_ylim(len(rows) + len(floors) - 0.5, -0.5)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
@@ -124,11 +104,6 @@ def method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     sane = {rec: error for rec, error in trial.online.items() if rec not in trial.diverged_at}
     online = [course.share(rec, error) for rec, error in sane.items()]
     return {ONLINE: online, **_frozen_errors(comparison, trial.frozen or {})}
-
-
-def floor_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
-    """Return by kind all errors of offline fits [%]."""
-    return _frozen_errors(comparison, comparison.floors[name])
 
 
 def _frozen_errors(comparison: Comparison, frozen: Frozen) -> dict[str, list[float]]:
@@ -166,32 +141,21 @@ DARK = 0.55  # share of the color scale from which text is white
 LONGEST = 17  # letters of a recording's name beside a map
 
 
-@styled
+@style.styled
 def matrix_figure(comparison: Comparison) -> Figure:
-    """Draw the frozen error of each method, rows learnt on, columns replayed on.
-
-    Parameters
-    ----------
-    comparison : the methods; signal estimators have no map.
-
-    Raises
-    ------
-    ValueError
-        Where no method can be frozen.
-    """
+    """Draw the frozen error of each method, rows learnt on, columns replayed on."""
     maps = {
         method_label(name): frozen
         for name in ranking(comparison)
         if (frozen := comparison.trials[name].frozen) is not None
     }
-    maps |= {f"floor, {name}": frozen for name, frozen in comparison.floors.items()}
     if not maps:
         raise ValueError("no method of the comparison can be frozen")
     size = len(comparison.names)
     columns = min(len(maps), 4 if size <= 4 else 2)
     rows = math.ceil(len(maps) / columns)
-    cell = (PAGE - 1.6) / columns / size
-    figure = new_figure(PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
+    cell = (style.PAGE - 1.6) / columns / size
+    figure = style.new_figure(style.PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
     grid = figure.subplots(rows, columns, squeeze=False)
     norm, colors = LogNorm(BEST, WORST), colormaps["viridis_r"]
     for axes, (label, frozen) in zip(grid.flat, maps.items(), strict=False):
@@ -245,126 +209,3 @@ def _letter(number: int) -> str:
 
 def _cut(label: str) -> str:
     return label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…"
-
-
-DESIGN, FRONT, DEFAULT = "random design", "Pareto front", "default design"
-OTHERS, SIGNAL = "fronts of the other methods", "online error of a signal estimator"
-# Every method at its best: Pareto fronts of frozen against online error over random designs.
-
-Point = tuple[float, float]
-
-
-@styled
-def pareto_figure(comparison: Comparison) -> Figure:
-    """Draw a panel for each method: its designs, its front before those of all others.
-
-    Parameters
-    ----------
-    comparison : with a sweep; designs that diverged are counted in the panel's title.
-
-    Raises
-    ------
-    ValueError
-        Where there was no sweep.
-    """
-    names = [name for name in ranking(comparison) if name in comparison.sweeps]
-    if not names:
-        raise ValueError("a Pareto front needs a sweep")
-    clouds = {name: _points(comparison.sweeps[name]) for name in names}
-    fronts = {name: _points(pareto_front(comparison.sweeps[name])) for name in names}
-    columns = min(4, len(names))
-    rows = math.ceil(len(names) / columns)
-    figure = new_figure(PAGE, 0.9 + 1.55 * rows)
-    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-    limits = _limits(comparison, list(clouds.values()), list(fronts.values()))
-    for axes, name in zip(grid.flat, names, strict=False):
-        percent_axis(axes, "x", *limits[0])
-        percent_axis(axes, "y", *limits[1])
-        for other in names:
-            if other != name and fronts[other]:
-                axes.plot(*_stairs(fronts[other]), color="#BBBBBB", linewidth=0.8, label=OTHERS)
-        _draw_method(axes, comparison, name, clouds[name], fronts[name])
-        axes.set_title(method_label(name))
-        lost = sum(bool(candidate.diverged_on) for candidate in comparison.sweeps[name])
-        note(axes, f"{lost} diverged" if lost else "")
-    for number, axes in enumerate(grid.flat):
-        axes.set_visible(number < len(names))
-        axes.tick_params(labelbottom=number + columns >= len(names))
-    figure.supxlabel("online RMSE [% of rms force]", fontsize=8.0)
-    where = "elsewhere" if len(comparison.names) > 1 else "where learnt"
-    figure.supylabel(f"frozen {where} [%]", fontsize=8.0)
-    signals = any(frozen_share(comparison.shares(name)) is None for name in names)
-    legend_above(
-        figure, columns=3 if signals else 4, order=(DESIGN, FRONT, DEFAULT, OTHERS, SIGNAL)
-    )
-    return figure
-
-
-def _draw_method(
-    axes: Axes, comparison: Comparison, name: str, cloud: list[Point], front: list[Point]
-) -> None:
-    own = comparison.shares(name)
-    if cloud:
-        ends = axes.get_xlim()[1], axes.get_ylim()[1]
-        inside = np.minimum(cloud, ends)  # what is farther away is drawn at the edge
-        axes.plot(
-            *inside.T, ".", color=BLUE, markersize=2.5, alpha=0.5, label=DESIGN, clip_on=False
-        )
-        axes.plot(*_stairs(front), color=BLUE, linewidth=1.4, label=FRONT)
-    default = _point(own)
-    if default is not None:
-        axes.plot(
-            *np.minimum(default, FARTHEST),
-            "*",
-            color=ORANGE,
-            markersize=8.0,
-            markeredgecolor="white",
-            markeredgewidth=0.5,
-            label=DEFAULT,
-        )
-    sane = [c.shares.online for c in comparison.sweeps[name] if not c.diverged_on]
-    if frozen_share(own) is None and sane:
-        axes.axvline(min(sane), color=BLUE, linewidth=1.2, linestyle=(0, (4, 2)), label=SIGNAL)
-        note(axes, "signal")
-    elif not cloud:
-        axes.text(0.5, 0.5, "all diverged", transform=axes.transAxes, ha="center", color=GREY)
-
-
-def _point(found: Shares) -> Point | None:
-    frozen = frozen_share(found)
-    if frozen is None or not np.isfinite([found.online, frozen]).all():
-        return None
-    return found.online, frozen
-
-
-def _points(candidates: Sequence[Candidate]) -> list[Point]:
-    """Points of the designs that did not diverge, the worst at the end of the axis."""
-    points = (_point(candidate.shares) for candidate in candidates)
-    return [(min(x, FARTHEST), min(y, FARTHEST)) for x, y in filter(None, points)]
-
-
-def _stairs(front: list[Point]) -> tuple[list[float], list[float]]:
-    """Corners of the line below which no design is, from the top edge to the right one."""
-    xs, ys = [front[0][0]], [10.0 * FARTHEST]
-    for x, y in front:
-        xs += [x, x]
-        ys += [ys[-1], y]
-    return [*xs, 10.0 * FARTHEST], [*ys, ys[-1]]
-
-
-def _limits(
-    comparison: Comparison, clouds: Sequence[list[Point]], fronts: Sequence[list[Point]]
-) -> tuple[Point, Point]:
-    """Ends of both axes: all fronts, defaults and nine of ten designs are seen in place."""
-    defaults = (_point(comparison.shares(name)) for name in comparison.sweeps)
-    points = [point for front in fronts for point in front]
-    points += [point for point in defaults if point is not None]
-    points += [tuple(np.percentile(cloud, 90, axis=0)) for cloud in clouds if cloud]
-    points += [
-        (c.shares.online, points[0][1] if points else 100.0)
-        for candidates in comparison.sweeps.values()
-        for c in candidates
-        if not c.diverged_on and frozen_share(c.shares) is None
-    ]
-    xs, ys = zip(*(points or [(10.0, 100.0)]), strict=True)
-    return (min(xs), max(xs)), (min(ys), max(ys))

@@ -12,42 +12,28 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
-from tireid.figures.style import (
-    AMBER,
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    PAGE,
-    PURPLE,
-    TIME,
-    legend_above,
-    new_figure,
-    styled,
-)
+from tireid.figures import style
 
 if TYPE_CHECKING:
-    from mpc.loop import Drive
+    from mpc.loop.record import Drive
     from mpc.path import Path
-
-# How long the tracker took for a step: a histogram with its percentiles, and where it failed.
 
 BINS = 60
 WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
 MILLI = 1e3
 
 
-@styled
+@style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive as a histogram and over time."""
     times = MILLI * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
-    figure = new_figure(PAGE, 2.7)
+    figure = style.new_figure(style.PAGE, 2.7)
     left, right = figure.subplots(1, 2)
     wide = largest > WIDE * median
     low = float(times.min()) / 1.1 if wide else 0.0
     bins = np.geomspace(low, 1.1 * largest, BINS) if wide else np.linspace(low, 1.1 * largest, BINS)
-    left.hist(times, bins=list(bins), color=BLUE, alpha=0.8)
+    left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
     left.set(xlabel="solve time [ms]", ylabel="steps [-]", xlim=(low, 1.1 * largest))
     right.plot(
         drive.t,
@@ -56,7 +42,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         marker=".",
         markersize=2.2,
         markeredgewidth=0.0,
-        color=BLUE,
+        color=style.BLUE,
         rasterized=True,
         label="a step",
     )
@@ -68,13 +54,13 @@ def drive_solve_figure(drive: "Drive") -> Figure:
             linestyle="",
             marker="x",
             markersize=4.0,
-            color=ORANGE,
+            color=style.ORANGE,
             label=f"failed ({np.count_nonzero(failed)})",
         )
-    for value, name, color in ((median, "median", PURPLE), (p99, "99 %", ORANGE)):
+    for value, name, color in ((median, "median", style.PURPLE), (p99, "99 %", style.ORANGE)):
         text = f"{name} {value:.3g} ms"
         left.axvline(value, color=color, linewidth=1.1, linestyle=(0, (4, 1.5)), label=text)
-    right.set(xlabel=TIME, ylabel="solve time [ms]", ylim=(low, 1.3 * largest))
+    right.set(xlabel=style.TIME, ylabel="solve time [ms]", ylim=(low, 1.3 * largest))
     if wide:
         left.set_xscale("log")
         right.set_yscale("log")
@@ -86,11 +72,9 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         f"largest {largest:.3g} ms of a period of {MILLI * drive.period:g} ms", loc="right"
     )
     left.set_title(f"{times.size} steps")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
-
-# How the pictures of a drive tell paths, cones and the tires that a tracker was told of.
 
 PATH: Mapping[str, Any] = {
     "color": "#9ADBC6",
@@ -104,17 +88,17 @@ CONES: Mapping[str, Any] = {
     "markersize": 2.6,
     "markeredgewidth": 0.4,
     "markeredgecolor": "#7A4B00",
-    "markerfacecolor": AMBER,
+    "markerfacecolor": style.AMBER,
     "label": "cones",
 }
 ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
 LATER = (0, (2.5, 0.9))
 TIRES: Mapping[str, Mapping[str, Any]] = {
-    "linear": {"color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
-    "frozen": {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
-    ORACLE: {"color": BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
-    "learning": {"color": BLUE, "linestyle": "-", "linewidth": 1.2},
+    "linear": {"color": style.GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
+    "frozen": {"color": style.ORANGE, "linestyle": "-", "linewidth": 1.2},
+    ORACLE: {"color": style.BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
+    "learning": {"color": style.BLUE, "linestyle": "-", "linewidth": 1.2},
 }
 
 
@@ -124,13 +108,11 @@ def tire_look(label: str) -> dict[str, Any]:
     return look | {"linestyle": LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
 
-# How far the car was from its path, and how fast, over the arc length of the path.
-
 REPLANNED, NOTICED = "plans with another tire or grip", "sensor fault noticed"
 ARC = "arc length of the path [m]"
 
 
-@styled
+@style.styled
 def drive_errors_figure(
     drives: Mapping[str, "Drive"],
     *,
@@ -140,13 +122,10 @@ def drive_errors_figure(
 ) -> Figure:
     """Draw lateral deviation, heading error, lateral acceleration and speed over arc length.
 
-    Parameters
-    ----------
-    drives : by the name in the legend; the first is drawn on top.
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = new_figure(PAGE, 5.2)
+    figure = style.new_figure(style.PAGE, 5.2)
     panels = figure.subplots(4, 1, sharex=True)
     labels = (
         "deviation $e_y$\n[m]",
@@ -177,30 +156,23 @@ def drive_errors_figure(
     for axes in panels:
         mark_faults(axes, drives, faults)
     figure.align_ylabels(panels)
-    legend_above(figure, order=(*drives, REPLANNED, *(friction_label(mu) for _, mu in drops)))
+    style.legend_above(figure, order=(*drives, REPLANNED, *(friction_label(mu) for _, mu in drops)))
     return figure
 
 
 def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
     """Mark where the friction of the road changes.
 
-    Parameters
-    ----------
     drops : arc length [m] and friction from there on.
     """
     for place, mu in drops:
         axes.axvline(
-            place, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=friction_label(mu)
+            place, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=friction_label(mu)
         )
 
 
 def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[SensorFault]) -> None:
-    """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors.
-
-    Parameters
-    ----------
-    drives : by the name in the legend; faults are placed by the time of the first.
-    """
+    """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors."""
     from mpc.handover.rules import Verdict
 
     first = next(iter(drives.values()))
@@ -230,8 +202,6 @@ def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[Sens
 def friction_label(mu: float) -> str:
     """Return what a legend calls a friction of the road.
 
-    Parameters
-    ----------
     mu : over that of the tire's measurement [-].
     """
     return f"friction {mu:g}"
@@ -265,12 +235,10 @@ def _roomy(axes: Axes, slowest: float) -> None:
     axes.set_ylim(min(low, slowest), high)
 
 
-# What the tracker asked of the steering, and what the wheels did.
-
 NEAR = 0.75  # a limit is drawn where a command comes this close to it
 
 
-@styled
+@style.styled
 def drive_steering_figure(
     drives: Mapping[str, "Drive"],
     *,
@@ -281,14 +249,10 @@ def drive_steering_figure(
 ) -> Figure:
     """Draw commanded angles of the front wheels over arc length, and the rate of the first drive.
 
-    Parameters
-    ----------
-    drives : by the name in the legend; the first is drawn on top, with its wheels.
-    angle_limit : that the tracker keeps [rad].
-    rate_limit : that the tracker keeps [rad/s].
+    angle_limit : that the tracker keeps [rad].   rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = new_figure(PAGE, 3.4)
+    figure = style.new_figure(style.PAGE, 3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
@@ -297,7 +261,7 @@ def drive_steering_figure(
     angle.plot(
         first.s,
         np.rad2deg(first.delta),
-        color=PURPLE,
+        color=style.PURPLE,
         linewidth=0.8,
         label=f"wheels of {name}",
     )
@@ -316,7 +280,7 @@ def drive_steering_figure(
         mark_faults(axes, drives, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
-    legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, order=tuple(drives))
     return figure
 
 
@@ -351,10 +315,7 @@ class CarShape(NamedTuple):
 def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0.0) -> CarShape:
     """Return a car at a pose; wheels in the order front left, front right, rear left, rear right.
 
-    Parameters
-    ----------
-    X, Y : center of gravity [m].
-    psi : heading [rad].
+    X, Y : center of gravity [m].   psi : heading [rad].
     delta : angle of the front wheels [rad], positive to the left.
     """
     long = vehicle.wheelbase
@@ -370,10 +331,7 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     wheels = np.stack(
         [
             _wheel(long) @ _turn(angle).T + (x, 0.5 * side * track)
-            for x, track, angle in (
-                (vehicle.l_f, tracks[0], delta),
-                (-vehicle.l_r, tracks[1], 0.0),
-            )
+            for x, track, angle in ((vehicle.l_f, tracks[0], delta), (-vehicle.l_r, tracks[1], 0.0))
             for side in (1.0, -1.0)
         ]
     )
@@ -407,7 +365,7 @@ MOST_ROWS = 5
 NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
 MARGIN = 3.0  # around the path [m]
 RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
-INNER_WIDTH = PAGE - 0.75  # what labels leave of the page [in]
+INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
 HIGHEST = 5.0  # panel [in]
 CARS_EVERY = 2.6  # wheelbases between two outlines
 SMALL = 160.0  # in a picture of more than that [m] cars cannot be seen
@@ -415,16 +373,12 @@ ZOOM = 44.0  # a part of such a path that is drawn large, where a car was farthe
 SEEN = 0.05  # deviations are drawn larger until the largest is this share of the picture
 
 
-@styled
+@style.styled
 def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     """Draw the path, its cones and where every car drove; the first with its outlines.
 
     A path too large for cars to be seen is drawn as a whole with its deviations magnified, as the
     legend says, and beside it the place of the largest deviation at its true scale.
-
-    Parameters
-    ----------
-    drives : by the name in the legend, along one path; the first is drawn on top.
     """
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
@@ -436,7 +390,7 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         rows = min(MOST_ROWS, max(1, round(width / ROW_LENGTH)))
     step = width / rows
     inch = min(INNER_WIDTH / step, HIGHEST / height)  # of a meter
-    figure = new_figure(PAGE, rows * (height * inch + 0.3) + 0.6)
+    figure = style.new_figure(style.PAGE, rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
@@ -445,7 +399,7 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         axes.set_yticks(axes.get_yticks()[1:-1:1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
-    legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, order=tuple(drives))
     return figure
 
 
@@ -466,7 +420,7 @@ def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
 
 
 def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
-    figure = new_figure(PAGE, 3.6)
+    figure = style.new_figure(style.PAGE, 3.6)
     whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
     size = max(float(np.ptp(path.X)), float(np.ptp(path.Y)))
@@ -488,7 +442,7 @@ def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
     part.set_title(f"the largest deviation, {abs(worst.e_y[k]):.2f} m, to scale")
     for axes in (whole, part):
         axes.set(xlabel="X [m]", ylabel="Y [m]")
-    legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, order=tuple(drives))
     return figure
 
 

@@ -19,41 +19,16 @@ from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
-from tireid.figures.style import (
-    AXLES,
-    BLUE,
-    FROZEN,
-    GREEN,
-    GREY,
-    ONLINE,
-    ORANGE,
-    PAGE,
-    PURPLE,
-    TRUTH,
-    ForceUnit,
-    Window,
-    drawable,
-    force_range,
-    force_unit_of,
-    frozen_title,
-    label_time,
-    legend_above,
-    legend_beside,
-    mark_freeze,
-    new_figure,
-    note,
-    styled,
-    time_window,
-)
+from tireid.figures import style
 from tireid.figures.thinned import Signal, drawn_times, shown
 
 
-@styled
+@style.styled
 def force_figure(
     history: History,
     replays: Mapping[float, Replay] | None = None,
     *,
-    window: Window = None,
+    window: style.Window = None,
     since: float | None = None,
 ) -> Figure:
     """Draw forces of front and rear axle over time: identified online, and replayed frozen.
@@ -64,17 +39,10 @@ def force_figure(
     lowest row shows what the online run and the last freeze miss of that force. Of a method that
     learns from a whole log there is no online run: it has neither panel nor residual.
 
-    Parameters
-    ----------
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
     window : first and last time to show [s]; None shows all.
     since : time from which the error of the online run counts [s], as in the replays; None counts
-        all.
-
-    Raises
-    ------
-    ValueError
-        Where a replay is of another recording, or the window holds no sample.
+    all.
     """
     replays = dict(sorted((replays or {}).items()))
     recording, truth = history.recording, history.recording.axle_force
@@ -84,58 +52,58 @@ def force_figure(
                 f"the replay frozen at {freeze_key(t_freeze)} s is of {replay.recording.name}, "
                 f"the online run of {recording.name}"
             )
-    ends = time_window(recording.t, window)
+    ends = style.time_window(recording.t, window)
     first = int(history.online)  # rows of the online run
     curves = [history.axle_force] * first + [*(replay.axle_force for replay in replays.values())]
     part = shown(recording.t, ends, *_with_residuals(curves or [history.axle_force], truth))
     t, online = drawn_times(recording, recording.t[part]), history.axle_force[part]
     reference = online if truth is None else truth[part]
-    unit = force_unit_of(reference)
+    unit = style.force_unit_of(reference)
     frozen = {at: replay.axle_force[part] / unit.newtons for at, replay in replays.items()}
-    limits = force_range(reference / unit.newtons, online / unit.newtons, *frozen.values())
+    limits = style.force_range(reference / unit.newtons, online / unit.newtons, *frozen.values())
 
-    missed = [(online / unit.newtons, ONLINE)] if truth is not None and first else []
+    missed = [(online / unit.newtons, style.ONLINE)] if truth is not None and first else []
     if truth is not None or first:
-        missed += [(force, FROZEN) for force in list(frozen.values())[-1:]]
+        missed += [(force, style.FROZEN) for force in list(frozen.values())[-1:]]
     missed = [(force - reference / unit.newtons, look) for force, look in missed]
     rows = first + len(replays)
     ratios = [1.45] * rows + [1.05] * bool(missed)
-    figure = new_figure(PAGE, 0.85 + sum(ratios))
+    figure = style.new_figure(style.PAGE, 0.85 + sum(ratios))
     panels = figure.subplots(
         len(ratios), 2, sharex=True, sharey="row", squeeze=False, height_ratios=ratios
     )
     error = online_error(history, since=since)
-    for axle, name in enumerate(AXLES):
+    for axle, name in enumerate(style.AXLES):
         for axes in panels[:rows, axle]:
             axes.set(xlim=ends, ylim=limits)
             if truth is not None:
-                axes.plot(t, truth[part, axle] / unit.newtons, **TRUTH)
+                axes.plot(t, truth[part, axle] / unit.newtons, **style.TRUTH)
             if first:
-                axes.plot(t, drawable(online[:, axle] / unit.newtons, limits), **ONLINE)
+                axes.plot(t, style.drawable(online[:, axle] / unit.newtons, limits), **style.ONLINE)
         if first:
             panels[0, axle].set_title(f"{name}, online")
         if history.diverged_at is not None:
-            note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
+            style.note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
         elif error is not None:
-            note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
+            style.note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
         for axes, (at, replay) in zip(panels[first:rows, axle], replays.items(), strict=True):
-            axes.plot(t, drawable(frozen[at][:, axle], limits), **FROZEN)
-            axes.set_title(f"{name}, {frozen_title(recording.t, at)}")
-            note(axes, _errors(replay, unit, axle))
+            axes.plot(t, style.drawable(frozen[at][:, axle], limits), **style.FROZEN)
+            axes.set_title(f"{name}, {style.frozen_title(recording.t, at)}")
+            style.note(axes, _errors(replay, unit, axle))
             if first:
-                mark_freeze(panels[0, axle], at, prediction=False)
-            mark_freeze(axes, at, prediction=True)
+                style.mark_freeze(panels[0, axle], at, prediction=False)
+            style.mark_freeze(axes, at, prediction=True)
         if missed:
             _draw_missed(panels[-1, axle], t, [(force[:, axle], look) for force, look in missed])
             against = "online" if truth is None else "truth"
             panels[-1, axle].set_title(f"{name}, residual to {against}")
-        label_time(panels[-1, axle], recording.t)
+        style.label_time(panels[-1, axle], recording.t)
     for axes in panels[:rows, 0]:
         axes.set_ylabel(f"lateral force [{unit.name}]")
     if missed:
         panels[-1, 0].set_ylim(_missed_range([force for force, _ in missed], limits))
         panels[-1, 0].set_ylabel(f"residual [{unit.name}]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
@@ -157,17 +125,17 @@ RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a d
 
 
 def _draw_missed(axes: Axes, t: Array, curves: Sequence[tuple[Array, Mapping[str, Any]]]) -> None:
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.6)
     for missed, look in curves:
         axes.plot(t, np.clip(missed, -1e6, 1e6), **{**look, **RESIDUAL})
 
 
 def _missed_range(missed: Sequence[Array], limits: tuple[float, float]) -> tuple[float, float]:
     """Return the ends of an axis of residuals, which reach no farther than the forces do."""
-    return force_range(np.zeros(1), *(np.clip(one, *limits) for one in missed))
+    return style.force_range(np.zeros(1), *(np.clip(one, *limits) for one in missed))
 
 
-def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
+def _errors(replay: Replay, unit: style.ForceUnit, axle: int) -> str:
     against = replay.against_truth
     if against is not None:
         said = f"RMSE {unit.format(against, axle)}"
@@ -181,136 +149,106 @@ def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
     return f"{said}\npast to online {unit.format(sides.past_against_online, axle)}"
 
 
-# A frozen model on a recording that it did not learn from, and what it misses there.
-
-
-@styled
+@style.styled
 def prediction_figure(
-    replay: Replay | Prediction, online: History | None = None, *, window: Window = None
+    replay: Replay | Prediction, online: History | None = None, *, window: style.Window = None
 ) -> Figure:
     """Draw a frozen model on a recording it did not learn from, with what it misses below.
 
     The residual is the frozen force minus the true force, or minus the online force where there is
     no truth; with neither there is no residual.
 
-    Parameters
-    ----------
-    online : an online run over the same recording, drawn where there is no truth.
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the online run is of another recording, or the window holds no sample.
     """
     recording, truth = replay.recording, replay.recording.axle_force
     if online is not None and online.axle_force.shape != replay.axle_force.shape:
         raise ValueError(
             f"the replay is of {recording.name}, the online run of {online.recording.name}"
         )
-    ends = time_window(recording.t, window)
-    curve, known = TRUTH, truth
+    ends = style.time_window(recording.t, window)
+    curve, known = style.TRUTH, truth
     if truth is None and online is not None:
-        curve, known = ONLINE, online.axle_force
+        curve, known = style.ONLINE, online.axle_force
     part = shown(recording.t, ends, *_with_residuals([replay.axle_force], known))
     t = drawn_times(recording, recording.t[part])
     reference = replay.axle_force[part] if known is None else known[part]
-    unit = force_unit_of(reference)
+    unit = style.force_unit_of(reference)
     frozen = replay.axle_force[part] / unit.newtons
     reference = reference / unit.newtons
-    limits = force_range(reference, frozen)
+    limits = style.force_range(reference, frozen)
     residual = frozen - reference
     missed_limits = _missed_range([residual], limits)
 
     ratios = [2.0] if known is None else [2.0, 1.0]
-    figure = new_figure(PAGE, 1.0 + sum(ratios))
+    figure = style.new_figure(style.PAGE, 1.0 + sum(ratios))
     panels = figure.subplots(
         len(ratios), 2, sharex=True, sharey="row", squeeze=False, height_ratios=ratios
     )
     error = replay.against_truth
-    for axle, name in enumerate(AXLES):
+    for axle, name in enumerate(style.AXLES):
         upper = panels[0, axle]
         upper.set(xlim=ends, ylim=limits, title=name)
         if known is not None:
-            upper.plot(t, drawable(reference[:, axle], limits), **curve)
-            missed = drawable(residual[:, axle], missed_limits)
+            upper.plot(t, style.drawable(reference[:, axle], limits), **curve)
+            missed = style.drawable(residual[:, axle], missed_limits)
             panels[1, axle].axhline(0.0, color=curve["color"], linewidth=0.6)
-            panels[1, axle].plot(t, missed, color=FROZEN["color"], **RESIDUAL)
+            panels[1, axle].plot(t, missed, color=style.FROZEN["color"], **RESIDUAL)
             panels[1, axle].set_ylim(missed_limits)
-        upper.plot(t, drawable(frozen[:, axle], limits), **FROZEN)
+        upper.plot(t, style.drawable(frozen[:, axle], limits), **style.FROZEN)
         if error is not None:
-            note(upper, f"RMSE {unit.format(error, axle)}")
+            style.note(upper, f"RMSE {unit.format(error, axle)}")
         elif isinstance(replay, Replay) and known is not None and replay.against_online is not None:
-            note(upper, f"RMSE to online {unit.format(replay.against_online, axle)}")
-        label_time(panels[-1, axle], recording.t)
+            style.note(upper, f"RMSE to online {unit.format(replay.against_online, axle)}")
+        style.label_time(panels[-1, axle], recording.t)
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
     if known is not None:
         panels[1, 0].set_ylabel(f"residual [{unit.name}]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
-# Frozen models side by side on a drive that none of them has learnt.
-
-COLORS = (ORANGE, BLUE, GREEN, PURPLE)
+COLORS = (style.ORANGE, style.BLUE, style.GREEN, style.PURPLE)
 
 
-@styled
+@style.styled
 def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
-    """Draw the forces of several frozen models over one drive, and what each misses.
-
-    Raises
-    ------
-    ValueError
-        Where the recordings differ, or there is no truth.
-    """
+    """Draw the forces of several frozen models over one drive, and what each misses."""
     recordings = [replay.recording for replay in replays.values()]
     recording, truth = recordings[0], recordings[0].axle_force
     if truth is None or any(other.name != recording.name for other in recordings):
         raise ValueError("replays of one recording with true forces are needed")
-    unit = force_unit_of(truth)
+    unit = style.force_unit_of(truth)
     t = drawn_times(recording, recording.t)
     drawn = [replay.axle_force / unit.newtons for replay in replays.values()]
-    limits = force_range(truth / unit.newtons, *drawn)
+    limits = style.force_range(truth / unit.newtons, *drawn)
     missed = {name: (r.axle_force - truth) / unit.newtons for name, r in replays.items()}
     margin = 1.1 * max(float(np.abs(m).max()) for m in missed.values())
 
-    figure = new_figure(PAGE, 3.6)
+    figure = style.new_figure(style.PAGE, 3.6)
     panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(2, 1))
-    for axle, name in enumerate(AXLES):
+    for axle, name in enumerate(style.AXLES):
         upper, lower = panels[:, axle]
-        upper.plot(t, truth[:, axle] / unit.newtons, **TRUTH)
+        upper.plot(t, truth[:, axle] / unit.newtons, **style.TRUTH)
         for (label, replay), color in zip(replays.items(), COLORS, strict=False):
-            force = drawable(replay.axle_force[:, axle] / unit.newtons, limits)
+            force = style.drawable(replay.axle_force[:, axle] / unit.newtons, limits)
             upper.plot(t, force, color=color, linewidth=1.1, label=label)
             lower.plot(t, missed[label][:, axle], color=color, **RESIDUAL)
         upper.set(title=name, ylim=limits, xlim=(t[0], t[-1]))
         lower.set(ylim=(-margin, margin))
-        label_time(lower, t)
+        style.label_time(lower, t)
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
     panels[1, 0].set_ylabel(f"residual [{unit.name}]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
-# What the identifier was given: speed, steering and motion of a recording over time.
-
-
-@styled
-def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
+@style.styled
+def inputs_figure(recording: Recording, *, window: style.Window = None) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any.
 
-    Parameters
-    ----------
-    recording : what to draw.
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the window holds no sample.
     """
-    ends = time_window(recording.t, window)
+    ends = style.time_window(recording.t, window)
     logged = [recording.v_x, recording.delta_f, recording.delta_r, recording.r]
     logged += [one for one in (recording.v_y, recording.a_y) if one is not None]
     part = shown(recording.t, ends, *(signal.__getitem__ for signal in logged))
@@ -326,11 +264,11 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
     if recording.a_y is not None:
         signals["$a_y$ [m/s²]"] = recording.a_y[part]
 
-    figure = new_figure(PAGE, 0.5 + 1.05 * len(signals))
+    figure = style.new_figure(style.PAGE, 0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, values) in zip(panels, signals.items(), strict=True):
-        axes.plot(t, values, color=BLUE, linewidth=0.9, label=label)
+        axes.plot(t, values, color=style.BLUE, linewidth=0.9, label=label)
         axes.set_ylabel(label)
         span = float(np.ptp(values))
         middle = float(values.min()) + span / 2
@@ -342,31 +280,26 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
         steering.plot(
             t,
             np.rad2deg(recording.delta_r[part]),
-            color=ORANGE,
+            color=style.ORANGE,
             linewidth=0.9,
             label=r"rear $\delta_r$",
         )
-        legend_beside(steering)
-    label_time(panels[-1], recording.t)
+        style.legend_beside(steering)
+    style.label_time(panels[-1], recording.t)
     figure.align_ylabels()
     return figure
 
 
-@styled
+@style.styled
 def draw_diagnosis(
     recording: Recording, vehicle: Vehicle, repaired: Recording, car: Vehicle
 ) -> Figure:
-    """Draw force over slip angle of both axles before and after a repair.
-
-    Parameters
-    ----------
-    repaired, car : with the repair; the same where there is none.
-    """
-    figure = new_figure(PAGE, 2.9)
+    """Draw force over slip angle of both axles before and after a repair."""
+    figure = style.new_figure(style.PAGE, 2.9)
     panels = figure.subplots(1, 2)
-    shown = [("as logged", GREY, recording, vehicle)]
+    shown = [("as logged", style.GREY, recording, vehicle)]
     if repaired is not recording:
-        shown.append(("repaired", BLUE, repaired, car))
+        shown.append(("repaired", style.BLUE, repaired, car))
     for name, color, one, told in shown:
         motion = Motion.of(one)
         if motion is None:
@@ -374,10 +307,10 @@ def draw_diagnosis(
         axles = forces_and_slips(motion, told, Reading())
         for panel, slip, force in zip(panels, axles.slip, axles.force, strict=True):
             panel.plot(np.degrees(slip), force, ".", color=color, markersize=2.5, label=name)
-    for panel, title in zip(panels, AXLES, strict=True):
+    for panel, title in zip(panels, style.AXLES, strict=True):
         panel.set_title(title)
         panel.set_xlabel("slip angle [deg]")
         panel.set_ylabel("force that the motion shows [load]")
-        panel.axhline(0.0, color=GREY, linewidth=0.5)
-    legend_above(figure)
+        panel.axhline(0.0, color=style.GREY, linewidth=0.5)
+    style.legend_above(figure)
     return figure

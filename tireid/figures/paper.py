@@ -12,61 +12,30 @@ from identifier.run import History
 from identifier.setup import force_unit_name
 from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
-from tireid.figures.style import (
-    AMBER,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PAGE,
-    PURPLE,
-    SERIES,
-    Window,
-    drawable,
-    force_range,
-    impulse_unit,
-    label_time,
-    legend_above,
-    legend_beside,
-    mark_freeze,
-    new_figure,
-    paper_design,
-    styled,
-    time_window,
-)
+from tireid.figures import style
 from tireid.figures.thinned import shown_of_run
-
-# A table as a picture: medians and quartiles by law and column, with the paper's values.
 
 WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 
 
-@styled
+@style.styled
 def error_figure(
     history: History,
     bounds: Mapping[str, float] | None = None,
     freeze_times: Sequence[float] = (),
     *,
-    window: Window = None,
+    window: style.Window = None,
 ) -> Figure:
     """Draw the norm of ξ̃ = ξ - ξ̂ over time and its bounds.
 
     The axis is logarithmic where a bound lies far above the error.
 
-    Parameters
-    ----------
     bounds : by name, bounds on the norm [U s]; one that is not finite is left out.
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the window holds no sample.
     """
     recording = history.recording
-    ends = time_window(recording.t, window)
+    ends = style.time_window(recording.t, window)
     # A root of squares would overflow where a law diverges; hypot does not.
     t, (norm,) = shown_of_run(history, ends, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
@@ -74,7 +43,7 @@ def error_figure(
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
     top = max(peak, *known.values()) if known else peak
 
-    figure = new_figure(PAGE, 2.6)
+    figure = style.new_figure(style.PAGE, 2.6)
     axes = figure.subplots()
     axes.set_xlim(ends)
     if top > WIDE * peak or peak > 100.0 * WIDE * typical:
@@ -85,25 +54,26 @@ def error_figure(
     axes.plot(
         t,
         np.minimum(norm, 1e3 * top),
-        color=BLUE,
+        color=style.BLUE,
         linewidth=0.9,
         label=r"$|\tilde{\xi}|$ online",
     )
-    styles = ((PURPLE, "-"), (GREEN, (0, (5, 1.5))), (AMBER, (0, (5, 1.5, 1, 1.5))))
+    styles = (
+        (style.PURPLE, "-"),
+        (style.GREEN, (0, (5, 1.5))),
+        (style.AMBER, (0, (5, 1.5, 1, 1.5))),
+    )
     for number, (name, bound) in enumerate(known.items()):
         color, dashes = styles[number % len(styles)]
         axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
     for t_freeze in freeze_times:
-        mark_freeze(axes, t_freeze, prediction=False)
-    axes.set(
-        ylabel=rf"error norm $|\tilde{{\xi}}|$ [{impulse_unit(paper_design(history).force_unit)}]",
-    )
-    label_time(axes, recording.t)
-    legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
+        style.mark_freeze(axes, t_freeze, prediction=False)
+    unit = style.impulse_unit(style.paper_design(history).force_unit)
+    axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit}]")
+    style.label_time(axes, recording.t)
+    style.legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
     return figure
 
-
-# The weights over time: what was learnt when, and whether it settled.
 
 SYMBOLS = {
     "v_y": "$v_y$",
@@ -116,48 +86,45 @@ SYMBOLS = {
 }
 
 
-@styled
+@style.styled
 def weights_figure(
-    history: History, freeze_times: Sequence[float] = (), *, window: Window = None
+    history: History, freeze_times: Sequence[float] = (), *, window: style.Window = None
 ) -> Figure:
     """Draw every entry of W and V over time: W by axle, V by the input it weighs.
 
-    Parameters
-    ----------
     freeze_times : times at which weights were taken [s].
     window : first and last time to show [s]; None shows all.
-
-    Raises
-    ------
-    ValueError
-        Where the window holds no sample.
     """
-    recording, design = history.recording, paper_design(history)
-    ends = time_window(recording.t, window)
+    recording, design = history.recording, style.paper_design(history)
+    ends = style.time_window(recording.t, window)
     t, (W, V) = shown_of_run(history, ends, lambda block: [block.before["W"], block.before["V"]])
 
-    figure = new_figure(PAGE, 4.2)
+    figure = style.new_figure(style.PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.set_xlim(ends)
-    _lines(upper, t, W[:, 0, :], GREEN, "front axle")
-    _lines(upper, t, W[:, 1, :], PURPLE, "rear axle")
+    _lines(upper, t, W[:, 0, :], style.GREEN, "front axle")
+    _lines(upper, t, W[:, 1, :], style.PURPLE, "rear axle")
     upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
     for number, name in enumerate(design.network.inputs):
-        _lines(lower, t, V[:, :, number], SERIES[number % len(SERIES)], SYMBOLS[name])
+        _lines(lower, t, V[:, :, number], style.SERIES[number % len(style.SERIES)], SYMBOLS[name])
     lower.set(ylabel=r"weights $\hat{V}$ [-]")
-    label_time(lower, recording.t)
+    style.label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
-        axes.set_ylim(force_range(_settled(values) if history.diverged_at is not None else values))
+        axes.set_ylim(
+            style.force_range(_settled(values) if history.diverged_at is not None else values)
+        )
         for t_freeze in freeze_times:
-            mark_freeze(axes, t_freeze, prediction=False)
-        legend_beside(axes)
+            style.mark_freeze(axes, t_freeze, prediction=False)
+        style.legend_beside(axes)
     figure.align_ylabels()
     return figure
 
 
 def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
     """Draw the columns of `values` (n, k) in one color under one label."""
-    lines = axes.plot(t, drawable(values, force_range(values)), color=color, linewidth=0.7)
+    lines = axes.plot(
+        t, style.drawable(values, style.force_range(values)), color=color, linewidth=0.7
+    )
     lines[0].set_label(label)
 
 
@@ -170,36 +137,29 @@ def _settled(values: Array) -> Array:
 
 Quartiles = tuple[float, float, float]  # median, lower and upper quartile
 MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
-    "instantaneous": (ORANGE, "s"),
-    "integral": (BLUE, "o"),
-    "instantaneous_scaled": (GREEN, "D"),
+    "instantaneous": (style.ORANGE, "s"),
+    "integral": (style.BLUE, "o"),
+    "instantaneous_scaled": (style.GREEN, "D"),
 }
-FURTHER = ((PURPLE, "^"), (AMBER, "v"))
+FURTHER = ((style.PURPLE, "^"), (style.AMBER, "v"))
 OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 
 
-@styled
+@style.styled
 def comparison_figure(
     results: Mapping[str, Mapping[str, Quartiles]],
     paper: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Figure:
     """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
 
-    Parameters
-    ----------
     results : by law, by column as it is to be labeled: median, lower, upper quartile [kN]; a law
-        that diverged has no column or values that are not finite, which are left out.
+    that diverged has no column or values that are not finite, which are left out.
     paper : by law, by column: the value that the paper prints [kN].
-
-    Raises
-    ------
-    ValueError
-        Where there is nothing to draw.
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
     if not columns:
         raise ValueError("a comparison needs at least one law with one column")
-    figure = new_figure(PAGE, 2.9)
+    figure = style.new_figure(style.PAGE, 2.9)
     axes = figure.subplots()
     drawn: list[float] = []
     order: list[str] = []
@@ -249,48 +209,45 @@ def comparison_figure(
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
     for boundary in range(1, len(columns)):
         axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
-    legend_above(figure, columns=len(results), order=order)
+    style.legend_above(figure, columns=len(results), order=order)
     return figure
 
-
-# How far the learning loop is from instability: its sampled poles at any gain.
 
 FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 
 
-@styled
+@style.styled
 def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
     """Draw the root locus of the sampled loop, with the design on it and the gain at its limit.
 
     Left all of the unit circle, right the part near z = 1, where slow poles are.
 
-    Parameters
-    ----------
-    integrator : "euler" or "rk4".
-    dt : sampling interval [s].
+    integrator : "euler" or "rk4".   dt : sampling interval [s].
     """
     step = INTEGRATORS[integrator]
     locus = step(root_locus(loop, FACTORS) * dt).ravel()
     design = step(eigenvalues(loop.matrix()) * dt)
     margin = gain_margin(loop, step, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
-    figure = new_figure(PAGE, 3.5)
+    figure = style.new_figure(style.PAGE, 3.5)
     panels = figure.subplots(1, 2)
     span = 1.3 * float(np.abs(1.0 - design).max())
     views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)
     for axes, (left, right, height) in zip(panels, views, strict=True):
-        axes.plot(circle.real, circle.imag, color=BLACK, linewidth=0.9, label="stability limit")
-        axes.plot(locus.real, locus.imag, ".", color=GREY, markersize=1.0, label="any gain")
-        axes.plot(design.real, design.imag, "o", color=BLUE, markersize=4.5, label="design")
+        axes.plot(
+            circle.real, circle.imag, color=style.BLACK, linewidth=0.9, label="stability limit"
+        )
+        axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
+        axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:
             edge = step(eigenvalues(loop.scaled(margin.factor).matrix()) * dt)
             name = f"{margin.factor:.3g} times its gain"
-            axes.plot(edge.real, edge.imag, "x", color=ORANGE, markersize=5.5, label=name)
+            axes.plot(edge.real, edge.imag, "x", color=style.ORANGE, markersize=5.5, label=name)
         axes.set(xlim=(left, right), ylim=(-height, height), aspect="equal")
         axes.set_xlabel("real part of z [-]")
     panels[0].set_ylabel("imaginary part of z [-]")
     panels[0].set_title("Poles of the sampled loop")
     phase = phase_margin(loop, step, dt)
     panels[1].set_title(f"Near z = 1; phase margin {phase:.0f}°")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure

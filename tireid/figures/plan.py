@@ -8,36 +8,27 @@ from codegen.arrays import Array
 from identifier.axle.band import LEVEL, BandSpread
 from identifier.axle.curve import unit_matrix
 from identifier.plan import Plan
-from tireid.figures.style import (
-    AXLES,
-    BLUE,
-    GREY,
-    ORANGE,
-    PAGE,
-    SERIES,
-    force_unit_of,
-    legend_above,
-    new_figure,
-    styled,
-)
+from tireid.figures import style
 
 ARROW = 0.07  # lengths of the area: that shows where and whither a pass comes in
 
 
-@styled
+@style.styled
 def plan_area_figure(found: Plan) -> Figure:
     """Draw the passes in the area, with every tire that the car may have."""
     space = found.space
-    figure = new_figure(PAGE, min(max(1.8, PAGE * space.width / space.length), PAGE))
+    figure = style.new_figure(
+        style.PAGE, min(max(1.8, style.PAGE * space.width / space.length), style.PAGE)
+    )
     axes = figure.subplots()
     axes.add_patch(Rectangle((0.0, 0.0), space.length, space.width, fill=False, linewidth=1.2))
     inner = space.length - 2.0 * space.margin, space.width - 2.0 * space.margin
     corner = space.margin, space.margin
     axes.add_patch(
-        Rectangle(corner, *inner, fill=False, linestyle="--", color=GREY, label="margin")
+        Rectangle(corner, *inner, fill=False, linestyle="--", color=style.GREY, label="margin")
     )
     for k, one in enumerate(found.passes):
-        color = SERIES[k % len(SERIES)]
+        color = style.SERIES[k % len(style.SERIES)]
         others = axes.plot(
             one.motion.X[:, 0, 1:], one.motion.Y[:, 0, 1:], color=color, alpha=0.4, linewidth=0.6
         )
@@ -53,17 +44,17 @@ def plan_area_figure(found: Plan) -> Figure:
         )
     axes.set_xlim(-1.3 * ARROW * space.length, 1.03 * space.length)
     axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
-@styled
+@style.styled
 def plan_steering_figure(found: Plan, ratio: float | None) -> Figure:
     """Draw the angle of the front wheels of each pass, and what force it asks for."""
-    figure = new_figure(PAGE, 3.4)
+    figure = style.new_figure(style.PAGE, 3.4)
     top, bottom = figure.subplots(2, 1, sharex=True)
     for k, one in enumerate(found.passes):
-        color = SERIES[k % len(SERIES)]
+        color = style.SERIES[k % len(style.SERIES)]
         t = np.linspace(0.0, one.steering.duration, 600)
         top.plot(t, np.degrees(one.steering.steering(t)[:, 0]), color=color, label=f"pass {k + 1}")
         for axle, line in ((0, "-"), (1, "--")):
@@ -76,11 +67,11 @@ def plan_steering_figure(found: Plan, ratio: float | None) -> Figure:
         ).set_ylabel("hand wheel [deg]")
     bottom.set(xlabel="time [s]", ylabel="force over grip [%]")
     bottom.set_title("front solid, rear dashed", loc="right", color="#444444")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
-@styled
+@style.styled
 def plan_band_figure(found: Plan) -> Figure:
     """Draw the likely force curves with their band of 90 % before and after the maneuver."""
     tires = found.tires
@@ -88,23 +79,25 @@ def plan_band_figure(found: Plan) -> Figure:
     farthest = 1.2 * float(tires.slip_at(0.98)[0].max())
     slip = np.linspace(0.0, farthest, 200)
     units = unit_matrix(slip, tires.method.ladder)
-    unit = force_unit_of(tires.grip[0] * loads)
-    figure = new_figure(PAGE, 2.9)
+    unit = style.force_unit_of(tires.grip[0] * loads)
+    figure = style.new_figure(style.PAGE, 2.9)
     both = figure.subplots(1, 2, sharey=True)
-    for i, (axes, title) in enumerate(zip(both, AXLES, strict=True)):
+    for i, (axes, title) in enumerate(zip(both, style.AXLES, strict=True)):
         force = units @ tires.W[0, i]
         for P, color, label in (
-            (tires.covariance, GREY, "before"),
-            (found.passes[-1].covariance, ORANGE, "after"),
+            (tires.covariance, style.GREY, "before"),
+            (found.passes[-1].covariance, style.ORANGE, "after"),
         ):
             half = _half_band(units, force, P[i], tires.prior[i])
             low, high = ((force + sign * half) * loads[i] / unit.newtons for sign in (-1.0, 1.0))
             axes.fill_between(np.degrees(slip), low, high, color=color, alpha=0.3, label=label)
-        axes.plot(np.degrees(slip), force * loads[i] / unit.newtons, color=BLUE, label="likely")
+        axes.plot(
+            np.degrees(slip), force * loads[i] / unit.newtons, color=style.BLUE, label="likely"
+        )
         axes.set(xlabel="slip angle [deg]")
         axes.set_title(title)
     both[0].set(ylabel=f"lateral force [{unit.name}]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 

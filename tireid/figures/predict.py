@@ -9,71 +9,57 @@ from matplotlib.figure import Figure
 from codegen.arrays import thinning
 from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
-from tireid.figures.style import (
-    AXLES,
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    PAGE,
-    SKY,
-    force_unit_of,
-    label_time,
-    legend_above,
-    new_figure,
-    styled,
-)
+from tireid.figures import style
 
-POINTS: Mapping[str, Any] = {
-    "linestyle": "",
-    "marker": ".",
-    "markersize": 3.0,
-    "rasterized": True,
-}
+POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
 
 
-@styled
+@style.styled
 def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
     """Draw the force that the motion shows and that of the model, and what is missed below."""
     loads = np.array(vehicle.axle_loads)
     measured, modelled = shown.measured * loads, shown.modelled * loads
-    unit = force_unit_of(measured)
-    figure = new_figure(PAGE, 3.0)
+    unit = style.force_unit_of(measured)
+    figure = style.new_figure(style.PAGE, 3.0)
     panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[2.0, 1.0])
-    for axle, name in enumerate(AXLES):
+    for axle, name in enumerate(style.AXLES):
         upper, lower = panels[:, axle]
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
-        upper.plot(shown.t, seen, color=BLACK, label="shown by the motion", **POINTS)
-        upper.plot(shown.t, said, color=ORANGE, label="model", **POINTS)
+        upper.plot(shown.t, seen, color=style.BLACK, label="shown by the motion", **POINTS)
+        upper.plot(shown.t, said, color=style.ORANGE, label="model", **POINTS)
         upper.set(title=name)
-        lower.axhline(0.0, color=BLACK, linewidth=0.6)
-        lower.plot(shown.t, said - seen, color=ORANGE, **POINTS)
-        label_time(lower, shown.t)
+        lower.axhline(0.0, color=style.BLACK, linewidth=0.6)
+        lower.plot(shown.t, said - seen, color=style.ORANGE, **POINTS)
+        style.label_time(lower, shown.t)
     panels[0, 0].set_ylabel(f"mean force [{unit.name}]")
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")
-    legend_above(figure)
+    style.legend_above(figure)
     return figure
 
 
-@styled
+@style.styled
 def friction_figure(friction: RoadFriction) -> Figure:
     """Draw the friction of a drive's road over that of the drive that taught, and its doubt."""
     some = slice(None, None, thinning(len(friction.t)))
     t, ratio, sd = friction.t[some], friction.ratio[some], friction.sd[some]
-    figure = new_figure(PAGE, 2.8)
+    figure = style.new_figure(style.PAGE, 2.8)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     ends = ratio * np.exp(-sd), ratio * np.exp(sd)
     upper.fill_between(
-        t, *ends, color=SKY, alpha=0.5, linewidth=0.0, label="one standard deviation"
+        t, *ends, color=style.SKY, alpha=0.5, linewidth=0.0, label="one standard deviation"
     )
-    upper.plot(t, ratio, color=BLUE, label="friction")
-    upper.axhline(1.0, color=GREY, linewidth=0.8, linestyle="--", label="as taught")
+    upper.plot(t, ratio, color=style.BLUE, label="friction")
+    upper.axhline(1.0, color=style.GREY, linewidth=0.8, linestyle="--", label="as taught")
     upper.set(ylabel="friction over that\nof the drive that taught", ylim=(0.0, None))
-    lower.plot(t, friction.another[some], color=ORANGE, label="another road")
+    lower.plot(t, friction.another[some], color=style.ORANGE, label="another road")
     lower.plot(
-        t, friction.unexplained[some], color=BLACK, linestyle=":", label="no friction explains it"
+        t,
+        friction.unexplained[some],
+        color=style.BLACK,
+        linestyle=":",
+        label="no friction explains it",
     )
     lower.set(ylabel="probability", ylim=(-0.05, 1.05))
-    label_time(lower, friction.t)
-    legend_above(figure)
+    style.label_time(lower, friction.t)
+    style.legend_above(figure)
     return figure

@@ -10,40 +10,24 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
+from tireid.figures import style
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
-from tireid.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    ONLINE,
-    ORANGE,
-    PAGE,
-    PURPLE,
-    SKY,
-    TRUTH,
-    label_time,
-    legend_above,
-    new_figure,
-    note,
-    styled,
-)
 from tireid.figures.thinned import Signal, drawn_times, shown
 
 if TYPE_CHECKING:
-    from mpc.loop import Drive
+    from mpc.loop.record import Drive
 
 FIRST = "inertial"  # which has the band where several tell v_y
 MOST = 4  # recordings that are drawn
-OTHERS = (ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
+OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
 COLUMNS = 5  # entries of a row of the legend
 BAND = "within 2 standard deviations"
 MILLI = 1e3
 BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 
-@styled
+@style.styled
 def side_slip_figure(
     recordings: Sequence[Recording], told: Mapping[str, Mapping[str, SideSlip]]
 ) -> Figure:
@@ -51,15 +35,6 @@ def side_slip_figure(
 
     Without a recorded v_y there is an estimate with its band, and nothing is missed. A band is
     drawn of the inertial identifier, of the first method with one where it is not there.
-
-    Parameters
-    ----------
-    recordings : that the methods ran over; the first few are drawn.
-
-    Raises
-    ------
-    ValueError
-        Where no method told a lateral velocity.
     """
     drawn = list(recordings)[:MOST]
     told = {name: by_name for name, by_name in told.items() if by_name}
@@ -73,7 +48,7 @@ def side_slip_figure(
     first = FIRST if FIRST in told else next(iter(with_band), next(iter(told)))
     known = [recording.logged_v_y is not None for recording in drawn]
     ratios = [ratio for one in known for ratio in ([1.5, 0.9] if one else [1.5])]
-    figure = new_figure(PAGE, 0.7 + sum(ratios))
+    figure = style.new_figure(style.PAGE, 0.7 + sum(ratios))
     panels = iter(figure.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0])
     names = short_names([recording.name for recording in recordings])
     for recording, has_truth in zip(drawn, known, strict=True):
@@ -82,16 +57,12 @@ def side_slip_figure(
         upper.set_title(names[recording.name])
         _draw(upper, next(panels) if has_truth else None, recording, here, first)
     figure.align_ylabels()
-    legend_above(figure, columns=COLUMNS)
+    style.legend_above(figure, columns=COLUMNS)
     return figure
 
 
 def _draw(
-    upper: Axes,
-    lower: Axes | None,
-    recording: Recording,
-    told: Mapping[str, SideSlip],
-    first: str,
+    upper: Axes, lower: Axes | None, recording: Recording, told: Mapping[str, SideSlip], first: str
 ) -> None:
     """Draw the side slip of a recording, and below it the errors of the estimates."""
     v_x, truth, ends = recording.v_x, recording.logged_v_y, (recording.t[0], recording.t[-1])
@@ -108,24 +79,24 @@ def _draw(
             np.clip(_degrees(told[first].v_y[part] + side * SIGMAS * band[part], at), -limit, limit)
             for side in (-1.0, 1.0)
         )
-        upper.fill_between(t, low, high, color=BLUE, alpha=0.2, linewidth=0.0, label=BAND)
+        upper.fill_between(t, low, high, color=style.BLUE, alpha=0.2, linewidth=0.0, label=BAND)
     if exact is not None:
-        upper.plot(t, exact, **{**TRUTH, "label": "recorded"})
+        upper.plot(t, exact, **{**style.TRUTH, "label": "recorded"})
     colors = dict(zip((name for name in told if name != first), OTHERS * len(told), strict=False))
     errors = {}
     for name in (*colors, first):  # the first lies above the others
-        look: dict[str, Any] = {"color": colors.get(name, BLUE), "linewidth": 0.9}
+        look: dict[str, Any] = {"color": colors.get(name, style.BLUE), "linewidth": 0.9}
         upper.plot(t, np.clip(slips[name], -limit, limit), **look, label=method_label(name))
         if lower is not None and exact is not None:
             errors[name] = slips[name] - exact
             lower.plot(t, np.clip(errors[name], -limit, limit), **look, rasterized=True)
     upper.set(xlim=ends, ylim=(-limit, limit), ylabel="side slip [deg]")
     if told[first].rms is not None:
-        note(upper, f"RMSE {told[first].rms:.2g} deg")
+        style.note(upper, f"RMSE {told[first].rms:.2g} deg")
     if lower is not None:
-        lower.axhline(0.0, color=GREY, linewidth=0.6)
+        lower.axhline(0.0, color=style.GREY, linewidth=0.6)
         lower.set(xlim=ends, ylabel="error [deg]")
-    label_time(upper if lower is None else lower, recording.t)
+    style.label_time(upper if lower is None else lower, recording.t)
 
 
 def _degrees(v_y: Array, v_x: Array) -> Array:
@@ -133,30 +104,30 @@ def _degrees(v_y: Array, v_x: Array) -> Array:
     return np.degrees(np.where(v_x > 0.0, np.arctan2(v_y, np.maximum(v_x, 1e-9)), 0.0))
 
 
-@styled
+@style.styled
 def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the v_y that was told over the true one, and its error, each with the band of two
     sigma.
     """
     told, band = drive.told["v_y"], SIGMAS * drive.told["v_y_sd"]
     inertial = drive.told["inertial_v_y"]
-    figure = new_figure(PAGE, 3.6)
+    figure = style.new_figure(style.PAGE, 3.6)
     above, below = figure.subplots(2, 1, sharex=True)
     shade: Mapping[str, Any] = {
-        "color": BLUE,
+        "color": style.BLUE,
         "alpha": 0.2,
         "linewidth": 0.0,
         "label": "told, two sigma",
     }
-    told_look: Mapping[str, Any] = {**ONLINE, "label": "told"}
+    told_look: Mapping[str, Any] = {**style.ONLINE, "label": "told"}
     alone: Mapping[str, Any] = {
-        "color": GREY,
+        "color": style.GREY,
         "linewidth": 0.8,
         "label": "inertial identifier alone",
     }
     above.fill_between(drive.s, told - band, told + band, **shade)
     above.plot(drive.s, inertial, **alone)
-    above.plot(drive.s, drive.v_y, **TRUTH)
+    above.plot(drive.s, drive.v_y, **style.TRUTH)
     above.plot(drive.s, told, **told_look)
     above.set_ylabel("$v_y$\n[m/s]")
     below.fill_between(drive.s, -MILLI * band, MILLI * band, **shade)
@@ -166,5 +137,5 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     below.set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
     below.set_xlim(0.0, float(drive.s[-1]))
     figure.align_ylabels([above, below])
-    legend_above(figure)
+    style.legend_above(figure)
     return figure

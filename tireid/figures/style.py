@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec
 
 import numpy as np
-from matplotlib import font_manager, get_data_path, style
+from matplotlib import font_manager, get_data_path, rc_params_from_file, style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -51,36 +51,8 @@ LINEAR: Mapping[str, Any] = {
     "label": "linear tire",
 }
 
-LOOK: dict[str, Any] = {
-    "font.size": 8.0,
-    "axes.titlesize": 8.0,
-    "axes.labelsize": 8.0,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "legend.fontsize": 8.0,
-    "legend.frameon": False,
-    "legend.handlelength": 2.2,
-    "legend.columnspacing": 1.6,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": "#444444",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "axes.titlelocation": "left",
-    "axes.titlepad": 4.0,
-    "axes.formatter.use_mathtext": True,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.5,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.major.size": 3.0,
-    "ytick.major.size": 3.0,
-    "figure.constrained_layout.wspace": 0.04,
-    "agg.path.chunksize": 20000,
-    "path.simplify_threshold": 0.3,  # dots of a PNG, points of a drawing
-    "savefig.bbox": None,
-}
+_look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
+LOOK: dict[str, Any] = dict(_look.items())
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
@@ -101,7 +73,6 @@ class PlainNumbers(ScalarFormatter):
     """
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return a number of the axis."""
         return MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
 
 
@@ -111,10 +82,7 @@ MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
-    Parameters
-    ----------
-    width : of the figure [in].
-    height : of the figure [in].
+    width : of the figure [in].   height : of the figure [in].
     """
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -163,7 +131,6 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
-    """Return a figure as PNG, the same bytes for the same figure."""
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
@@ -173,10 +140,7 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
 # Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
 # opened, and the same figure has the same bytes.
 CLOUDS = 130  # dots per inch of what is pixels in a drawing
-VECTOR: dict[str, Any] = {
-    "svg.fonttype": "path",
-    "svg.hashsalt": "tireid",
-}
+VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
 
 
 def figure_svg(figure: Figure) -> bytes:
@@ -184,11 +148,7 @@ def figure_svg(figure: Figure) -> bytes:
     buffer = BytesIO()
     with laid_out(figure, {**LOOK, **VECTOR}):
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
-    return OUTLINE.sub(lambda path: DIGITS.sub(b"", path[0]), buffer.getvalue())
-
-
-OUTLINE = re.compile(rb' d="[^"]*"')  # of a curve or a glyph, in points or finer
-DIGITS = re.compile(rb"(?<=\.\d\d)\d+")  # more are not seen
+    return buffer.getvalue()
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -196,7 +156,12 @@ def save_figure(figure: Figure, path: Path) -> None:
     write_file(path, figure_png(figure))
 
 
-# Parts that several figures share: time axes, freeze marks, legends, errors in titles.
+def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
+    """Write figures as PNG under their names, and return them."""
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return figures
+
 
 Window = tuple[float, float] | None
 
@@ -212,8 +177,6 @@ DIGITS_SHOWN = 100.0  # s
 def clock_zero(t: Array) -> float:
     """Return what figures take off the times of a recording [s]; 0 where they are as short as is.
 
-    Parameters
-    ----------
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
@@ -223,10 +186,7 @@ def clock_zero(t: Array) -> float:
 def frozen_title(t: Array, t_freeze: float) -> str:
     """Return what a title calls a freeze, in the clock of the axis below it.
 
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    t_freeze : time of the freeze [s].
+    t : times of the samples (n,) [s].   t_freeze : time of the freeze [s].
     """
     return f"frozen at {freeze_key(round(t_freeze - clock_zero(t), 6))} s"
 
@@ -234,8 +194,6 @@ def frozen_title(t: Array, t_freeze: float) -> str:
 def label_time(axes: Axes, t: Array) -> None:
     """Name the time axis of a panel, and number it from the zero that it names.
 
-    Parameters
-    ----------
     t : times of the samples (n,) [s].
     """
     zero = clock_zero(t)
@@ -247,15 +205,7 @@ def label_time(axes: Axes, t: Array) -> None:
 def time_window(t: Array, window: Window) -> tuple[float, float]:
     """Return the ends of a time axis.
 
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    window : first and last time to show [s], or None for all.
-
-    Raises
-    ------
-    ValueError
-        Where the window is empty or holds no sample.
+    t : times of the samples (n,) [s].   window : first and last time to show [s], or None for all.
     """
     if window is None:
         return float(t[0]), float(t[-1])
@@ -272,10 +222,7 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
 
     The limits of the time axis must be set before.
 
-    Parameters
-    ----------
     t_freeze : time of the freeze [s].
-    prediction : whether the panel shows a replay.
     """
     first, last = axes.get_xlim()
     if prediction and t_freeze < last:
@@ -301,10 +248,7 @@ def legend_above(
 ) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 
-    Parameters
-    ----------
     columns : entries in a row; None puts all in one.
-    order : labels that come after all others, in this order.
     """
     entries: dict[str, Any] = {}
     for axes in figure.axes:
@@ -346,8 +290,6 @@ def _bolder(legend: Legend) -> None:
             line.set_alpha(1.0)
 
 
-# Units that suit the size of what is drawn: kN for cars, N for models, and the impulse of each.
-
 FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
 
 
@@ -360,10 +302,7 @@ class ForceUnit(NamedTuple):
     def format(self, error: AxleRmse, axle: int) -> str:
         """Return an axle's error as text with its unit.
 
-        Parameters
-        ----------
-        error : of both axles [N].
-        axle : 0 is the front axle, 1 the rear.
+        error : of both axles [N].   axle : 0 is the front axle, 1 the rear.
         """
         value = (error.front, error.rear)[axle] / self.newtons
         digits = f"{value:.3g}" if value >= 1.0 else f"{value:.2f}"
@@ -376,8 +315,6 @@ KILONEWTON, NEWTON = ForceUnit("kN", 1000.0), ForceUnit("N", 1.0)
 def force_unit_of(force: Array) -> ForceUnit:
     """Return kN where a force reaches 1 kN, else N.
 
-    Parameters
-    ----------
     force : any shape [N]; what is not finite does not count.
     """
     return KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else NEWTON
@@ -386,21 +323,13 @@ def force_unit_of(force: Array) -> ForceUnit:
 def impulse_unit(force_unit: float) -> str:
     """Return the name of the unit of ξ, the force unit times one second.
 
-    Parameters
-    ----------
     force_unit : U [N].
     """
     return f"{force_unit_name(force_unit)} s"
 
 
 def paper_design(history: History) -> PaperIdentifier:
-    """Return the design of a run of the paper's identifier, whose weights and error have units.
-
-    Raises
-    ------
-    TypeError
-        Where another method ran.
-    """
+    """Return the design of a run of the paper's identifier, whose weights and error have units."""
     if not isinstance(history.design, PaperIdentifier):
         raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
     return history.design
@@ -410,11 +339,6 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
     """Return the ends of an axis that shows all curves, but no more than thrice the reference.
 
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
-
-    Parameters
-    ----------
-    reference : curves that are seen in full as long as they are finite (of any shape).
-    others : curves that may be cut (of any shape).
     """
     largest = _finite(reference)
     bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
@@ -427,12 +351,7 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
 
 
 def drawable(curve: Array, limits: tuple[float, float]) -> Array:
-    """Return a curve whose values far outside the axis are brought close to it, NaN left out.
-
-    Parameters
-    ----------
-    curve : in the unit of the axis (of any shape).
-    """
+    """Return a curve whose values far outside the axis are brought close to it, NaN left out."""
     low, high = limits
     reach = 10.0 * (high - low)
     return np.clip(curve, low - reach, high + reach)

@@ -25,11 +25,7 @@ Signal = Callable[[slice | Samples], NDArray[Any]]  # values (k,) or (k, m) at s
 def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
     """Return which samples within the ends of a time axis are drawn.
 
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    ends : first and last time [s].
-    signals : that are drawn; where samples are many, those that reach farthest in one of them.
+    t : times of the samples (n,) [s].   ends : first and last time [s].
     """
     if len(t) <= LONG:
         within: Samples = (t >= ends[0]) & (t <= ends[1])
@@ -50,8 +46,6 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
 def drawn_times(recording: Recording, t: Array) -> Array:
     """Return times as a line is drawn over them: none where a stretch begins, so that it has a gap.
 
-    Parameters
-    ----------
     t : times of some of its samples, rising (k,) [s].
     """
     begins = recording.t[list(recording.breaks)]
@@ -62,8 +56,6 @@ def drawn_times(recording: Recording, t: Array) -> Array:
 def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     """Return the samples that are lowest or highest among `width` neighbors, rising.
 
-    Parameters
-    ----------
     signals : (k,) or (k, m) each; the last neighbors may be fewer.
     """
     found = []
@@ -98,12 +90,6 @@ class DrawnRun:
         self._values: list[list[Array]] = []
 
     def take(self, block: Block) -> None:
-        """Gather what is drawn of a block.
-
-        Parameters
-        ----------
-        block : of the run; one after the other, all of them.
-        """
         told, here = self._tell(block), self._recording.t[block.part]
         part: Samples = (here >= self._ends[0]) & (here <= self._ends[1])
         if self._width > 1 and part.any():
@@ -126,8 +112,6 @@ def shown_of_run(
 ) -> tuple[Array, list[Array]]:
     """Return times and values of what a run recorded, as `DrawnRun` gathers them.
 
-    Parameters
-    ----------
     ends : first and last time [s].
     """
     drawn = DrawnRun(history, ends, tell)
@@ -139,10 +123,7 @@ def shown_of_run(
 def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> Samples:
     """Return which samples a cloud of points shows: of those that look alike the first.
 
-    Parameters
-    ----------
-    slips : across (k, m).
-    heights : of each curve (k, m).
+    slips : across (k, m).   heights : of each curve (k, m).
     counts : whether samples are drawn at all (k,).
     """
     if n <= LONG:
@@ -175,6 +156,5 @@ def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> S
 
 
 def _cells(values: Array, low: Array, high: Array, count: int) -> NDArray[np.intp]:
-    """Return in which of `count` cells from low to high values lie."""
     share = (values - low) / np.maximum(high - low, 1e-300)
     return np.clip(np.nan_to_num(share) * count, 0, count - 1).astype(np.intp)

@@ -15,30 +15,12 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
+from tireid.figures import style
 from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
-from tireid.figures.style import (
-    AXLES,
-    BLACK,
-    BLUE,
-    GREEN,
-    LINEAR,
-    ORANGE,
-    PAGE,
-    PURPLE,
-    SKY,
-    drawable,
-    force_range,
-    force_unit_of,
-    label_time,
-    legend_above,
-    mark_freeze,
-    new_figure,
-    styled,
-)
 from tireid.figures.thinned import DrawnRun, cloud
 
 if TYPE_CHECKING:
-    from mpc.loop import Drive
+    from mpc.loop.record import Drive
 
 UNKNOWN = "slip not known"
 BAND = "band of 90 %"
@@ -53,22 +35,12 @@ CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a 
 }
 
 
-@styled
+@style.styled
 def slip_figure(model: TireModel, recording: Recording, online: History | None = None) -> Figure:
     """Draw force over slip angle, front and rear: truth, frozen model and linear tire.
 
     The slip angle has the paper's sign, α = δ - atan2(v_y ± l r, v_x), the negative of ISO 8855, so
     that the curves rise. Samples below the model's minimum speed are left out.
-
-    Parameters
-    ----------
-    model : the frozen model; its vehicle gives the axle positions and the linear tire.
-    online : an online run over the recording, drawn where there is no truth.
-
-    Raises
-    ------
-    ValueError
-        Where the online run is of another recording, or the car never reaches the minimum speed.
     """
     if online is not None and online.axle_force.shape != (recording.t.size, 2):
         raise ValueError(
@@ -77,9 +49,9 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     if not (recording.v_x >= model.min_speed).any():
         raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
     vehicle, force = model.vehicle, model.axle_force(recording)
-    known, color, label = recording.axle_force, BLACK, "truth"
+    known, color, label = recording.axle_force, style.BLACK, "truth"
     if known is None and online is not None:
-        known, color, label = online.axle_force, BLUE, "online"
+        known, color, label = online.axle_force, style.BLUE, "online"
     against = force if known is None else known
 
     def slip(at: Any) -> Array:
@@ -88,40 +60,40 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     heights = [force.__getitem__, against.__getitem__, lambda at: force[at] - against[at]]
     part = cloud(len(recording), slip, heights, lambda at: recording.v_x[at] >= model.min_speed)
     alpha, frozen, reference = slip(part), force[part], against[part]
-    unit = force_unit_of(reference)
+    unit = style.force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
-    limits = force_range(reference, frozen)
+    limits = style.force_range(reference, frozen)
     stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
 
     ratios = [3.2] if known is None else [3.2, 1.3]
-    figure = new_figure(PAGE, sum(ratios))
+    figure = style.new_figure(style.PAGE, sum(ratios))
     panels = figure.subplots(
         len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios
     )
-    for axle, name in enumerate(AXLES):
+    for axle, name in enumerate(style.AXLES):
         axes, lowest = panels[0, axle], panels[-1, axle]
         if known is not None:
             axes.plot(
                 alpha[:, axle],
-                drawable(reference[:, axle], limits),
+                style.drawable(reference[:, axle], limits),
                 color=color,
                 label=label,
                 **{**CLOUD, "markersize": 3.0, "alpha": 0.35},
             )
             missed = np.clip(frozen[:, axle] - reference[:, axle], *limits)
             lowest.axhline(0.0, color=color, linewidth=0.6)
-            lowest.plot(alpha[:, axle], missed, color=ORANGE, **CLOUD)
+            lowest.plot(alpha[:, axle], missed, color=style.ORANGE, **CLOUD)
         axes.plot(
             alpha[:, axle],
-            drawable(frozen[:, axle], limits),
-            color=ORANGE,
+            style.drawable(frozen[:, axle], limits),
+            color=style.ORANGE,
             label="frozen weights",
             **CLOUD,
         )
         low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
         margin = 0.04 * (high - low) or 1.0
         ends = np.array([low - margin, high + margin])
-        axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **LINEAR)
+        axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **style.LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
             _shade_unknown(axes, float(np.rad2deg(model.known_slip[axle])), ends)
@@ -133,7 +105,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     if known is not None:
         panels[1, 0].set_ylabel(f"residual [{unit.name}]")
     labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
-    legend_above(figure, columns=None if len(labels) < 6 else 3, order=(UNKNOWN,))
+    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(UNKNOWN,))
     return figure
 
 
@@ -152,8 +124,8 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
             np.rad2deg(slip),
             low,
             high,
-            facecolor=(SKY, 0.6),
-            edgecolor=BLUE,
+            facecolor=(style.SKY, 0.6),
+            edgecolor=style.BLUE,
             linewidth=0.4,
             zorder=3,
             label=BAND,
@@ -162,7 +134,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         axes.plot(
             np.rad2deg(slip),
             side[:, axle] / newtons,
-            color=PURPLE,
+            color=style.PURPLE,
             linewidth=0.9,
             linestyle="--",
             label=GUARANTEED,
@@ -170,7 +142,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     axes.plot(
         np.rad2deg(slip),
         model.force(slip)[:, axle] / newtons,
-        color=BLUE,
+        color=style.BLUE,
         linewidth=1.2,
         zorder=4,
         label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
@@ -182,9 +154,6 @@ def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
     for low, high in ((ends[0], -known), (known, ends[1])):
         if low < high:
             axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
-
-
-# What pictures of a drive say of tires: the slip of its axles, and curves of force over slip.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,43 +178,41 @@ def axle_slip(drive: "Drive") -> Array:
     return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
 
 
-# Axle force over slip on the drive: what the tires did, what the tracker believed, the truth.
-
 REACH = 1.25  # curves go on this far beyond the slip of the drive
 
 
-@styled
+@style.styled
 def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     """Draw the forces of a drive as a cloud, and the curves that trackers believed.
 
     Below stands what each curve misses of the true one, where the true one is known.
     """
-    unit = force_unit_of(drive.axle_force)
+    unit = style.force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
     reach = REACH * float(np.abs(alpha).max())
     shown = [np.abs(np.rad2deg(curve.alpha)) <= reach for curve in curves]
     within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
     steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
-    low, high = force_range(force, *steep)
+    low, high = style.force_range(force, *steep)
     missed = _missed_of_truth(curves, reach, unit.newtons)
     ratios = [3.3, 1.3] if missed else [3.3]
-    figure = new_figure(PAGE, sum(ratios))
+    figure = style.new_figure(style.PAGE, sum(ratios))
     panels = figure.subplots(
         len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios
     )
-    for axle, name in enumerate(AXLES):
+    for axle, name in enumerate(style.AXLES):
         axes = panels[0, axle]
         axes.plot(
             alpha[:, axle],
             force[:, axle],
-            color=SKY,
+            color=style.SKY,
             label="this drive, true forces",
             **{**CLOUD, "markersize": 3.0, "alpha": 0.6},
         )
         for curve, part, values in zip(curves, shown, within, strict=True):
             axes.plot(
                 np.rad2deg(curve.alpha[part]),
-                drawable(values[:, axle], (low, high)),
+                style.drawable(values[:, axle], (low, high)),
                 label=curve.label,
                 **tire_look(curve.label),
             )
@@ -256,9 +223,9 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
     if missed:
         near = [one for label, _, one in missed if not label.startswith("linear")]
-        panels[1, 0].set_ylim(force_range(np.zeros(1), *near))
+        panels[1, 0].set_ylim(style.force_range(np.zeros(1), *near))
         panels[1, 0].set_ylabel(f"residual [{unit.name}]")
-    legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
+    style.legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
     return figure
 
 
@@ -279,9 +246,6 @@ def _missed_of_truth(
     return [one for one in found if not one[0].startswith(ORACLE)]
 
 
-# What the axle identifier has learnt over time, in the numbers an engineer reads.
-
-
 def drawn_tracks(history: History) -> DrawnRun | None:
     """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to."""
     if not history.tracks_over(next(history.blocks())):
@@ -293,7 +257,7 @@ def drawn_tracks(history: History) -> DrawnRun | None:
     )
 
 
-@styled
+@style.styled
 def learnt_axles_figure(
     history: History, freeze_times: Sequence[float] = (), drawn: DrawnRun | None = None
 ) -> Figure:
@@ -302,16 +266,8 @@ def learnt_axles_figure(
     Of the axle identifier cornering stiffness, relaxation length and capacity, the force at which
     the learnt curve saturates, over the static load of the axle.
 
-    Parameters
-    ----------
-    history : a run of a method that has `tracks`.
     freeze_times : times at which weights were taken [s].
     drawn : `drawn_tracks` that has taken all blocks; None looks at the run.
-
-    Raises
-    ------
-    TypeError
-        Where the method has none.
     """
     if drawn is None:
         drawn = drawn_tracks(history)
@@ -321,16 +277,18 @@ def learnt_axles_figure(
             drawn.take(block)
     tracks, t = history.tracks_over(next(history.blocks())), history.recording.t
     at, curves = drawn.curves()
-    figure = new_figure(PAGE, 4.4)
+    figure = style.new_figure(style.PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
-        for axle, color in enumerate((GREEN, PURPLE)):
-            axes.plot(at, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
+        for axle, color in enumerate((style.GREEN, style.PURPLE)):
+            axes.plot(
+                at, values[:, axle], color=color, linewidth=1.0, label=style.AXLES[axle].lower()
+            )
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for freeze in freeze_times:
-            mark_freeze(axes, freeze, prediction=False)
-    label_time(panels[-1], t)
-    legend_above(figure)
+            style.mark_freeze(axes, freeze, prediction=False)
+    style.label_time(panels[-1], t)
+    style.legend_above(figure)
     return figure

@@ -1,10 +1,10 @@
 """Learning from thousands of logs: which they are, what is learnt of one, and who does it.
 
-A log is read, learnt and frozen by the axle identifier as `tireid identify` does it, without
-figures; then it is gone through once more for what it tells of the tires, with its own frozen model
-as the reference (`identifier.axle.information`). A log that cannot be used becomes a row with its
-error. Work is done by processes of this machine or by a Dask cluster; a process that dies loses
-what it was doing, which is done again, and a log that it dies of twice becomes a row with an error.
+A log is read and fitted as `tireid identify` does it, without figures, its samples averaged to 50
+Hz; what it tells without the prior is kept (`identifier.estimate.information`). A log that cannot
+be used becomes a row with its error. Work is done by processes of this machine or by a Dask
+cluster; a process that dies loses what it was doing, which is done again, and a log that it dies of
+twice becomes a row with an error.
 
 A log is known by the hash of its content and by its setting, wherever it lies; whoever reads it
 computes the hash. A file whose name, size and time are those of a row is not read again.
@@ -29,15 +29,15 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from codegen.compiler import CompilationError
-from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.information import Evidence
 from identifier.compare.work import Map, fresh_processes
+from identifier.estimate.fit import fit
+from identifier.estimate.model import FittedModel
 from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
-from identifier.run import identify, learn
+from identifier.run import identify
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict import Verdict, judge, judge_prediction
+from identifier.verdict import judge_taught
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
@@ -47,7 +47,7 @@ TOGETHER = 8  # logs that a process takes at most at once, and whose rows are wr
 PORTIONS = 16  # that few logs are shared into
 PART = 300.0  # s of a log whose information is kept as one
 DT = 0.01  # s, to which logs are brought
-Judging = Literal["motion", "full", "none"]
+Judging = Literal["motion", "none"]
 DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
 FIELD = re.compile(r"\{(\w+)\}")
 EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
@@ -81,9 +81,9 @@ class Telling:
 
     Parameters
     ----------
-    start : model that learning begins with; None begins afresh.
-    judging : "motion" asks whether the frozen model gives the drive's motion back, "full" for the
-        verdict of `tireid identify`, which takes ten times as long, "none" for nothing.
+    start : a fit or a prior that is believed before; None believes the table.
+    judging : "motion" asks whether the frozen model gives the drive's motion back, "none" for
+        nothing.
     check : whether a log that contradicts physics or the car is refused.
     part : longest time whose information is kept as one [s].
     """
@@ -97,6 +97,11 @@ class Telling:
     def __post_init__(self) -> None:
         if not 10.0 <= self.part < float("inf"):
             raise ValueError(f"a part must last at least 10 s, it is {self.part:g} s")
+        if not (self.start is None or isinstance(self.start, FittedModel)):
+            kind = self.start.kind
+            raise ValueError(
+                f"a fleet begins with a fit or a fleet's prior, not with kind {kind!r}"
+            )
         if self.log_map.dbc:  # whoever reads a log may run in another folder
             told = replace(self.log_map, dbc=str(Path(self.log_map.dbc).absolute()))
             object.__setattr__(self, "log_map", told)
@@ -109,7 +114,6 @@ class Telling:
         dbc = self.log_map.dbc
         parts = (
             vehicle,
-            AxleIdentifier.for_vehicle(vehicle, dt=DT),
             InertialIdentifier.for_vehicle(vehicle, dt=DT),
             replace(self.log_map, dbc=""),
             Path(dbc).read_bytes() if dbc else b"",
@@ -334,31 +338,20 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
     ValueError, ArithmeticError
         Where nothing can be learnt of it.
     """
-    usual = InertialIdentifier if recording.logged_v_y is None else AxleIdentifier
-    method = usual.for_vehicle(vehicle, dt=recording.dt)
-    counted_samples(recording, method.min_speed)  # refuses a car that never drives
-    verdict: Verdict | None = None
-    if recording.logged_v_y is None or telling.judging == "full":
-        history = identify(recording, vehicle, method, telling.start)
-        recording, model = history.recording, history.freeze()
-        verdict = judge(history) if telling.judging == "full" else None
-    else:
-        model = learn(recording, vehicle, method, telling.start)
-    if not isinstance(model, AxleModel):
-        raise TypeError(f"{type(method).__name__} freezes no axle model")
-    if telling.judging == "motion":
-        verdict = judge_prediction(model, recording, another_road=False)
-    evidence = Evidence(
-        design=AxleIdentifier.for_vehicle(vehicle, dt=recording.dt), reference=model
-    )
-    parts = evidence.parts(recording, telling.part)
+    counted_samples(recording, vehicle.lowest_speed)  # refuses a car that never drives
+    begin, start = float(recording.t[0]), telling.start
+    if recording.logged_v_y is None:
+        inertial = InertialIdentifier.for_vehicle(vehicle, dt=recording.dt)
+        recording = identify(recording, vehicle, inertial, start).recording
+    priors = start.as_prior(vehicle) if isinstance(start, FittedModel) else None
+    model, _, parts = fit([recording], vehicle, priors, block=telling.part, coarse=True)
     return replace(
         row,
         **conditions(recording),
-        **_of_verdict(verdict),
+        **(_judged(model, recording) if telling.judging == "motion" else {}),
         **_of_model(model),
         car=json.dumps(vehicle_numbers(vehicle)),
-        part_begin=[begin for begin, _ in parts],
+        part_begin=[at - begin for at, _ in parts],
         **information_columns([one for _, one in parts]),
     )
 
@@ -390,9 +383,8 @@ def conditions(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _of_verdict(verdict: Verdict | None) -> dict[str, Any]:
-    if verdict is None:
-        return {}
+def _judged(model: FittedModel, recording: Recording) -> dict[str, Any]:
+    verdict = judge_taught(model, recording)
     codes = [f"{one.code}{f' {one.axle}' if one.axle else ''}" for one in verdict.findings]
     missed = verdict.measures.get("force_missed")
     each = missed if isinstance(missed, tuple) else (None, None)
@@ -403,10 +395,10 @@ def _of_verdict(verdict: Verdict | None) -> dict[str, Any]:
     }
 
 
-def _of_model(model: AxleModel) -> dict[str, Any]:
+def _of_model(model: FittedModel) -> dict[str, Any]:
     numbers = {
         "stiffness": model.cornering_stiffness,
-        "grip": model.W.sum(axis=1),
+        "grip": np.exp([model["ln_grip_f"], model["ln_grip_r"]]),
         "relaxation": model.relaxation_length,
         "known": model.known_slip,
     }
@@ -416,7 +408,9 @@ def _of_model(model: AxleModel) -> dict[str, Any]:
         for axle, value in zip(AXLES, both, strict=True)
     }
     text = json.dumps(model.to_dict(), ensure_ascii=False)
-    return {**told, "model": text, "excitation": model.excitation.ravel().tolist()}
+    reached = model.driven, model.speeds, model.a_x, model.unexplained
+    reach = [value for one in reached for value in one.tolist()]
+    return {**told, "model": text, "reach": reach}
 
 
 # Who does it.

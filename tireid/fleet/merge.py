@@ -1,34 +1,49 @@
 """One model of many logs, and of many cars where the next one starts.
 
-What logs tell adds up (`identifier.axle.information`): the model of a group is that of the sum,
-with the prior of its car counted once. Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of
-which its logs tell θ̂_v with covariance P_v. m and T are found by expectation and maximization
-(N. Laird and J. Ware, Biometrics 38, 1982), T begins at the prior of the identifier and is held by
-it as by `WORTH` more cars. Where the next car starts is m, as sure as N(m, T + T/V).
+What logs tell adds up (`identifier.estimate.information`), and the model of a group is the optimum
+of their sum and the prior of its car, counted once. Sensors are those of the car, in each log off
+by an error of its own (`APART` of their prior). Where the evidence of a log asks for another
+friction, by `PRICE` as inside a log, its friction is its own.
+
+Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs tell θ̂_v with covariance P_v.
+m and T are found by expectation and maximization (N. Laird and J. Ware, Biometrics 38, 1982), both
+held by the prior of the estimate: m ~ N(m₀, S₀), T as by `WORTH` more cars. Where the next car
+starts is m, as sure as N(m, T + M), M = (V/T + 1/S₀)⁻¹.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.curve import EDGES
-from identifier.axle.information import Information, Total, merged, posterior, reference_of
+from identifier.estimate.fit import Reach
+from identifier.estimate.information import PLACE, SIZE, Information, coordinates
+from identifier.estimate.model import FittedModel
+from identifier.estimate.priors import ANOTHER_ROAD, OF_AXLES, SENSORS, Priors
+from identifier.estimate.roads import LEAST, PRICE
+from identifier.estimate.solve import settled
+from identifier.motion.parameters import INDEX, NAMES
 from models.vehicle import Vehicle
-from tireid.fleet.learn import DT
-from tireid.fleet.store import INDEX, LogRow
+from tireid.fleet.store import INDEX as WHICH
+from tireid.fleet.store import MOVING, LogRow
 
 TAGGED = ("vehicle", "tires", "date")
 BY = (*TAGGED, "week", "month", "log", "setting")
-TOLD = ("excitation", "part_begin", "part_seconds", "part_samples", "matrix", "vector", "square")
-COLUMNS = (*INDEX, *TAGGED, "tags", "valid", "car", *TOLD)  # of a row, that are asked for here
+TOLD = ("reach", "part_begin", "part_seconds", "matrix", "vector")
+COLUMNS = (*WHICH, *TAGGED, "tags", "valid", "car", *TOLD)  # of a row, that are asked for here
+ROUNDS = 3  # over the rows
 PASSES = 60  # of expectation and maximization
 WORTH = 2.0  # cars that the identifier's prior counts as
+CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from log to log
+APART = 0.1  # their standard deviation, of that of their prior
+TIRES = [INDEX[name] for name in MOVING if name not in SENSORS]
+OFF = [INDEX[name] for name in SENSORS]
+ROAD = INDEX["ln_road"]
+Key = tuple[tuple[str, str], ...]
 
 
 class MergeError(TireidError, ValueError):
@@ -42,25 +57,22 @@ class Merged:
     Parameters
     ----------
     key : what they have in common, by `BY` or tag.
+    elsewhere : how many of them were driven on another road.
     """
 
-    key: tuple[tuple[str, str], ...]
+    key: Key
     logs: int
+    elsewhere: int
     told: Information
-    model: AxleModel
+    model: FittedModel
 
     @property
     def name(self) -> str:
         """The group in a word: values of its key."""
         return " ".join(value or "-" for _, value in self.key) or "all"
 
-    @property
-    def misfit(self) -> Array:
-        """Mean squared error over what is told of it, (2,) [-]."""
-        return self.told.misfit(np.hstack([self.model.W, self.model.own]))
 
-
-def key_of(row: LogRow, by: Sequence[str]) -> tuple[tuple[str, str], ...]:
+def key_of(row: LogRow, by: Sequence[str]) -> Key:
     """Return what a log belongs to.
 
     Parameters
@@ -115,9 +127,7 @@ def usable(row: LogRow, *, refused: bool = False) -> bool:
     return bool(not row.error and row.part_begin and (refused or row.valid is not False))
 
 
-def grouped(
-    rows: Iterable[LogRow], by: Sequence[str]
-) -> Iterator[tuple[tuple[tuple[str, str], ...], LogRow]]:
+def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, LogRow]]:
     """Yield rows with what they belong to.
 
     Parameters
@@ -130,7 +140,7 @@ def grouped(
         Where the logs of a group are of several cars, or a log is in it twice, learnt with two
         settings.
     """
-    cars: dict[tuple[tuple[str, str], ...], tuple[str, str]] = {}
+    cars: dict[Key, tuple[str, str]] = {}
     settings: dict[tuple[object, ...], str] = {}
     for row in rows:
         key = key_of(row, by)
@@ -150,11 +160,12 @@ def grouped(
         yield key, row
 
 
-def merge(rows: Iterable[LogRow], by: Sequence[str]) -> list[Merged]:
+def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merged]:
     """Return the model of each group of logs, by its key; rows are held one at a time.
 
     Parameters
     ----------
+    rows : yields them, three times: what all say tells on which road each was, and most.
     by : what the logs of a group have in common; empty merges all.
 
     Raises
@@ -162,44 +173,102 @@ def merge(rows: Iterable[LogRow], by: Sequence[str]) -> list[Merged]:
     MergeError
         As of `grouped`.
     """
-    sums: dict[tuple[tuple[str, str], ...], _Sum] = {}
-    for key, row in grouped(rows, by):
-        sums.setdefault(key, _Sum(row)).add(row)
+    sums: dict[Key, _Sum] = {}
+    for _ in range(ROUNDS):
+        for key, row in grouped(rows(), by):
+            if key not in sums:
+                sums[key] = _Sum(row.told_car)
+            sums[key].add(row)
+        for one in sums.values():
+            one.end_round()
     return [one.merged(key) for key, one in sorted(sums.items(), key=lambda item: item[0])]
 
 
 class _Sum:
-    """What the logs of a group tell, as far as they were added."""
+    """What the logs of a group tell, in three rounds.
 
-    def __init__(self, row: LogRow) -> None:
-        self.vehicle, self.logs = row.told_car, 0
-        self.design = AxleIdentifier.for_vehicle(self.vehicle, dt=DT)
-        self.told = Total(len(self.design.ladder) + 3)
-        self.excitation = np.zeros((2, 1 + len(EDGES)))
+    At the optimum of all on one road (round 1) the friction of each part over it is found (2);
+    their median is the road of the curves, and parts far from it have a friction of their own (3).
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle, self.beliefs = vehicle, Priors.of(vehicle)
+        self.errors = errors_of(self.beliefs)
+        self.at: tuple[Array, Array] | None = None
+        self.ln_m: list[float] = []
+        self.road: float | None = None
+        self._begin_round()
+
+    def _begin_round(self) -> None:
+        self.logs = self.elsewhere = 0
+        self.told, self.reach = Information.nothing(), Reach()
+
+    def end_round(self) -> None:
+        """Go on to the next round; the last one stays."""
+        if self.at is None:
+            self.at = coordinates(self.settled()[0])
+            self._begin_round()
+        elif self.road is None:
+            self.road = float(np.median(self.ln_m))
+            self._begin_round()
 
     def add(self, row: LogRow) -> None:
+        before = self.elsewhere
         for part in row.parts:
-            self.told.add(part)
-        self.excitation = excitation_of(self.excitation, row)
+            one = part.loosened(*self.errors)
+            own = self._on_its_road(one)
+            if own is not one:
+                self.elsewhere = before + 1
+            self.told += own
+        slip, speeds, a_x, unexplained = row.numbers("reach", 4, 2)
+        seconds = float(sum(row.part_seconds))
+        self.reach = self.reach.with_(Reach(slip, speeds, a_x, seconds * unexplained**2, seconds))
         self.logs += 1
 
-    def merged(self, key: tuple[tuple[str, str], ...]) -> Merged:
-        told, reference = self.told.information, reference_of(self.design, self.vehicle)
-        model = merged(self.design, reference, told, self.excitation)
-        return Merged(key=key, logs=self.logs, told=told, model=model)
+    def _on_its_road(self, one: Information) -> Information:
+        """Return what a part tells, its friction its own where the evidence asks for it."""
+        if self.at is None:
+            return one
+        u, slopes = self.at
+        along = slopes[:, ROAD]
+        known = along @ one.matrix @ along + ANOTHER_ROAD**-2
+        ln_m = float(along @ (one.vector - one.matrix @ u) / known)
+        if self.road is None:
+            self.ln_m.append(ln_m)
+            return one
+        away = ln_m - self.road
+        if abs(away) < LEAST or 0.5 * known * away**2 < PRICE:
+            return one
+        return one.loosened(along[:, None], np.array([ANOTHER_ROAD]))
+
+    def settled(self) -> tuple[Array, Array]:
+        """Return the optimum and its covariance, as of `settled`."""
+        return settled(self.beliefs.after(self.told), self.beliefs.mean)
+
+    def merged(self, key: Key) -> Merged:
+        p, covariance = self.settled()
+        of_next = [INDEX[name] for name in CHANGES]  # its sensors are off by an error of its own
+        covariance[of_next, of_next] += self.errors[1] ** 2
+        model = FittedModel(
+            vehicle=self.vehicle,
+            p=p,
+            covariance=covariance,
+            driven=self.reach.slip,
+            speeds=self.reach.speeds,
+            a_x=self.reach.a_x,
+            unexplained=self.reach.unexplained,
+        )
+        return Merged(
+            key=key, logs=self.logs, elsewhere=self.elsewhere, told=self.told, model=model
+        )
 
 
-def excitation_of(before: Array, row: LogRow) -> Array:
-    """Return the largest slip and the times of learning of logs and one more, (2, 9).
-
-    Parameters
-    ----------
-    before : of the logs, (2, 9).
-    """
-    one = row.numbers("excitation", *before.shape)
-    together: Array = before + one
-    together[:, 0] = np.maximum(before[:, 0], one[:, 0])
-    return together
+def errors_of(beliefs: Priors) -> tuple[Array, Array]:
+    """Return along what in u sensors change from log to log (m, k), and by how much (k,)."""
+    along = np.zeros((SIZE, len(CHANGES)))
+    for k, name in enumerate(CHANGES):
+        along[PLACE[name], k] = 1.0
+    return along, APART * beliefs.sd[[INDEX[name] for name in CHANGES]]
 
 
 # Where the next car starts.
@@ -211,44 +280,45 @@ class FleetPrior:
 
     Parameters
     ----------
-    mean : m of [W, own], (2, q), own in wheelbases and speeds of the car's size.
-    between : T, (2, q, q).
+    mean : m of `TIRES`, lengths in wheelbases (q,).
+    spread : T + M (q, q).
     cars : V.
+    reach : of all their drives.
     """
 
     mean: Array
-    between: Array
+    spread: Array
     cars: int
+    reach: Reach
 
-    def model(self, vehicle: Vehicle) -> AxleModel:
+    def model(self, vehicle: Vehicle) -> FittedModel:
         """Return where a car starts: a model that `tireid identify --weights` begins with.
 
         Parameters
         ----------
-        vehicle : the car; its cornering stiffness is not looked at, the fleet knows better.
+        vehicle : the car; its cornering stiffness is not looked at.
         """
-        design = AxleIdentifier.for_vehicle(vehicle, dt=DT)
-        before = reference_of(design, vehicle)
-        size = sizes(vehicle, self.mean.shape[1])
-        theta = self.mean * size
-        P = self.between * (1.0 + 1.0 / self.cars) * size[:, :, None] * size[:, None, :]
-        n = len(design.ladder)
-        W, own = design.within_bounds(theta[:, :n], theta[:, n:], P)
-        return replace(before, W=W, own=own, covariance=P)
+        usual, size = Priors.of(vehicle), sizes(vehicle)
+        p, covariance = usual.mean.copy(), usual.covariance
+        p[TIRES] = self.mean * size
+        covariance[np.ix_(TIRES, TIRES)] = self.spread * np.outer(size, size)
+        return FittedModel(
+            vehicle=vehicle,
+            p=np.clip(p, usual.low, usual.high),
+            covariance=covariance,
+            driven=self.reach.slip,
+            speeds=self.reach.speeds,
+            a_x=self.reach.a_x,
+            unexplained=self.reach.unexplained,
+        )
 
 
-def sizes(vehicle: Vehicle, q: int) -> Array:
-    """Return what parameters of a car are measured in, (2, q): compliance in wheelbases, the bias
-    of v_y in sqrt(g L).
-
-    Parameters
-    ----------
-    q : parameters of an axle.
-    """
-    size = np.ones((2, q))
-    size[:, q - 3] = vehicle.wheelbase
-    size[1, q - 1] = vehicle.froude_speed
-    return size
+def sizes(vehicle: Vehicle) -> Array:
+    """Return what `TIRES` of a car are measured in: lengths in wheelbases, (q,)."""
+    lengths = {
+        f"{name}_{axle}" for name, one in OF_AXLES.items() for axle in "fr" if one.per == "L"
+    }
+    return np.array([vehicle.wheelbase if NAMES[k] in lengths else 1.0 for k in TIRES])
 
 
 def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
@@ -257,37 +327,41 @@ def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
     Raises
     ------
     MergeError
-        Where there is none, or their curves are of other units.
+        Where there is none.
     """
     if not cars:
         raise MergeError("no log of the store can be used: nothing is known of where a car starts")
-    if len({one.model.ladder for one in cars}) > 1:
-        raise MergeError("the cars' curves are of other units: ask for them apart by --where")
     listed = [_of_size(one) for one in cars]
-    q = listed[0][1].shape[-1]
-    first = np.mean([before for before, _, _ in listed], axis=0)
-    S0 = np.mean([wide for _, wide, _ in listed], axis=0)
-    m, T = first, S0.copy()
+    m0, S0 = (np.mean([one[k] for one in listed], axis=0) for k in (0, 1))
+    m, T, V = m0, S0, len(listed)
     for _ in range(PASSES):
-        expected = [posterior(told, m, T) for _, _, told in listed]
-        means = np.array([mean for mean, _ in expected])
-        m = means.mean(axis=0)
-        away = means - m
-        spread = np.einsum("vai,vaj->aij", away, away) + sum(P for _, P in expected)
-        T = (WORTH * S0 + spread) / (WORTH + len(listed))
-    assert m.shape == (2, q)
-    return FleetPrior(mean=m, between=T, cars=len(listed))
+        between, held = np.linalg.inv(T), np.linalg.inv(S0)
+        P = np.linalg.inv(between + np.array([matrix for _, _, matrix, _ in listed]))
+        vectors = np.array([vector for *_, vector in listed])
+        means = np.einsum("vij,vj->vi", P, between @ m + vectors)
+        M = np.linalg.inv(V * between + held)
+        m = M @ (between @ means.sum(axis=0) + held @ m0)
+        T = (WORTH * S0 + (means - m).T @ (means - m) + P.sum(axis=0)) / (WORTH + V)
+    reach = Reach()
+    for one in cars:
+        model = one.model
+        squares = model.unexplained**2
+        reach = reach.with_(Reach(model.driven, model.speeds, model.a_x, squares, 1.0))
+    return FleetPrior(mean=m, spread=T + M, cars=V, reach=reach)
 
 
-def _of_size(one: Merged) -> tuple[Array, Array, Information]:
-    """Return the prior of a car, mean and covariance, and what is told of it, over its size."""
-    vehicle = one.model.vehicle
-    before = reference_of(AxleIdentifier.for_vehicle(vehicle, dt=DT), vehicle)
-    size = sizes(vehicle, one.told.vector.shape[1])
-    told = replace(
-        one.told,
-        matrix=one.told.matrix * size[:, :, None] * size[:, None, :],
-        vector=one.told.vector * size,
-    )
-    covariance = before.covariance / (size[:, :, None] * size[:, None, :])
-    return np.hstack([before.W, before.own]) / size, covariance, told
+def _of_size(one: Merged) -> tuple[Array, Array, Array, Array]:
+    """Return prior mean and covariance of a car's `TIRES`, and matrix and vector of its logs.
+
+    All over its size; of the sensors the logs' information is marginal.
+    """
+    model = one.model
+    usual, size = Priors.of(model.vehicle), sizes(model.vehicle)
+    _, slope, H = one.told.around(model.p)
+    known = H[np.ix_(OFF, OFF)] + usual.information[np.ix_(OFF, OFF)]
+    across = H[np.ix_(TIRES, OFF)]
+    matrix = H[np.ix_(TIRES, TIRES)] - across @ np.linalg.solve(known, across.T)
+    vector = matrix @ model.p[TIRES] - slope[TIRES]  # at the optimum of the sensors
+    both = np.outer(size, size)
+    covariance = usual.covariance[np.ix_(TIRES, TIRES)]
+    return usual.mean[TIRES] / size, covariance / both, matrix * both, vector * size

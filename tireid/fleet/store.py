@@ -26,18 +26,22 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.writing import naming
-from identifier.axle import AxleModel
-from identifier.axle.information import Information
+from identifier.estimate.information import FORCES, PLACE, SIZE, Information
+from identifier.estimate.model import FittedModel
+from identifier.estimate.priors import Priors
 from identifier.frozen import vehicle_from
+from identifier.motion.parameters import NAMES
 from models.extras import needs
-from models.vehicle import Vehicle
+from models.vehicle import Vehicle, sedan
 
 Key = tuple[str, str, str]
 BUCKETS = 16
-FORMAT = "tireid fleet 2"
+FORMAT = "tireid fleet 3"
 BATCH = 512  # rows that are read at once
 SMALL = 1 << 22  # bytes of a file that is fetched as one
 HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
+MOVING = [name for name, moves in zip(NAMES, Priors.of(sedan()).moves, strict=True) if moves]
+TOLD = np.array([*range(FORCES), *(PLACE[name] for name in MOVING if name in PLACE)])  # of u
 WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "oci", "memory"}  # see _put
 
 
@@ -82,16 +86,17 @@ class LogRow:
     findings : codes of what speaks against it, with the axle where it is one's.
     missed_front, missed_rear : share of the force that the model misses [-].
     stiffness_front, stiffness_rear : cornering stiffness [N/rad].
-    grip_front, grip_rear : force at which the curves saturate [static axle loads].
+    grip_front, grip_rear : largest force of the Magic Formula [static axle loads].
     relaxation_front, relaxation_rear : length [m].
     known_front, known_rear : slip up to which the curves are known [rad].
     car : the vehicle's numbers, as JSON.
     model : the frozen model, as JSON, what weights.json holds.
-    excitation : largest slip [rad] and times of learning [s], (2, 9) by rows.
+    reach : largest slip of both axles [rad], least and largest speed [m/s] and a_x [m/s²], what a
+        model of it leaves unexplained of both axles, (8,).
     part_begin : when the parts begin [s], counted from the first sample, k of them.
-    part_seconds, part_samples : time of learning [s] and samples that count, (k,).
-    matrix : information of the parts, upper triangles, (k, 2, q (q + 1)/2) by rows.
-    vector, square : of the parts, (k, 2, q) and (k, 2) by rows.
+    part_seconds : of driving that counts [s], (k,).
+    matrix : information of the parts over `TOLD`, upper triangles, (k, q (q + 1)/2) by rows.
+    vector : of the parts, (k, q) by rows.
     """
 
     log: str
@@ -126,13 +131,11 @@ class LogRow:
     known_rear: float | None = None
     car: str = ""
     model: str = ""
-    excitation: Sequence[float] = ()
+    reach: Sequence[float] = ()
     part_begin: Sequence[float] = ()
     part_seconds: Sequence[float] = ()
-    part_samples: Sequence[float] = ()
     matrix: Sequence[float] = ()
     vector: Sequence[float] = ()
-    square: Sequence[float] = ()
 
     @property
     def name(self) -> str:
@@ -164,9 +167,9 @@ class LogRow:
             raise StoreError(f"{self._where}: car is none: {error}") from None
 
     @property
-    def frozen(self) -> AxleModel:
+    def frozen(self) -> FittedModel:
         """The frozen model."""
-        return AxleModel.from_dict(json.loads(self.model), self.name)
+        return FittedModel.from_dict(json.loads(self.model), self.name)
 
     @property
     def parts(self) -> list[Information]:
@@ -177,25 +180,21 @@ class LogRow:
         StoreError
             Where its columns do not fit one another, or a number is not finite.
         """
-        k = len(self.part_begin)
+        k, q = len(self.part_begin), len(TOLD)
         self.numbers("part_begin", k)
-        q = len(self.vector) // max(2 * k, 1)
-        matrix = unpacked_triangles(self.numbers("matrix", k, 2, q * (q + 1) // 2), q)
-        each = zip(
-            matrix,
-            self.numbers("vector", k, 2, q),
-            self.numbers("square", k, 2),
-            self.numbers("part_samples", k).tolist(),
-            self.numbers("part_seconds", k).tolist(),
-            strict=True,
-        )
-        try:
-            return [
-                Information(matrix=M, vector=v, square=c, samples=n, seconds=s)
-                for M, v, c, n, s in each
-            ]
-        except ValueError as error:
-            raise StoreError(f"{self._where}: {error}") from None
+        triangles = self.numbers("matrix", k, q * (q + 1) // 2)
+        vectors, seconds = self.numbers("vector", k, q), self.numbers("part_seconds", k)
+        rows, columns = TOLD[np.array(np.triu_indices(q))]
+        found = []
+        for packed, vector, some in zip(triangles, vectors, seconds.tolist(), strict=True):
+            matrix, whole = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
+            matrix[rows, columns] = matrix[columns, rows] = packed
+            whole[TOLD] = vector
+            try:
+                found.append(Information(matrix=matrix, vector=whole, seconds=some))
+            except ValueError as error:
+                raise StoreError(f"{self._where}: {error}") from None
+        return found
 
     def numbers(self, name: str, *shape: int) -> Array:
         """Return a column that is a list, in its shape.
@@ -219,47 +218,20 @@ class LogRow:
 
 
 COLUMNS = tuple(field.name for field in fields(LogRow))
-LISTS = ("excitation", *COLUMNS[COLUMNS.index("part_begin") :])
+LISTS = ("reach", *COLUMNS[COLUMNS.index("part_begin") :])
 WORDS = ("log", "run", "content", "setting", "stamp", "vehicle", "tires", "date", "tags", "error",
          "car", "model")  # fmt: skip
 INDEX = ("log", "run", "content", "setting", "stamp", "error")  # which rows there are
 HEAVY = (*LISTS, "car", "model")  # read where they are asked for by name
 
 
-def packed_triangles(matrix: Array) -> Array:
-    """Return the upper triangles of symmetric matrices, (..., q (q + 1)/2).
-
-    Parameters
-    ----------
-    matrix : (..., q, q).
-    """
-    rows, columns = np.triu_indices(matrix.shape[-1])
-    return np.asarray(matrix[..., rows, columns])
-
-
-def unpacked_triangles(packed: Array, q: int) -> Array:
-    """Return symmetric matrices of their upper triangles.
-
-    Parameters
-    ----------
-    packed : (..., q (q + 1)/2).
-    q : size of the matrices.
-    """
-    rows, columns = np.triu_indices(q)
-    matrix = np.zeros((*packed.shape[:-1], q, q))
-    matrix[..., rows, columns] = packed
-    matrix[..., columns, rows] = packed
-    return matrix
-
-
 def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
     """Return the columns that hold what parts of a log tell."""
+    rows, columns = TOLD[np.array(np.triu_indices(len(TOLD)))]
     return {
         "part_seconds": [one.seconds for one in parts],
-        "part_samples": [one.samples for one in parts],
-        "matrix": np.ravel([packed_triangles(one.matrix) for one in parts]).tolist(),
-        "vector": np.ravel([one.vector for one in parts]).tolist(),
-        "square": np.ravel([one.square for one in parts]).tolist(),
+        "matrix": np.ravel([one.matrix[rows, columns] for one in parts]).tolist(),
+        "vector": np.ravel([one.vector[TOLD] for one in parts]).tolist(),
     }
 
 

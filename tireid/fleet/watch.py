@@ -1,10 +1,10 @@
 """Which car's tires changed, when, and to what they are likely due: with a false-alarm rate.
 
 The parts of a car's logs stand in the order of time. The first of them are its baseline, one merged
-model; of each later part z = [ln C, ln μ] at both axles says how its tires differ from it
-(`change_from`). Under no change z ~ N(0, S + T): S is what the part leaves open, T how parts of an
-unchanged car differ (roads, speeds, curves that are not the tire's): the median of squared
-deviations in the car's own baseline, held by the fleet's.
+model; of each later part z = [ln C front, ln C rear, ln of the friction] says how its tires differ
+from it, errors of its sensors left out (`change_from`). Under no change z ~ N(0, S + T): S is what
+the part leaves open, T how parts of an unchanged car differ (roads, speeds, curves that are not the
+tire's): the median of squared deviations in the car's own baseline, held by the fleet's.
 
 A change by δ is looked for by a cumulative sum of log-likelihood ratios (E. S. Page, Biometrika 41,
 1954), both ways, for the stiffness of each axle and the friction of both:
@@ -24,16 +24,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle import AxleIdentifier
-from identifier.axle.information import (
-    Information,
-    change_from,
-    posterior,
-    total,
-)
+from identifier.estimate.information import PLACE, SIZE, Information, coordinates
+from identifier.estimate.priors import SENSORS, Priors
+from identifier.estimate.solve import settled
+from identifier.motion.parameters import INDEX
 from models.vehicle import Vehicle
-from tireid.fleet.learn import DT
-from tireid.fleet.merge import day_of, grouped
+from tireid.fleet.merge import day_of, errors_of, grouped
 from tireid.fleet.store import LogRow
 
 LEAST = 600.0  # s of driving that an alarm takes at least
@@ -42,6 +38,8 @@ FLOOR = 0.01  # standard deviation of ln C that roads make at least
 FLOOR_FRICTION = 0.05  # and of ln μ
 HELD = 10.0  # parts that the fleet's scatter counts as
 NORMAL = 1.4826  # standard deviation of normal errors over their median absolute deviation
+CHANGED = [INDEX[name] for name in ("ln_stiffness_f", "ln_stiffness_r", "ln_road")]
+LARGEST = 0.5  # standard deviation of ln C and ln μ that is believed before
 TITLES = ("stiffness of the front axle", "stiffness of the rear axle", "friction of both axles")
 
 
@@ -270,30 +268,36 @@ def _against_baseline(
     parts: Sequence[Part], vehicle: Vehicle, watching: Watching
 ) -> _Compared | None:
     """Return the parts of a car against its baseline; None where there are none after it."""
-    design = AxleIdentifier.for_vehicle(vehicle, dt=DT)
     learnt = np.cumsum([one.told.seconds for one in parts])
     count = int(np.searchsorted(learnt, watching.baseline)) + 1
     if count >= len(parts):
         return None
-    theta = _baseline([one.told for one in parts[:count]], design, vehicle)
-    changes = [change_from(one.told, theta, design, vehicle) for one in parts]
-    z = np.array([_three(one.value, np.array([0.5, 0.5])) for one in changes])
-    variances = np.array([np.einsum("aii->ai", one.covariance) for one in changes])
-    S = np.array([_three(one, np.array([0.25, 0.25])) for one in variances])
+    beliefs, told = Priors.of(vehicle), Information.nothing()
+    for one in parts[:count]:
+        told += one.told.loosened(*errors_of(beliefs))
+    p, _ = settled(beliefs.after(told), beliefs.mean)
+    changes = [change_from(one.told, p, beliefs) for one in parts]
+    z, S = (np.array(each) for each in zip(*changes, strict=True))
     return _Compared(tuple(parts), z, S, list(range(count)))
 
 
-def _baseline(told: Sequence[Information], design: AxleIdentifier, vehicle: Vehicle) -> Array:
-    """Return [W, own] of what the first parts tell, (2, q)."""
-    W, own = design.prior.means(vehicle, design.ladder)
-    mean = np.hstack([W, own])
-    P = design.prior.covariance(vehicle, design.ladder)
-    return posterior(total(told, mean.shape[1]), mean, P)[0]
+def change_from(told: Information, p: Array, beliefs: Priors) -> tuple[Array, Array]:
+    """Return ln of both stiffnesses and of the friction over a car's, and variances, (3,) each.
 
+    Sensors may be off otherwise than when the car was learnt: that is estimated beside it.
 
-def _three(both: Array, share: Array) -> Array:
-    """Return [front stiffness, rear stiffness, friction of both] of rows [ln C, ln μ], (3,)."""
-    return np.array([both[0, 0], both[1, 0], share @ both[:, 1]])
+    Parameters
+    ----------
+    p : parameters of the car (p,).
+    """
+    u, slopes = coordinates(p)
+    sensors = np.zeros((SIZE, len(SENSORS)))
+    sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
+    along = np.hstack([slopes[:, CHANGED], sensors])
+    sd = np.array([*(LARGEST for _ in CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
+    P = np.linalg.inv(along.T @ told.matrix @ along + np.diag(sd**-2.0))
+    value = P @ (along.T @ (told.vector - told.matrix @ u))
+    return value[: len(CHANGED)], np.diag(P)[: len(CHANGED)]
 
 
 def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:

@@ -10,13 +10,8 @@ from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import freeze_key
 from identifier.verdict import Verdict
 from tireid.report import Block, Headline, Report, Section, Table, write_report
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import REPORT, drawings, origin
 from tireid.verdicts import verdict_warnings, verdicts_headline
-
-HINDSIGHT = (
-    "The best design of a sweep is chosen with the recordings that it is judged on, for every "
-    "method alike."
-)
 
 
 def write_compare_report(
@@ -31,8 +26,6 @@ def write_compare_report(
 ) -> None:
     """Write the report of a comparison.
 
-    Parameters
-    ----------
     verdicts : on what the default learns, by recording.
     """
     course = comparison.course
@@ -40,7 +33,6 @@ def write_compare_report(
         "methods": "Errors of every method.",
         "matrix": "Learnt on one recording, asked about another.",
         "side_slip": "Side slip as methods without a lateral velocity told it.",
-        "pareto": "Random designs of every method.",
     }
     blocks: list[Block] = [
         Table(
@@ -50,11 +42,7 @@ def write_compare_report(
             rows=rows[1:],
         )
     ]
-    blocks += [
-        drawing(figures[name], text, READ[name])
-        for name, text in captions.items()
-        if name in figures
-    ]
+    blocks += drawings(figures, captions)
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Every method learns on each recording, is frozen at its end and asked about all "
@@ -106,6 +94,4 @@ def compare_warnings(comparison: Comparison) -> list[str]:
             said.append(f"{name} diverged on {', '.join(at)}.")
     if len(comparison.names) == 1:
         said.append("One recording: nothing says how a method does on a drive it did not learn on.")
-    if comparison.sweeps:
-        said.append(HINDSIGHT)
     return said

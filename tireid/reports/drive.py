@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 
 from models.files import digest
 from mpc.handover.rules import Verdict
-from mpc.loop import told_scores
+from mpc.loop.record import told_scores
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import READ, REPORT, drawings, origin
 
 
 def write_drive_report(
@@ -25,13 +25,7 @@ def write_drive_report(
     film: Path | None,
     command: str,
 ) -> None:
-    """Write the report of drives along one path.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    film : its file, where there is one that a page shows.
-    """
+    """Write the report of drives along one path."""
     first = runs[0]
     report = Report(
         title=f"{first.drive.path.name} on {first.label} tires",
@@ -43,9 +37,7 @@ def write_drive_report(
             Section(heading="What the tracker knew", blocks=known_blocks(runs, figures)),
             Section(
                 heading="Was it in time?",
-                blocks=[
-                    drawing(figures["solve_times"], "How long a step took.", READ["solve_times"])
-                ],
+                blocks=drawings(figures, {"solve_times": "How long a step took."}),
             ),
             origin(
                 command,
@@ -120,32 +112,29 @@ def _bad(text: str) -> bool:
     return text.startswith(Verdict.FAULT.value) or "dead reckoning" in text
 
 
-def drive_table(runs: Sequence[Run], caption: str) -> Table:
-    """Return the scores of drives."""
-    rows = [
-        [
-            run.label,
-            f"{run.scores.rms_e_y_m:.3f}",
-            f"{run.scores.peak_e_y_m:.3f}",
-            "completed" if run.scores.completed else run.drive.ending,
-            f"{run.scores.solve_ms['median']:.3f}",
-        ]
-        for run in runs
-    ]
-    header = ["tires", "rms deviation [m]", "largest [m]", "end", "a step, median [ms]"]
-    return Table(caption=caption, header=header, rows=rows)
+SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
+
+
+def score_rows(runs: Sequence[Run]) -> list[list[str]]:
+    """Return the scores of drives under `SCORES`."""
+    rows = []
+    for run in runs:
+        score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
+        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
+        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
+        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
+        completed = "yes" if score.completed else end
+        rows.append([run.label, *off, completed, failures, f"{times} ms"])
+    return rows
 
 
 def drive_blocks(
     runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
-    """Return film, table and figures of drives.
-
-    Parameters
-    ----------
-    film : its file, where there is one that a page shows.
-    """
-    blocks: list[Block] = [drive_table(runs, "Scores of the drives.")]
+    """Return film, table and figures of drives."""
+    blocks: list[Block] = [
+        Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
+    ]
     if film is not None:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
         blocks.append(Picture(image=film, caption=caption, read=READ["film"]))
@@ -154,16 +143,16 @@ def drive_blocks(
         "errors": "Deviation, heading, acceleration and speed along the path.",
         "steering": "What was asked of the front wheels.",
     }
-    return blocks + [drawing(figures[name], text, READ[name]) for name, text in captions.items()]
+    return [*blocks, *drawings(figures, captions)]
 
 
 def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
     """Return what trackers believed of the tires, and what they were told on the way."""
-    caption = "Forces of the first drive, and what trackers believed of the tires."
-    blocks: list[Block] = [drawing(figures["tires"], caption, READ["tires"])]
-    if "lateral" in figures:
-        caption = "Lateral velocity, which nothing measured: the truth, and what was told."
-        blocks.append(drawing(figures["lateral"], caption, READ["lateral"]))
+    captions = {
+        "tires": "Forces of the first drive, and what trackers believed of the tires.",
+        "lateral": "Lateral velocity, which no sensor measured: the truth and the estimate.",
+    }
+    blocks: list[Block] = [*drawings(figures, captions)]
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
         header = ["tires", "time [s]", "what"]

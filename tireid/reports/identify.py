@@ -23,29 +23,10 @@ from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from models.recordings import Recording
+from tireid import report as page
+from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
-from tireid.report import (
-    Block,
-    Cell,
-    Headline,
-    Marked,
-    Paragraph,
-    Picture,
-    Report,
-    Section,
-    Table,
-    Tone,
-    write_report,
-)
-from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.verdicts import (
-    missed_headline,
-    number_headlines,
-    of_answer,
-    verdict_headline,
-    verdict_section,
-    verdict_warnings,
-)
+from tireid.reports.common import READ, REPORT, drawing, drawings, origin
 
 EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
@@ -64,30 +45,18 @@ def write_identify_report(
     command: str,
     asked: Mapping[str, Verdict],
 ) -> None:
-    """Write the report of what was learnt, or of a network that was judged.
-
-    Parameters
-    ----------
-    frozen : by when it was frozen, replays by recording; the last is of the model.
-    parts : of the first run, over each of several logs that were learnt on.
-    asked : verdicts on the model over the drives that it was not learnt on, by recording.
-    """
+    """Write the report of what was learnt, or of a network that was judged."""
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
-        verdict_section(verdict),
-        Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
-        Section(
+        verdicts.verdict_section(verdict),
+        page.Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
+        page.Section(
             heading="How well it predicts",
-            blocks=[
-                *_asked(asked),
-                *_errors([runs[0], *parts, *runs[1:]], frozen, figures),
-            ],
+            blocks=[*_asked(asked), *_errors([runs[0], *parts, *runs[1:]], frozen, figures)],
         ),
-        Section(
+        page.Section(
             heading="What went in",
-            blocks=[
-                drawing(figures["inputs"], f"Signals of {learnt.recording.name}.", READ["inputs"])
-            ],
+            blocks=drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
         ),
         diagnosis_section(diagnosis),
         origin(
@@ -98,38 +67,37 @@ def write_identify_report(
         ),
     ]
     notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, runs)]
-    report = Report(
+    report = page.Report(
         title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
-            verdict_headline(verdict, notes),
-            *of_answer(
+            verdicts.verdict_headline(verdict, notes),
+            *verdicts.of_answer(
                 verdict,
                 [
-                    *missed_headline(verdict),
+                    *verdicts.missed_headline(verdict),
                     *asked_headlines(asked),
-                    *number_headlines(verdict),
+                    *verdicts.number_headlines(verdict),
                     *identify_headlines(model, runs, last),
                 ],
             ),
         ],
         lead=[curve_drawing(figures, verdict)],
         warnings=[
-            *verdict_warnings(verdict),
+            *verdicts.verdict_warnings(verdict),
             *(
                 one
                 for name, found in asked.items()
-                for one in verdict_warnings(found, f"{name}, replayed: ")
+                for one in verdicts.verdict_warnings(found, f"{name}, replayed: ")
             ),
             *notes,
         ],
         sections=sections,
     )
-    write_report(folder / REPORT, report)
+    page.write_report(folder / REPORT, report)
 
 
 def _how_learnt(learnt: History) -> str:
-    """Return what was learnt from, in words."""
     estimated = learnt.recording.logged_v_y is None
     lateral = "acceleration" if estimated else "velocity"
     told = side_slip_text(learnt)
@@ -154,43 +122,38 @@ def side_slip_text(learnt: History) -> str:
 
 def identify_headlines(
     model: TireModel, runs: Sequence[History], replays: Mapping[str, Replay]
-) -> list[Headline]:
+) -> list[page.Headline]:
     """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers = []
     for kind, some in (("not learnt on", runs[1:]), ("learnt on", runs[:1])):
         shares = [share for run in some if (share := _share(run, replays)) is not None]
         if shares:
             meaning = f"of the rms force missed on drives {kind}, frozen"
-            numbers.append(Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
+            numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
     if model.known_slip is not None:
         front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
-        numbers.append(Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
+        numbers.append(page.Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
     return numbers
 
 
-def asked_headlines(asked: Mapping[str, Verdict]) -> list[Headline]:
+def asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
     """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
     if not asked:
         return []
     valid = sum(verdict.valid for verdict in asked.values())
-    tone: Tone = "" if valid == len(asked) else "bad"
+    tone: page.Tone = "" if valid == len(asked) else "bad"
     meaning = "replayed drives, not learnt on, whose motion the model gives back"
-    numbers = [Headline(f"{valid} of {len(asked)}", meaning, tone)]
+    numbers = [page.Headline(f"{valid} of {len(asked)}", meaning, tone)]
     shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
     if shares:
         front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
         meaning = "missed of the force that the motion of these drives shows, front / rear"
-        numbers.append(Headline(f"{front} / {rear} %", meaning))
+        numbers.append(page.Headline(f"{front} / {rear} %", meaning))
     return numbers
 
 
-def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> Picture:
-    """Return the learnt curve with its band, the first figure of a report.
-
-    Parameters
-    ----------
-    verdict : on the model; of a refused one the caption says so.
-    """
+def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> page.Picture:
+    """Return the learnt curve with its band, the first figure of a report."""
     refused = "" if verdict.valid else "NOT VALID. "
     caption = f"{refused}Axle force over slip angle: drive, curve and its band."
     return drawing(figures["slip"], caption, READ["slip"])
@@ -241,31 +204,29 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
     ]
 
 
-def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[Block]:
+def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[page.Block]:
     """Return the numbers and the figures of a frozen model."""
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
-    blocks: list[Block] = [
-        Paragraph(
+    blocks: list[page.Block] = [
+        page.Paragraph(
             text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
             "left. curve.csv holds the curve with what is known of it, weights.json the model."
         )
     ]
     if facts:
         blocks.append(
-            Table(caption=f"What {law} knows of the tires.", header=["", *AXLES], rows=facts)
+            page.Table(caption=f"What {law} knows of the tires.", header=["", *AXLES], rows=facts)
         )
     for told in (band_sentence(model), guaranteed_sentence(model)):
         if told:
-            blocks.append(Paragraph(text=told))
-    for name, caption in (
-        ("side_slip", "Side slip as it was estimated."),
-        ("learnt", "What was learnt over time."),
-        ("error", "Norm of the observer's error."),
-        ("weights", "Weights of the network."),
-    ):
-        if name in figures:
-            blocks.append(drawing(figures[name], caption, READ[name]))
-    return blocks
+            blocks.append(page.Paragraph(text=told))
+    captions = {
+        "side_slip": "Side slip as it was estimated.",
+        "learnt": "What was learnt over time.",
+        "error": "Norm of the observer's error.",
+        "weights": "Weights of the network.",
+    }
+    return [*blocks, *drawings(figures, captions)]
 
 
 def band_sentence(model: TireModel) -> str:
@@ -285,12 +246,7 @@ def band_sentence(model: TireModel) -> str:
 
 
 def guaranteed_sentence(model: TireModel) -> str:
-    """Return which forces are guaranteed where slip is known, in words; empty where none are.
-
-    Parameters
-    ----------
-    model : frozen, with a guaranteed band or without.
-    """
+    """Return which forces are guaranteed where slip is known, in words; empty where none are."""
     known, given = model.known_slip, getattr(model, "guarantee", None)
     limits = None if known is None else model.guaranteed_band(known)
     if known is None or not isinstance(given, Guarantee) or limits is None:
@@ -311,28 +267,30 @@ def guaranteed_sentence(model: TireModel) -> str:
     )
 
 
-def _asked(asked: Mapping[str, Verdict]) -> list[Block]:
+def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
     """Return the verdicts on a model over drives that it was not learnt on, as a table."""
-    rows: list[list[Cell]] = []
+    rows: list[list[page.Cell]] = []
     for name, verdict in asked.items():
         missed = verdict.force_missed or (None, None)
         shares = [None if one is None else with_doubt(PERCENT * one) for one in missed]
-        tone: Tone = "" if verdict.valid else "bad"
-        rows.append([name, Marked("valid" if verdict.valid else "NOT VALID", tone), *shares])
+        tone: page.Tone = "" if verdict.valid else "bad"
+        rows.append([name, page.Marked("valid" if verdict.valid else "NOT VALID", tone), *shares])
     if not rows:
         return []
     caption = (
         "The verdict on each replayed drive, as of tireid predict, and what is missed of the "
         "force that the motion shows."
     )
-    return [Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)]
+    return [
+        page.Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)
+    ]
 
 
 def _errors(
     runs: Sequence[History],
     frozen: Mapping[str, Mapping[str, Replay]],
     figures: Mapping[str, Figure],
-) -> list[Block]:
+) -> list[page.Block]:
     rows, online = [], runs[0].online
     for run in runs:
         name, size = run.recording.name, force_rms(run)
@@ -341,8 +299,8 @@ def _errors(
         for when, replays in frozen.items():
             error = replays[name].against_truth or replays[name].against_online
             rows.append([name, f"frozen, {when}", *_cells(error, size)])
-    blocks: list[Block] = [
-        Table(
+    blocks: list[page.Block] = [
+        page.Table(
             caption="RMSE of the axle force, and its share of the rms force where there is a "
             "truth" + ("; without one it is against what was identified online." * online or "."),
             header=["drive", "", "front [N]", "share", "rear [N]", "share"],

@@ -16,12 +16,7 @@ PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
 
 
 def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
-    """Return what to expect and what is safe, as sentences.
-
-    Parameters
-    ----------
-    driven : how the car of the vehicle file drives it, if it can be simulated.
-    """
+    """Return what to expect and what is safe, as sentences."""
     space, count = found.space, len(found.passes)
     each = found.time / count
     times = f"one pass of {each:.1f} s" if count == 1 else f"{count} passes of {each:.1f} s"
@@ -76,12 +71,6 @@ def write_plan_report(
     command: str,
     driven: Sequence[Rehearsal],
 ) -> None:
-    """Write the report of a plan.
-
-    Parameters
-    ----------
-    inputs : all that went in, ready for JSON.
-    """
     words = plan_words(found, driven)
     report = Report(
         title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",
@@ -163,19 +152,26 @@ def _how(found: Plan) -> str:
     )
 
 
+RIVALS = ("maneuver", "time", "room", "expected error")
+
+
+def rival_rows(found: Plan) -> list[list[str]]:
+    """Return the plan beside slalom and random steering, under `RIVALS`."""
+    space, time = found.space, f"{found.time:.1f} s"
+    room = f"{space.length:g} x {space.width:g} m"
+    rows = [["plan", time, room, f"{100.0 * found.error:.1f} %"]]
+    for one in found.rivals:
+        room = f"{one.length:.0f} x {one.width:.1f} m"
+        rows.append([one.name, time, room, f"{100.0 * one.error:.1f} %"])
+    return rows
+
+
 def _rivals(found: Plan) -> Table:
     """Return the plan beside slalom and random steering."""
-    space = found.space
-    rows: list[list[str | float | None]] = [
-        ["plan", found.time, space.length, space.width, 100.0 * found.error]
-    ]
-    rows += [
-        [one.name, found.time, one.length, one.width, 100.0 * one.error] for one in found.rivals
-    ]
     return Table(
-        caption="The plan beside maneuvers of the same length at the same share of the grip; their "
-        "room is what the car takes on an open field, without margins; random is the median of "
-        "eight.",
-        header=["maneuver", "time [s]", "length [m]", "width [m]", "expected error [% of grip]"],
-        rows=rows,
+        caption="The plan beside maneuvers of the same length at the same share of the grip, error "
+        "in parts of the grip; their room is what the car takes on an open field, without margins; "
+        "random is the median of eight.",
+        header=RIVALS,
+        rows=rival_rows(found),
     )

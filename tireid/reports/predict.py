@@ -11,18 +11,7 @@ from identifier.prediction import Prediction
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
-from tireid.report import (
-    Block,
-    Cell,
-    Headline,
-    Marked,
-    Paragraph,
-    Report,
-    Section,
-    Table,
-    printed,
-    write_report,
-)
+from tireid import report as page
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.reports.identify import (
     asked_warnings,
@@ -50,16 +39,10 @@ def write_predict_report(
     source: Path,
     command: str,
 ) -> None:
-    """Write the report of a prediction.
-
-    Parameters
-    ----------
-    told : what the command prints, lines of text without a table.
-    """
     model, recording = prediction.model, prediction.recording
-    notes: list[str | Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
-    found: list[Block] = [*_errors(prediction)]
-    found += [Paragraph(text=printed(line)) for line in told.splitlines()]
+    notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
+    found: list[page.Block] = [*_errors(prediction)]
+    found += [page.Paragraph(text=page.printed(line)) for line in told.splitlines()]
     captions = {
         "motion": "Mean force over windows of 0.3 s: shown by the motion, and by the model.",
         "forces": "Axle forces over time.",
@@ -70,8 +53,10 @@ def write_predict_report(
         for name, caption in captions.items()
         if name in figures
     ]
-    tires = [Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))]
-    report = Report(
+    tires = [
+        page.Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))
+    ]
+    report = page.Report(
         title=f"Tires of {source.name} asked about {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, from which the "
         "model learnt nothing.",
@@ -83,9 +68,8 @@ def write_predict_report(
         warnings=[*verdict_warnings(verdict), *notes],
         sections=[
             verdict_section(verdict),
-            Section(
-                heading="What it predicts",
-                blocks=[*found, *(one for one in tires if one.text)],
+            page.Section(
+                heading="What it predicts", blocks=[*found, *(one for one in tires if one.text)]
             ),
             origin(
                 command,
@@ -95,33 +79,33 @@ def write_predict_report(
             ),
         ],
     )
-    write_report(folder / REPORT, report)
+    page.write_report(folder / REPORT, report)
 
 
-def predict_headlines(prediction: Prediction) -> list[Headline]:
+def predict_headlines(prediction: Prediction) -> list[page.Headline]:
     """Return what is missed of the true force, explained of the motion, and the known slip."""
     numbers = []
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     if error is not None and size is not None and min(size.front, size.rear) > 0.0:
         shares = error.front / size.front, error.rear / size.rear
         front, rear = (f"{PERCENT * share:.1f}" for share in shares)
-        numbers.append(Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
+        numbers.append(page.Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
     if motion is not None and None not in motion.explained:
         lateral, yaw = (f"{PERCENT * max(share or 0.0, 0.0):.1f}" for share in motion.explained)
         numbers.append(
-            Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
+            page.Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
         )
     if prediction.model.known_slip is not None:
         front, rear = (with_doubt(float(x)) for x in np.degrees(prediction.model.known_slip))
-        numbers.append(Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
+        numbers.append(page.Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
     return numbers
 
 
-def _errors(prediction: Prediction) -> list[Block]:
+def _errors(prediction: Prediction) -> list[page.Block]:
     error, size = prediction.against_truth, prediction.true_force
     if error is None or size is None:
         return []
-    rows: list[list[Cell]] = [
+    rows: list[list[page.Cell]] = [
         [axle, newtons, PERCENT * newtons / force if force > 0.0 else None]
         for axle, newtons, force in (
             ("front", error.front, size.front),
@@ -129,4 +113,4 @@ def _errors(prediction: Prediction) -> list[Block]:
         )
     ]
     caption = "RMSE of the axle force against the true one, and its share of the rms force."
-    return [Table(caption=caption, header=["axle", "RMSE [N]", "share [%]"], rows=rows)]
+    return [page.Table(caption=caption, header=["axle", "RMSE [N]", "share [%]"], rows=rows)]

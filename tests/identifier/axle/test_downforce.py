@@ -9,11 +9,10 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.axle.curve import doublings
-from identifier.axle.information import Evidence, merged, reference_of
 from identifier.axle.step import build_frozen, build_lesson, build_step
 from identifier.run import identify
 from identifier.tire_model import AXLES, load_model
-from identifier.verdict import OnlineBound, calibrated, contradictions, guaranteed
+from identifier.verdict import calibrated, contradictions, guaranteed
 from models.maneuvers import RandomSteer
 from models.plant import Plant, tire_of
 from models.recordings import Recording
@@ -196,28 +195,6 @@ def test_a_guarantee_holds_and_a_car_that_was_told_without_contradicts_itself(ru
     assert not against.any()
     untold = guaranteed(learnt(drive, UNTOLD))
     assert untold.guarantee.bound.error[0] > 2.0 * model.guarantee.bound.error[0]
-
-
-def test_while_driving_the_bound_reads_the_load_too(model, drive):
-    error = 0.12
-    for vehicle, violated in ((RACER, False), (UNTOLD, True)):
-        told = replace(model, vehicle=vehicle, guarantee=None)
-        online = OnlineBound(told, error, drive.dt)
-        for k in range(len(drive)):
-            online.update(drive.x[k], drive.u[k], float(drive.v_x[k]))
-        assert any(online.violated) == violated, vehicle.downforce
-
-
-def test_what_drives_tell_adds_up_to_the_static_curve(drive):
-    design = AxleIdentifier.for_vehicle(RACER)
-    away = {}
-    for vehicle in (RACER, UNTOLD):
-        model = reference_of(design, vehicle)
-        for _ in range(2):  # a reference close to the tires is the next one
-            told = Evidence(design=design, reference=model).of(drive)
-            model = merged(design, model, told, np.zeros((2, 9)))
-        away[vehicle] = np.abs(model.force_at(SLIPS) / static(SLIPS) - 1.0).max(axis=0)
-    assert (away[RACER] < 0.05).all() and (away[UNTOLD] > 0.15).all()
 
 
 def test_what_is_proven_along_a_drive_is_proven_of_the_car_that_drove(run):

@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import linprog
 
 from identifier.axle import AxleIdentifier
-from identifier.axle.ellipsoid import Ellipsoid, outer_ellipsoid
 from identifier.axle.guarantee import (
     Doubt,
     ForceBound,
@@ -29,7 +28,6 @@ from identifier.run import identify
 from identifier.tire_model import load_model
 from identifier.verdict import (
     BoundViolatedError,
-    OnlineBound,
     calibrated,
     contradictions,
     guaranteed,
@@ -342,100 +340,6 @@ def test_the_bound_grows_with_slip_that_did_not_teach(model):
     error = model.guarantee.bound.error[0]
     np.testing.assert_allclose(high - most, [error, 2.0 * error])
     np.testing.assert_allclose(least - low, [error, 2.0 * error])
-
-
-def test_the_ellipsoid_holds_the_polytope_and_shrinks():
-    strips = drawn_strips(np.random.default_rng(5), 0.04)
-    bound = ForceBound(error=(0.05, 0.05))
-    corners = possible_weights(strips, 0, bound, BOX)
-    outer = outer_ellipsoid(strips, 0, bound, DESIGN.ladder)
-    away = corners - outer.center
-    assert np.einsum("ki,ij,kj->k", away, np.linalg.inv(outer.shape), away).max() <= 1.0 + 1e-8
-    known, sizes = Ellipsoid.around(4), []
-    for h, y in zip(strips.h[:, 0], strips.y[:, 0], strict=True):
-        known = known.cut(h, y, 0.05)
-        sizes.append(np.linalg.slogdet(known.shape)[1])
-    assert (np.diff(sizes) <= 1e-9).all() and sizes[-1] < sizes[0] - 5.0
-    assert known.cut(strips.h[0, 0], strips.y[0, 0] + 1.0, 0.05) is None  # what cannot be is told
-    assert outer_ellipsoid(strips._replace(y=strips.y + 5.0 * strips.t[:, None]), 0, bound,
-                           DESIGN.ladder) is None  # fmt: skip
-
-
-def taken(online, drive):
-    """Whether front or rear was violated after each sample, (n, 2)."""
-    told = []
-    for x, u, v_x in zip(drive.x, drive.u, drive.v_x, strict=True):
-        online.update(x, u, v_x)
-        told.append(online.violated)
-    return np.array(told)
-
-
-def test_sample_by_sample_the_ellipsoids_are_those_of_the_recording(run):
-    frozen, bound = run.freeze(), ForceBound(error=(0.1, 0.12), lateness=(0.01, 0.02))
-    for drive in (run.recording, swung(6, 13.0, amplitude=0.25)):  # within what taught, and beyond
-        online = OnlineBound(frozen, bound, drive.dt)
-        assert not taken(online, drive).any()
-        strips = strips_of(frozen, drive)
-        strips = strips.until(int(np.sum(strips.t + 0.31 <= drive.t[-1] + 1e-9)))
-        for axle in range(2):
-            outer = outer_ellipsoid(strips, axle, bound, DESIGN.ladder)
-            np.testing.assert_allclose(online.left[axle].center, outer.center, atol=1e-9)
-            np.testing.assert_allclose(online.left[axle].shape, outer.shape, atol=1e-9)
-    online = OnlineBound(frozen, bound, run.recording.dt)
-    taken(online, run.recording)
-    inner = guaranteed(run, bound).guaranteed_band(SLIP)
-    low, high = online.band(SLIP)
-    assert (low <= inner[0] + 1e-6).all() and (high >= inner[1] - 1e-6).all()
-    assert (high - low)[12:19].max() < 2.5 * (inner[1] - inner[0])[12:19].max()
-
-
-def test_while_driving_a_violated_bound_is_told(model):
-    wet = swung(4, 17.0, friction=Friction(changes=(FrictionChange(scale=0.4, at_time=6.0),)))
-    online = OnlineBound(model, model.guarantee.bound, wet.dt)
-    told = taken(online, wet).any(axis=1)
-    assert told.any() and 6.0 < wet.t[np.argmax(told)] < 10.0
-    assert online.band(SLIP) is None
-    assert taken(online, wet).any(axis=1).all()  # it stays so
-
-
-def test_a_gap_while_driving_is_no_contradiction(model):
-    first, then = swung(4, 17.0), swung(5, 23.0).between(6.0, 12.0)
-    online = OnlineBound(model, model.guarantee.bound, first.dt)
-    assert not taken(online, first.between(0.0, 9.0)).any()
-    online.update(np.array([np.nan, 0.0]), np.zeros(2), 17.0)
-    assert not taken(online, then).any()
-    online = OnlineBound(model, model.guarantee.bound, first.dt)
-    assert not taken(online, first.between(0.0, 9.0)).any()
-    assert taken(online, then).any()  # a jump from one drive to the other
-    with pytest.raises(ValueError, match="dt must be positive"):
-        OnlineBound(model, 0.1, 0.0)
-
-
-@pytest.mark.parametrize(("y", "allowed"), [(0.6, 0.3), (0.0, 0.2), (-2.2, 0.5), (0.1, 5.0)])
-def test_a_cut_of_a_ball_is_as_small_as_a_search_finds(y, allowed):
-    """About the first axis: of all ellipsoids with that axis, the smallest around the slab."""
-    ball, n, radius = Ellipsoid.around(4, 1.0), 4, 2.0
-    cut = ball.cut(np.eye(4)[0], y, allowed)
-    low, high = max(y - allowed, -radius), min(y + allowed, radius)
-
-    def logvolume(center, half):
-        """Of the ellipsoid with that first half-axis that holds the rims of the slab."""
-        rim = []
-        for at in (low, high, np.clip(center, low, high), 0.0 if low <= 0.0 <= high else low):
-            left = 1.0 - ((at - center) / half) ** 2
-            if left < -1e-12:
-                return np.inf
-            across = radius**2 - at**2
-            rim.append(across / left if across > 1e-12 else 0.0)
-        return np.log(half) + 0.5 * (n - 1) * np.log(max(rim)) if max(rim) > 0.0 else np.inf
-
-    grid = [
-        logvolume(c, half)
-        for c in np.linspace(low, high, 81)
-        for half in np.linspace(0.5 * (high - low) + 1e-9, 2.0 * radius, 81)
-    ]
-    mine = 0.5 * np.linalg.slogdet(cut.shape)[1]
-    assert mine <= min(grid) + 0.02
 
 
 def test_an_empty_guarantee_is_refused():

@@ -5,28 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.baselines import CurveModel, dugoff_ekf, magic_formula_ekf, share_of_force
+from benchmarks.floor import share_of_force
+from identifier.baselines import CurveModel, magic_formula_ekf
 from identifier.baselines.ports import LAG_PORTS
 from identifier.run import identify
 
 MAGIC = np.array([[12.0, 1.5, 6000.0], [14.0, 1.3, 5200.0]])  # B, C, D
-DUGOFF = np.array([[8e4, 0.7], [1.0e5, 0.7]])  # C, mu
 
 
 def magic(axle, alpha):
     B, C, D = MAGIC[axle]
     return D * np.sin(C * np.arctan(B * alpha))
-
-
-def dugoff_on(car):
-    def force(axle, alpha):
-        C, mu = DUGOFF[axle]
-        demand, limit = C * np.tan(alpha), mu * car.axle_loads[axle]
-        if abs(demand) <= limit / 2:
-            return demand
-        return np.sign(demand) * limit * (1 - limit / (4 * abs(demand)))
-
-    return force
 
 
 def test_magic_formula_is_found_on_data_that_it_made(car, curve_drive, rng):
@@ -40,25 +29,16 @@ def test_magic_formula_is_found_on_data_that_it_made(car, curve_drive, rng):
     assert np.abs(np.prod(MAGIC, axis=1) / told - 1).min() > 0.2, "the prior was far off"
 
 
-def test_dugoff_is_found_on_data_that_it_made(car, curve_drive, rng):
-    recording = curve_drive(car, dugoff_on(car), n=4000, rng=rng)
-    found = identify(recording, car, dugoff_ekf(car)).freeze(99.0).parameters
-    np.testing.assert_allclose(found / DUGOFF, 1.0, atol=0.05)
-    assert found[0, 1] == found[1, 1], "one road"
-
-
-@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
-def test_frozen_and_online_force_agree_at_the_instant_of_freezing(make, car, drive):
-    history = identify(drive(n=600), car, make(car, textbook=True))
+def test_frozen_and_online_force_agree_at_the_instant_of_freezing(car, drive):
+    history = identify(drive(n=600), car, magic_formula_ekf(car, textbook=True))
     for k in (350, 521):
         frozen = history.freeze(0.01 * k).axle_force(history.recording)
         np.testing.assert_allclose(history.axle_force[k], frozen[k], rtol=1e-9)
         assert np.abs(frozen - history.axle_force)[: k - 100].max() > 10.0
 
 
-@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
-def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(make, car, drive):
-    history = identify(drive(n=600), car, make(car))
+def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(car, drive):
+    history = identify(drive(n=600), car, magic_formula_ekf(car))
     for k in (350, 521):
         frozen = history.freeze(0.01 * k)
         setup, rest = frozen.setup(0.01), history.recording.between(0.01 * k - 1e-6, 99.0)
@@ -74,17 +54,14 @@ def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(make, car, driv
 LAG, OFFSET = np.array([0.9, 0.6]), np.array([0.004, -0.08])  # m; rad and m/s
 
 
-@pytest.mark.parametrize("curve", ["magic_formula", "dugoff"])
-def test_lag_and_offsets_are_found_on_a_car_that_has_them(curve, car, curve_drive, rng):
+def test_lag_and_offsets_are_found_on_a_car_that_has_them(car, curve_drive, rng):
     """The car drives on its lagged tires; its steering and v_y are read with offsets."""
-    make = {"magic_formula": magic_formula_ekf, "dugoff": dugoff_ekf}[curve]
-    force = {"magic_formula": magic, "dugoff": dugoff_on(car)}[curve]
-    recording = curve_drive(car, force, n=6000, rng=rng, lag=LAG)
+    recording = curve_drive(car, magic, n=6000, rng=rng, lag=LAG)
     read = replace(recording, delta_f=recording.delta_f - OFFSET[0], v_y=recording.v_y + OFFSET[1])
-    found = identify(read, car, make(car)).freeze()
+    found = identify(read, car, magic_formula_ekf(car)).freeze()
     np.testing.assert_allclose(found.relaxation_length, LAG, rtol=0.15)
     assert (np.abs(found.offset - OFFSET) < [0.001, 0.02]).all()
-    plain = identify(read, car, make(car, textbook=True)).freeze()
+    plain = identify(read, car, magic_formula_ekf(car, textbook=True)).freeze()
     assert (share_of_force(found, read) < 0.03).all()
     assert (share_of_force(plain, read) > 3.0 * share_of_force(found, read)).all()
 
@@ -98,9 +75,8 @@ def test_a_stored_lag_and_offsets_begin_the_next_run(car, drive):
     np.testing.assert_allclose(again.offset, model.offset, rtol=1e-9)
 
 
-@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
-def test_stored_parameters_begin_the_next_run(make, car, drive):
-    recording, method = drive(n=600), make(car)
+def test_stored_parameters_begin_the_next_run(car, drive):
+    recording, method = drive(n=600), magic_formula_ekf(car)
     model = identify(recording, car, method).freeze(99.0)
     again = identify(recording, car, method, start=model).freeze(0.0)
     np.testing.assert_allclose(again.parameters, model.parameters, rtol=1e-9)

@@ -6,10 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.baselines import ForceEkf, dugoff_ekf, magic_formula_ekf
+from identifier.baselines import magic_formula_ekf
 from identifier.baselines.kalman import correct
 from identifier.run import identify
-from models.vehicle import GRAVITY
 
 
 def derivative(function, at):
@@ -157,33 +156,15 @@ def test_the_lagged_filter_is_the_textbook_with_more_states(dt, car, drive, rng)
     assert not np.allclose(estimate, rows, rtol=1e-3, atol=1e-5), "a wrong number shows"
 
 
-def test_force_filter_is_the_textbook_and_tells_the_corrected_force(car, drive):
-    recording, method = drive(n=200), replace(ForceEkf.for_vehicle(car), outlier=1e6)
-    loads = np.array([car.l_r, car.l_f]) * car.mass * GRAVITY / car.wheelbase
-    rows, _ = textbook(
-        recording,
-        car,
-        method,
-        lambda theta, v_x, x, u: loads * theta,
-        np.zeros(2),
-        np.eye(2),
-        [method.force_walk] * 2,
-    )
-    history = identify(recording, car, method)
-    np.testing.assert_allclose(history.axle_force, rows[:, 2:] * loads, rtol=1e-5, atol=0.1)
-
-
-@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf, ForceEkf.for_vehicle])
-def test_covariance_stays_symmetric_and_positive(make, car, drive):
-    P = identify(drive(n=3000), car, make(car)).state["P"][1:]
+def test_covariance_stays_symmetric_and_positive(car, drive):
+    P = identify(drive(n=3000), car, magic_formula_ekf(car)).state["P"][1:]
     np.testing.assert_array_equal(P, P.swapaxes(1, 2))
     assert np.linalg.eigvalsh(P).min() > 0.0
 
 
-@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
 @pytest.mark.parametrize("size", [1000.0, -1000.0])
-def test_a_spike_teaches_little_and_all_forces_stay_finite(size, make, car, drive):
-    clean, method = drive(n=800), make(car)
+def test_a_spike_teaches_little_and_all_forces_stay_finite(size, car, drive):
+    clean, method = drive(n=800), magic_formula_ekf(car)
     v_y = clean.v_y.copy()
     v_y[500] += size
     spiked = replace(clean, v_y=v_y)
@@ -221,9 +202,8 @@ def test_an_outlier_is_followed_but_teaches_as_one_at_the_limit(follow, away, rn
     np.testing.assert_allclose(P_after, P - gain @ S @ gain.T, rtol=1e-8, atol=1e-10)
 
 
-@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
-def test_at_rest_the_force_is_zero_and_learning_rests(make, car, halted_drive):
-    (recording, rest), method = halted_drive, make(car)
+def test_at_rest_the_force_is_zero_and_learning_rests(car, halted_drive):
+    (recording, rest), method = halted_drive, magic_formula_ekf(car)
     history = identify(recording, car, method)
     assert (history.axle_force[rest] == 0.0).all()
     theta = history.state["estimate"][:, -method.limit.size :]

@@ -242,7 +242,7 @@ def test_what_is_learnt_is_written_read_and_gone_on_from(name, car, drive, tmp_p
     learnt = identify(recording, car, method).state["estimate"][-1].ravel()[2:]
     np.testing.assert_allclose(theta, learnt, rtol=1e-12)
     with pytest.raises(ValueError, match="not a curve 'dugoff'"):
-        method.setup(car, identify(recording, car, make_method("stiffness_rls", car)).freeze())
+        method.setup(car, identify(recording, car, make_method("magic_formula_ekf", car)).freeze())
 
 
 @pytest.mark.parametrize("name", sorted(set(NAMES) - set(LEARNING)))

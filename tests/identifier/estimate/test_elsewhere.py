@@ -48,7 +48,7 @@ def believed(p=PRIORS.mean, **numbers):
         driven=np.array([0.17, 0.12]),
         speeds=np.array([16.0, 20.0]),
         a_x=np.zeros(2),
-        missed=np.array([0.06, 0.04]),
+        unexplained=np.array([0.6, 0.4]),
     )
 
 
@@ -135,13 +135,11 @@ def test_the_exported_step_of_a_fit_is_its_exact_one(fitted, drive):
 
 
 def test_a_run_of_a_fit_is_exported_to_go_on_learning(drive, fitted, tmp_path, monkeypatch):
-    monkeypatch.setattr(exporting, "export_method", lambda method, car, start, *_, **__: (
-        method, method.setup(car, start)
-    ))  # fmt: skip
+    monkeypatch.setattr(exporting, "measure", lambda *_: [])
     run = ti.identify(drive, CAR, FitMethod.for_vehicle(CAR))
-    method, begun = ti.export(run, tmp_path / "ecu")
-    assert isinstance(method, AxleIdentifier)
-    np.testing.assert_allclose(begun.carry["W"], fitted.in_units(LADDER).W)
+    step = ti.export(run, tmp_path / "ecu").package.specialized
+    assert isinstance(step.method, AxleIdentifier)
+    np.testing.assert_allclose(step.carry["W"], fitted.in_units(LADDER).W)
 
 
 def test_a_fit_exports_on_another_car_by_its_loads(fitted):
@@ -204,7 +202,7 @@ def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does():
 def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
     path = iso_3888_2()
     wish = SpeedWish(0.9, None)
-    setup = Setup(path=path, vehicle=CAR, plant="double-track", mu=1.0, drops=(), wish=wish)
+    setup = Setup(path=path, vehicle=CAR, mu=1.0, drops=(), wish=wish)
     told = told_tire(LEARNING, setup, fitted)
     learner = make_learner(fitted, CAR)
     handed = prediction_tire(learner.supervisor.identifier.model())

@@ -6,14 +6,19 @@ from itertools import product
 import numpy as np
 import pytest
 
+from codegen.processor import PROCESSORS, missing_tools, replay
 from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import run_in_virtual_machine
-from identifier.export.processor import PROCESSORS, missing_tools, replay_here, replay_on
+from identifier.export.processor import recording_program
 from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
 
 needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 LAWS = ("integral", "axle", BANKED, "inertial")
+
+
+def run(files, rows, where, **words):
+    return replay(recording_program("tireid", files, rows), where, **words)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +29,7 @@ def here(packages, drives):
 
     def replay(key):
         law, single = key
-        return replay_here("gcc", "tireid", packages[law].files, drives[law], single=single)
+        return run(packages[law].files, drives[law], "gcc", single=single)
 
     return Kept(product(LAWS, (False, True)), replay)
 
@@ -34,7 +39,7 @@ def here(packages, drives):
 def test_clang_computes_the_bits_of_gcc(law, single, here, packages, drives):
     if shutil.which("clang") is None:
         pytest.skip("needs clang")
-    found = replay_here("clang", "tireid", packages[law].files, drives[law], single=single)
+    found = run(packages[law].files, drives[law], "clang", single=single)
     assert found.hash == here[law, single].hash
     assert found.faults == here[law, single].faults
 
@@ -42,9 +47,7 @@ def test_clang_computes_the_bits_of_gcc(law, single, here, packages, drives):
 @pytest.mark.parametrize("flags", ["-O0", "-O3", "-O3 -march=native", "-O2 -fno-trapping-math"])
 def test_optimization_does_not_change_a_bit(flags, here, packages, samples):
     words = ["-std=c99", "-ffp-contract=off", *flags.split()]
-    found = replay_here(
-        "gcc", "tireid", packages["integral"].files, samples, single=True, flags=words
-    )
+    found = run(packages["integral"].files, samples, "gcc", single=True, flags=words)
     assert found.hash == here["integral", True].hash
 
 
@@ -55,9 +58,7 @@ def test_optimization_does_not_change_a_bit(flags, here, packages, samples):
 def test_the_processor_computes_the_bits_of_this_machine(
     processor, law, single, here, packages, drives
 ):
-    found = replay_on(
-        processor, "tireid", packages[law].files, drives[law], single=single, corrected=True
-    )
+    found = run(packages[law].files, drives[law], processor, single=single, corrected=True)
     assert found.hash == here[law, single].hash
     assert found.steps == len(drives[law])
     assert found.faults == here[law, single].faults
@@ -70,7 +71,7 @@ def test_one_bit_of_one_weight_would_be_noticed(here, packages, samples):
     first = "learnt->V[9][3] = "
     assert files[place].count(first) >= 1
     files[place] = files[place].replace(first, f"{first}(TIREID_C(1.0) + TIREID_C(1.2e-7)) * ", 1)
-    found = replay_on(PROCESSORS[0], "tireid", files, samples, single=True)
+    found = run(files, samples, PROCESSORS[0], single=True)
     assert found.hash != here["integral", True].hash
 
 

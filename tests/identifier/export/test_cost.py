@@ -4,24 +4,23 @@ import json
 
 import pytest
 
-from identifier.export import processor
-from identifier.export.processor import (
+from codegen import processor
+from codegen.processor import (
     PROCESSORS,
     ReplayError,
-    figures_text,
-    measure,
     missing_tools,
-    replay_on,
+    replay,
     size_on,
     with_figures,
 )
+from identifier.export.processor import figures_text, measure, recording_program
 
 pytestmark = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 
 
 def test_the_paper_s_network_keeps_the_targets(packages, samples):
     package = packages["integral"]
-    found = replay_on(PROCESSORS[0], "tireid", package.files, samples, single=True)
+    found = replay(recording_program("tireid", package.files, samples), PROCESSORS[0], single=True)
     assert 1000 < found.instructions <= 2000
     assert found.most_instructions <= 2600  # the first sample counts twice
     assert 256 < found.stack <= 800
@@ -42,10 +41,8 @@ def test_the_counter_counts(packages, samples):
         "    }\n    if ((state == NULL) || (params",
     )
     assert files[place] != package.files[place]
-    before, after = (
-        replay_on(PROCESSORS[0], "tireid", one, samples[:500], single=True).instructions
-        for one in (package.files, files)
-    )
+    programs = [recording_program("tireid", one, samples[:500]) for one in (package.files, files)]
+    before, after = (replay(one, PROCESSORS[0], single=True).instructions for one in programs)
     assert 5000 <= after - before <= 8500
 
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from codegen.processor import replay
 from identifier.export.compiled import CompiledPackage, samples_of
 from identifier.export.onnx import onnx_bytes
 from identifier.export.package import build_package, run_in_virtual_machine
-from identifier.export.processor import replay_here
+from identifier.export.processor import recording_program
 from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
@@ -53,7 +54,7 @@ def test_both_compilers_make_the_same_bits(package, rows, single, run):
     for compiler in ("gcc", "clang"):
         run(compiler, "--version")  # skips where there is none
     gcc, clang = (
-        replay_here(compiler, "tireid", package.files, rows, single=single)
+        replay(recording_program("tireid", package.files, rows), compiler, single=single)
         for compiler in ("gcc", "clang")
     )
     assert gcc.hash == clang.hash

@@ -2,10 +2,11 @@
 
 import json
 
-from identifier.export.processor import Cost, Replay, figures_text, with_figures
+from codegen.processor import Cost, Replay, with_figures
+from identifier.export.processor import figures_text
 
 REPLAY = Replay(
-    hash="ab", steps=900, faults=2, state=1000, params=200, stack=30, instructions=77777,
+    hash="ab", steps=900, faults=2, state=1000, params=200, work=0, stack=30, instructions=77777,
     most_instructions=88888,
 )  # fmt: skip
 COST = Cost("Cortex-M4", "gcc 12", single=True, flash=5432, replay=REPLAY, static_ram=4)

@@ -17,7 +17,7 @@ from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
 
 CAR = sedan()
-OTHERS = ("rls", "stiffness_rls", "eso", "linear_kf", "washout")
+OTHERS = ("magic_formula_ekf", "linear_kf", "washout")
 LAWS = ("axle", "integral", *OTHERS, BANKED, "inertial")
 TELL_V_Y = ("linear_kf", "washout", "inertial")
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")

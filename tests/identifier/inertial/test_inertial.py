@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.compare.batch import identify_batch
 from identifier.inertial import InertialIdentifier
 from identifier.methods import make_method
 from identifier.run import OnlineIdentifier, identify, learn
@@ -121,7 +120,7 @@ def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
 
 def test_a_recording_without_an_accelerometer_is_refused_before_it_is_learnt_on(banked):
     blind = replace(as_shown(banked), a_y=None)
-    for run in (identify, learn, lambda *told: identify_batch(*told[:2], [told[2]])):
+    for run in (identify, learn):
         with pytest.raises(RecordingError, match="no ay, from which InertialIdentifier learns"):
             run(blind, CAR, METHOD)
     assert not AxleIdentifier.for_vehicle(CAR).needs_a_y

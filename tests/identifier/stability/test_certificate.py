@@ -5,18 +5,15 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
+from benchmarks.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.certificate import Property, at_least, at_most
 from identifier.paper.laws import LAWS, Gains, diagonal
 from identifier.stability import (
     Certificate,
     Operation,
-    along_run,
     certify,
     design_gains,
 )
-from identifier.stability.limits import instantaneous_damping, integral_euler_limit, integral_limit
-from identifier.stability.loop import direction_matrix
-from identifier.stability.operation import worst_loop
 from identifier.stability.sampled_bound import Disturbance
 
 integral, instantaneous, lead_law = (
@@ -187,17 +184,6 @@ def test_the_worst_status_is_the_verdict_and_nan_never_passes():
     assert Certificate(properties=(entry("fail"), entry("warn"))).verdict == "fail"
     assert at_most(np.nan, good=1.0, bad=2.0) == "fail"
     assert at_least(np.nan, good=1.0, bad=0.5) == "fail"
-
-
-def test_along_a_run_the_loop_is_unstable_only_where_the_regressor_is_large():
-    design = gains(eta_W=1.0)
-    loop = worst_loop(
-        design, integral.error(), CITY, direction_matrix(integral, -8 * np.eye(2)), np.inf
-    )
-    limit = integral_euler_limit(8.0, 8.0, 0.01)
-    G = np.array([0.5, 0.99, 1.01])[:, None, None] * limit * np.eye(2)
-    radius = along_run(loop, G, "euler", 0.01)
-    assert list(radius < 1.0) == [True, True, False]
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.monte_carlo import Beginning, bound_rows, monte_carlo
 from identifier.driving import natural_driving
+from identifier.methods import certify
 from identifier.paper.design import PaperIdentifier, with_keeping
 from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INTEGRAL
-from identifier.stability.monte_carlo import Beginning, monte_carlo
 from identifier.stability.sampled_bound import Learning
 from models.vehicle import sedan
-from tireid.commands.certificate_table import bound_rows, certificate_of
 
 CAR = sedan()
 DT, LAM, RHO, DRIVE = 0.01, 8.0, 3.0, 40.0
@@ -109,7 +109,7 @@ def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
         PaperIdentifier.for_vehicle(CAR), integrator=integrator, driving=natural_driving(CAR)
     )
     design = with_keeping(design, design.operation(CAR), keeping)
-    certificate = certificate_of(design, CAR)
+    certificate = certify(design, CAR)
     known = {entry.name: entry.value for entry in certificate.properties}
     W = min(known.get("weight_bound", np.inf), design.gains.W_max)
     seen = monte_carlo(
@@ -128,7 +128,7 @@ def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
 def test_a_certificate_of_a_smaller_dead_zone_than_the_one_that_runs_is_found_out():
     design = replace(PaperIdentifier.for_vehicle(CAR), driving=natural_driving(CAR))
     design = with_keeping(design, design.operation(CAR), "dead_zone")
-    certificate = certificate_of(design, CAR)
+    certificate = certify(design, CAR)
     gains = replace(design.gains, V_free=1e3, W_free=1e3, eta_W=3e5)
     seen = monte_carlo(
         replace(design, gains=gains),
@@ -145,9 +145,9 @@ def test_the_force_that_a_dead_zone_lets_w_hold_is_the_one_at_which_learning_res
     """All units saturated, a residual above the capacity: the force settles at the capacity."""
     design, n_h = PaperIdentifier.for_vehicle(CAR), 10
     resting = replace(design, gains=replace(design.gains, W_free=3.0))
-    capacity = certificate_of(resting, CAR)["capacity"].value
+    capacity = certify(resting, CAR)["capacity"].value
     assert capacity == pytest.approx(
-        certificate_of(design, CAR)["capacity"].value + np.sqrt(n_h) * 3.0, rel=1e-12
+        certify(design, CAR)["capacity"].value + np.sqrt(n_h) * 3.0, rel=1e-12
     )
     g, a, s = resting.gains, -resting.gains.A_d[0][0], np.ones(n_h)
     xi, z, W, dt = 0.0, 0.0, np.zeros(n_h), 1e-3
@@ -163,28 +163,28 @@ def test_the_force_that_a_dead_zone_lets_w_hold_is_the_one_at_which_learning_res
 def test_too_small_a_capacity_advises_the_leakage_that_is_just_enough():
     design = PaperIdentifier.for_vehicle(CAR)
     strong = replace(design, gains=replace(design.gains, rho_W=10.0, W_free=1.0))
-    advice = certificate_of(strong, CAR)["capacity"].advice
+    advice = certify(strong, CAR)["capacity"].advice
     rho = float(advice.removeprefix("rho_W below "))
     enough = replace(strong, gains=replace(strong.gains, rho_W=0.99 * rho))
-    assert certificate_of(enough, CAR)["capacity"].status == "pass"
+    assert certify(enough, CAR)["capacity"].status == "pass"
     short = replace(strong, gains=replace(strong.gains, rho_W=1.01 * rho))
-    assert certificate_of(short, CAR)["capacity"].status == "warn"
+    assert certify(short, CAR)["capacity"].status == "warn"
 
 
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])
 def test_the_dead_zone_of_each_layer_widens_its_own_bound(integrator):
     design = replace(PaperIdentifier.for_vehicle(CAR), integrator=integrator)
     wide = replace(design, gains=replace(design.gains, V_free=20.0))
-    before, after = (certificate_of(one, CAR) for one in (design, wide))
+    before, after = (certify(one, CAR) for one in (design, wide))
     assert after["V_bound"].value == pytest.approx(before["V_bound"].value + 20.0, rel=0.03)
     assert after["weight_bound"].value == before["weight_bound"].value
     wide = replace(design, gains=replace(design.gains, W_free=5.0))
-    assert certificate_of(wide, CAR)["weight_bound"].value > before["weight_bound"].value + 5.0
+    assert certify(wide, CAR)["weight_bound"].value > before["weight_bound"].value + 5.0
 
 
 def test_bound_14_is_not_stated_of_a_leakage_that_rests():
     def names(design):
-        return {entry.name for entry in certificate_of(design, CAR).properties}
+        return {entry.name for entry in certify(design, CAR).properties}
 
     design = PaperIdentifier.for_vehicle(CAR)
     for layer in ("W_free", "V_free"):

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -6,12 +8,22 @@ from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import (
     drift_frequency,
     passivity_shortage,
-    shortage_formula,
     sufficient_leakage,
 )
-from identifier.stability.pi_lead import lead_time, pi_lead
+from tests.identifier.stability.storage import lead_time, pi_lead
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])
+
+
+def shortage_formula(a: float, lam: float) -> float:
+    """1/(a (a + λ) (√a + √λ)²): shortage of passivity of the integral law with A_d = -a I.
+
+    Parameters
+    ----------
+    a : decay rate of A_d = -a I [1/s].
+    lam : forgetting factor λ [1/s].
+    """
+    return 1.0 / (a * (a + lam) * (math.sqrt(a) + math.sqrt(lam)) ** 2)
 
 
 def weight_error_after(a, lam, eta, frequency, leakage=0.0, law=INTEGRAL, duration=400.0, dt=2e-3):

@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.monte_carlo import Drives, measured, random_drives, within
 from identifier.driving import Driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS
 from identifier.paper.network import Network
 from identifier.stability import certify
-from identifier.stability.monte_carlo import Drives, measured, random_drives, within
 from identifier.stability.operation import (
     SPEED_SPREAD,
     declared_signals,

@@ -2,13 +2,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from benchmarks.steady_cornering import jacobian_feedback
 from identifier.paper.network import hidden_layer
 from identifier.stability.loop import INTEGRAL, Loop
 from identifier.stability.margins import gain_margin
 from identifier.stability.operation import (
     axle_coupling,
     estimated_input_feedback,
-    jacobian_feedback,
     minimal_decay,
 )
 from models.bicycle import BicycleParameters, bicycle, slip_angles

@@ -6,8 +6,8 @@ from identifier.stability.gain_design import DesignError, design_gains, gain_for
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact
 from identifier.stability.margins import phase_margin
 from identifier.stability.operation import Operation, worst_loop
-from identifier.stability.pi_lead import pi_lead
 from identifier.stability.sampled_bound import Disturbance
+from tests.identifier.stability.storage import pi_lead
 
 TASK = {
     "bandwidth": 0.7,

@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from identifier.stability.checks import worst_damping
-from identifier.stability.limits import (
+from benchmarks.limits import (
     critical_frequency,
     instantaneous_damping,
     instantaneous_euler_limit,
     integral_euler_limit,
     integral_limit,
 )
+from identifier.stability.checks import worst_damping
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
 from identifier.stability.margins import gain_margin
 

@@ -19,7 +19,7 @@ from identifier.stability.loop import (
     root_locus,
     spectral_radius,
 )
-from identifier.stability.pi_lead import pi_lead
+from tests.identifier.stability.storage import pi_lead
 
 A_D = np.array([[-6.0, 2.5], [-0.7, -4.0]])
 

@@ -1,11 +1,63 @@
+import warnings
+
+import control
 import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from identifier.stability.limits import integral_limit
+from benchmarks.limits import integral_limit
+from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
-from identifier.stability.margins import gain_margin, phase_margin, scalar_loop, scalar_margins
-from identifier.stability.pi_lead import pi_lead
+from identifier.stability.margins import gain_margin, phase_margin
+from tests.identifier.stability.storage import pi_lead
+
+
+def scalar_loop(
+    *,
+    a: float,
+    lam: float,
+    g: float,
+    law: DrivingError,
+    leakage: float = 0.0,
+    dt: float | None = None,
+) -> control.TransferFunction:
+    """Return the loop transfer function for A_d = -a I, in s, or in w = 1 + s dt (Euler).
+
+    (g/a) (c_ξ (s + λ) + c_z) / ((s + λ)(s + a)(s + l)); the pole-zero pair at λ of a law without
+    z is kept out.
+
+    Parameters
+    ----------
+    a : decay rate [1/s].
+    lam : forgetting factor λ [1/s].
+    g : loop gain λ_max(G).
+    law : coefficients of z and ξ̃ in the driving error.
+    leakage : l [1/s].
+    dt : step [s] of explicit Euler, None for continuous time.
+    """
+    c_z, c_xi = law
+    poles = [-a, -leakage] + ([-lam] if c_z > 0.0 else [])
+    zeros = [-lam - c_z / c_xi] if c_z > 0.0 and c_xi > 0.0 else []
+    gain = g / a * (c_xi if c_xi > 0.0 else c_z)
+    if dt is not None:
+        gain *= dt ** (len(poles) - len(zeros))
+        poles = [1.0 + dt * pole for pole in poles]
+        zeros = [1.0 + dt * zero for zero in zeros]
+    time = 0 if dt is None else dt
+    return control.tf(gain * np.poly(zeros), np.poly(poles), time)
+
+
+def scalar_margins(loop: control.TransferFunction) -> tuple[float, float, float, float]:
+    """Gain margin [-], phase margin [deg] and their frequencies [rad/s], by `control.margin`.
+
+    Parameters
+    ----------
+    loop : transfer function of `scalar_loop`.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # control warns where a margin is at infinity
+        gain, phase, at_phase_crossing, at_gain_crossing = control.margin(loop)
+    return float(gain), float(phase), float(at_phase_crossing), float(at_gain_crossing)
 
 
 def random_hurwitz(rng, skew):

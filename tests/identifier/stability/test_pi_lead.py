@@ -9,7 +9,8 @@ from identifier.stability import Operation, certify
 from identifier.stability.loop import INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import drift_frequency, gain_margin
-from identifier.stability.pi_lead import (
+from identifier.stability.sampled_bound import Disturbance
+from tests.identifier.stability.storage import (
     Storage,
     lead_time,
     pi_lead,
@@ -17,7 +18,6 @@ from identifier.stability.pi_lead import (
     storage,
     storage_residual,
 )
-from identifier.stability.sampled_bound import Disturbance
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])
 

@@ -5,6 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.monte_carlo import (
+    Beginning,
+    largest_norms,
+    measured,
+    monte_carlo,
+    random_drives,
+    within,
+)
 from identifier.driving import natural_driving
 from identifier.paper.design import PaperIdentifier, design_for
 from identifier.paper.laws import LAWS, DrivingError, Gains, diagonal, rk4
@@ -13,14 +21,6 @@ from identifier.paper.step import GAINS, build_step
 from identifier.run import identify
 from identifier.stability import certify
 from identifier.stability.loop import INTEGRAL, direction_matrix
-from identifier.stability.monte_carlo import (
-    Beginning,
-    largest_norms,
-    measured,
-    monte_carlo,
-    random_drives,
-    within,
-)
 from identifier.stability.operation import proven_bounds
 from identifier.stability.sampled_bound import (
     Disturbance,

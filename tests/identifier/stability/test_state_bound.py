@@ -1,16 +1,15 @@
 import numpy as np
 import pytest
 
+from benchmarks.limits import integral_euler_limit
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.run import identify
 from identifier.stability.bounds import small_gain, steady_capacity, transient_peak
-from identifier.stability.limits import integral_euler_limit
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.operation import Operation, proven_bounds
-from identifier.stability.pi_lead import pi_lead
 from identifier.stability.printed import (
     bound_14,
     canceling_pair,
@@ -25,6 +24,7 @@ from identifier.stability.sampled_bound import (
     error_gains,
     output_layer,
 )
+from tests.identifier.stability.storage import pi_lead
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead(0.3)}

@@ -5,39 +5,35 @@ from functools import cache
 
 import pytest
 
-from identifier.export.processor import missing_tools
-from mpc.export.processor import (
-    PROCESSOR,
-    MpcCost,
-    mpc_figures_text,
-    replay_here,
-    replay_on_processor,
-    time_here,
-    with_mpc_figures,
-)
+from codegen.processor import Cost, missing_tools, replay, with_figures
+from mpc.export.processor import PROCESSOR, mpc_figures_text, time_here, vectors_program
 
 CASES = [("axle", True), ("integral", False), ("integral", True)]
 needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 
 
+def run(package, where, **words):
+    return replay(vectors_program(package, steps=20), where, **words)
+
+
 @pytest.fixture(scope="module")
 def here(packages):
     """By law and precision, what gcc makes of the vectors on this machine."""
-    return cache(lambda law, single: replay_here(packages[law], "gcc", single=single, steps=20))
+    return cache(lambda law, single: run(packages[law], "gcc", single=single))
 
 
 @pytest.mark.parametrize(("law", "single"), CASES)
 def test_clang_computes_the_bits_of_gcc(law, single, here, packages):
     if shutil.which("clang") is None:
         pytest.skip("needs clang")
-    found = replay_here(packages[law], "clang", single=single, steps=20)
+    found = run(packages[law], "clang", single=single)
     assert found.hash == here(law, single).hash
 
 
 @pytest.mark.parametrize("flags", ["-O0", "-O3 -fno-trapping-math", "-O3 -march=native"])
 def test_optimization_does_not_change_a_bit(flags, here, packages):
     words = ["-std=c99", "-ffp-contract=off", *flags.split()]
-    found = replay_here(packages["axle"], "gcc", single=True, steps=20, flags=words)
+    found = run(packages["axle"], "gcc", single=True, flags=words)
     assert found.hash == here("axle", True).hash
 
 
@@ -50,13 +46,13 @@ def test_precisions_and_tires_differ(here):
 def test_the_processor_computes_the_bits_of_this_machine_within_its_means(
     law, single, here, packages
 ):
-    found = replay_on_processor(packages[law], single=single, steps=20)
+    found = run(packages[law], PROCESSOR, single=single)
     assert found.hash == here(law, single).hash
     assert found.steps == 20
     assert 3e5 < found.instructions <= found.most_instructions < 6e6
     assert 500 < found.stack < 4096
     assert found.work < 100_000
-    cost = MpcCost(PROCESSOR.name, "gcc 12", single, 20_000, 0, found)
+    cost = Cost(PROCESSOR.name, "gcc 12", single, 20_000, found)
     text = mpc_figures_text([cost], time_here(packages[law]))
     assert f"| {found.instructions} |" in text
-    assert '"stack_B"' in with_mpc_figures(packages[law].files["tireid_mpc.json"], [cost])
+    assert '"stack_B"' in with_figures(packages[law].files["tireid_mpc.json"], [cost])

@@ -12,7 +12,7 @@ from mpc.handover.certificate import law_complaint, tire_complaint
 from mpc.handover.road import at_friction
 from mpc.handover.supervisor import Excitation, slips
 from mpc.tires import PredictionTire, oracle_tire, prediction_tire
-from mpc.tires.tire import no_lag, wheel_slip
+from mpc.tires.tire import TireStructure
 
 
 def edited(tire, axle, change):
@@ -48,7 +48,7 @@ def test_what_is_no_tire_is_refused(tire, axle, change, complaint):
 
 
 @dataclass(frozen=True)
-class Spoiled:
+class Spoiled(TireStructure):
     """A good tire but for one axle, one sign of its slip, and bends to one side (0: straight)."""
 
     axle: int
@@ -56,10 +56,6 @@ class Spoiled:
     turn: float
     kind: str
     n_weights: int = 1
-    lagged: bool = False
-
-    slip = wheel_slip
-    lag_length = no_lag
 
     def force(self, slip, at):
         car = at.car

@@ -7,9 +7,11 @@ from identifier.axle import AxleIdentifier
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from mpc.cars import DoubleTrackCar
-from mpc.handover import Learner, Supervisor
+from mpc.handover.learner import Learner
 from mpc.handover.road import at_friction
-from mpc.loop import drive, inertial_unit
+from mpc.handover.supervisor import Supervisor
+from mpc.loop.drive import drive
+from mpc.loop.sensing import inertial_unit
 from mpc.path import iso_3888_1
 from mpc.realtime import Measurement, Tracker
 from mpc.tires import prediction_tire

@@ -11,10 +11,11 @@ from identifier.paper.network import Network
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer, Slalom
-from mpc.handover import Rules, Supervisor, Verdict
 from mpc.handover import supervisor as supervisor_module
 from mpc.handover.judge import ChiSquare, Judge
 from mpc.handover.road import at_friction
+from mpc.handover.rules import Rules, Verdict
+from mpc.handover.supervisor import Supervisor
 from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import DROP, drive, samples_of
 

@@ -9,7 +9,7 @@ from models.faults import SensorFault
 from models.friction import Friction, FrictionChange
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import drive
+from mpc.loop.drive import drive
 from mpc.loop.sensing import FaultySensors, cornering_limit, inertial_unit
 from mpc.path import iso_3888_1, slalom, steady_speed
 from mpc.realtime import Tracker

@@ -8,7 +8,7 @@ import pytest
 import tireid as ti
 from codegen import find_compiler
 from models.vehicle import sedan
-from mpc.loop import Dither
+from mpc.loop.dither import Dither
 from mpc.realtime.instance import Measurement
 from tireid.driving.runs import unknown_of
 
@@ -92,5 +92,5 @@ def test_a_car_that_weaves_learns_more_and_keeps_within_it():
 
 @pytest.mark.parametrize("dither", [-0.1, 0.6, math.nan])
 def test_a_weave_that_is_none_is_refused(dither):
-    with pytest.raises(ValueError, match=r"dither must be 0 to 0.5 m"):
+    with pytest.raises(ValueError, match=r"dither in m must lie between 0 and 0\.5"):
         ti.drive(ti.paths.iso_3888_2(), CAR, speed=10.0, dither=dither)

@@ -10,17 +10,9 @@ from models.friction import Friction
 from models.sensors import Sensor, SensorError
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import (
-    COMPLETED,
-    CarSensors,
-    FaultySensors,
-    Measured,
-    SpeedProfile,
-    drive,
-    inertial_unit,
-    scores,
-)
-from mpc.loop.drive import GUIDES
+from mpc.loop.drive import COMPLETED, GUIDES, drive
+from mpc.loop.record import scores
+from mpc.loop.sensing import CarSensors, FaultySensors, Measured, SpeedProfile, inertial_unit
 from mpc.path.path import Path
 from mpc.realtime import Command
 

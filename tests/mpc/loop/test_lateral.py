@@ -14,20 +14,13 @@ from models.faults import FaultError, SensorFault
 from models.friction import Friction, FrictionChange
 from models.recordings import Recording
 from models.vehicle import GRAVITY, sedan
-from mpc.cars import DoubleTrackCar
-from mpc.cars.car import CarState
-from mpc.handover import Learner, Supervisor
-from mpc.loop import (
-    CarSensors,
-    FaultySensors,
-    LateralVelocity,
-    Localization,
-    Measured,
-    Told,
-    drive,
-    imu_and_localization,
-    told_scores,
-)
+from mpc.cars import CarState, DoubleTrackCar
+from mpc.handover.learner import Learner
+from mpc.handover.supervisor import Supervisor
+from mpc.loop.drive import drive
+from mpc.loop.lateral import LateralVelocity, Localization, Told
+from mpc.loop.record import told_scores
+from mpc.loop.sensing import CarSensors, FaultySensors, Measured, imu_and_localization
 from mpc.path import Path, iso_3888_1
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire

@@ -5,7 +5,7 @@ import pytest
 
 from models.tires import FialaTire, MagicFormula
 from models.vehicle import GRAVITY, sedan
-from mpc.loop import cornering_limit
+from mpc.loop.sensing import cornering_limit
 from mpc.tires.ladder import cornering_force
 
 SLIPS = np.linspace(0.005, 0.4, 200)

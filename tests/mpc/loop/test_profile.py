@@ -5,7 +5,7 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import SpeedProfile
+from mpc.loop.sensing import SpeedProfile
 from mpc.path.path import Path
 
 GAIN = 2.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.sensors import Sensor
-from mpc.loop import CarSensors, Measured
+from mpc.loop.sensing import CarSensors, Measured
 
 NAMES = list(Measured._fields[1:])
 STATE = SimpleNamespace(t=1.5, **{name: 0.37 * (k + 1) for k, name in enumerate(NAMES)})

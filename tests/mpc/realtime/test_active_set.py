@@ -5,6 +5,7 @@ import ctypes
 import numpy as np
 import pytest
 
+from benchmarks.converged import iterated, solve
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker, instance
 from mpc.tires.tire import valid_slip
@@ -19,7 +20,7 @@ def near_a_plan(tracker, seed, size=1.0):
     x0 = np.zeros(tracker.instance.start.size)
     x0[:5] = size * np.array([0.5, 0.08, 0.3, 0.1, 0.05]) * rng.uniform(-1.0, 1.0, 5)
     kappa, v_x = (np.full(tracker.problem.horizon, x) for x in (0.012 * x0[0], 18.0 + 4.0 * x0[1]))
-    tracker.solve_converged(x0, kappa, v_x)
+    iterated(tracker, x0, kappa, v_x)
     x0[:4] += size * np.array([0.02, 0.004, 0.03, 0.05]) * rng.standard_normal(4)
     return x0, kappa, v_x
 
@@ -43,7 +44,7 @@ def solved(tracker, at, *, switched=0):
     """The command after a solution that switched so many rows; the plan stays."""
     before = tracker.instance.state.copy()
     tracker.instance.state["switched"] = switched
-    command = tracker.solve(*at)
+    command = solve(tracker, *at)
     tracker.instance.state[...] = before
     return command
 
@@ -77,7 +78,7 @@ def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
     tracker = Tracker(tire, problem)
     x0 = np.zeros(tracker.instance.start.size)
     at = (x0, np.full(problem.horizon, 0.06), np.full(problem.horizon, 8.0))
-    tracker.solve_converged(*at)
+    iterated(tracker, *at)
     again = solved(tracker, at)
     assert (again.status, again.iterations) == (Status.OK, 1)
     assert np.sum(again.plan_x[1:, 4] >= problem.limits.steering * (1.0 - 1e-9)) > 5
@@ -87,11 +88,11 @@ def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
 def test_a_step_says_how_many_rows_it_switched(tire, problem):
     tracker = Tracker(tire, problem)
     at = near_a_plan(tracker, 3)
-    tracker.solve_converged(*at)
+    iterated(tracker, *at)
     assert tracker.instance.state["switched"] == 0
     thrown = at[0].copy()
     thrown[0] -= 3.0 * np.sign(thrown[0])
-    tracker.solve(thrown, *at[1:])
+    solve(tracker, thrown, *at[1:])
     assert tracker.instance.state["switched"] > problem.horizon // 5
 
 
@@ -136,7 +137,7 @@ def test_no_set_is_tried_where_the_car_is_thrown_off_its_plan(counting):
     tracker = counting()
     x0 = np.zeros(tracker.instance.start.size)
     at = (x0, np.zeros(tracker.problem.horizon), np.full(tracker.problem.horizon, 18.0))
-    tracker.solve_converged(*at)
+    iterated(tracker, *at)
     near, thrown = x0.copy(), x0.copy()
     near[0], thrown[0] = 0.001, 2.0
     assert factorized(tracker, (near, *at[1:]))[0] == 1

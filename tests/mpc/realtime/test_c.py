@@ -9,7 +9,7 @@ import pytest
 from benchmarks.mpc_stress import sanitized, stress
 from codegen import find_compiler
 from mpc.realtime.c_source import c_sources
-from mpc.realtime.instance import N_COMMANDS, N_STATUSES, Status
+from mpc.realtime.instance import N_COMMANDS, Status
 
 ABOUT = {"title": "A test", "version": "0", "hash": "0", "version_text": "0"}
 WARNINGS = ("all", "extra", "pedantic", "conversion", "shadow", "double-promotion")
@@ -56,8 +56,7 @@ def test_the_header_says_what_python_believes(lagging_files):
     told = dict(re.findall(r"ANY_NAME_(\w+) = (\d+)", header))
     assert {name: int(value) for name, value in told.items()} == {s.name: s.value for s in Status}
     assert f"ANY_NAME_COMMANDS {N_COMMANDS}U" in header
-    assert f"ANY_NAME_STATUSES {N_STATUSES}U" in header
-    assert len(Status) == N_STATUSES
+    assert f"ANY_NAME_STATUSES {len(Status)}U" in header
 
 
 @needs_compiler

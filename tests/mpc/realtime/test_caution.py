@@ -297,7 +297,7 @@ def test_a_sample_that_is_no_number_leaves_what_is_believed_as_it_was(lagging):
 
 
 def test_caution_is_a_share(lagging):
-    with pytest.raises(ValueError, match=r"caution must be from 0 to 1, it is 1\.5"):
+    with pytest.raises(ValueError, match=r"caution must lie between 0 and 1, it is 1\.5"):
         make(lagging, 1.5)
     with pytest.raises(ValueError, match="it is nan"):
         make(lagging, np.nan)

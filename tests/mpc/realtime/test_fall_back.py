@@ -13,12 +13,12 @@ from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.export.package import build_mpc_package
-from mpc.loop import drive
+from mpc.loop.drive import drive
 from mpc.path.path import Path
 from mpc.problem import Problem
 from mpc.realtime import Guards, Measurement, Status, Tracker
 from mpc.realtime.fall_back import fall_back, feedback, motion, steady_turn
-from mpc.realtime.instance import input_type, params_type, state_type
+from mpc.realtime.instance import c_types
 from mpc.tires import prediction_tire
 
 CAR = sedan()
@@ -158,9 +158,10 @@ class Exported:
         words = [*find_compiler(), *flags, f"-I{folder / 'include'}", *sources]
         subprocess.run([*words, "-lm", "-o", str(folder / "tracker.so")], check=True)
         self.library = ctypes.CDLL(str(folder / "tracker.so"))
-        self.params = np.zeros((), params_type(2, single=False))
-        self.state = np.zeros((), state_type(PROBLEM.horizon, 5, single=False))
-        self.input = np.zeros((), input_type(PROBLEM.horizon, single=False))
+        types = c_types(package.tire.structure, PROBLEM.horizon, single=False)
+        self.params, self.state, self.input = (
+            np.zeros((), types[name]) for name in ("params", "state", "input")
+        )
         self.work, self.steering = np.zeros(100_000, np.uint8), np.zeros(1)
         assert self.library.tireid_mpc_default_params(self.at(self.params)) == 0
         self.params["hold_time"] = 0.0

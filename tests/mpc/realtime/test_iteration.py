@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from benchmarks.converged import iterated, solve
 from mpc.prediction import build_end, build_stage
 from mpc.realtime import Status, Tracker
 from mpc.tires.tire import valid_slip
@@ -95,7 +96,7 @@ def test_an_iteration_solves_the_linearized_problem(tire, problem, seed):
     kappa, v_x = 0.01 * rng.standard_normal(N), 18.0 + rng.uniform(0.0, 4.0, N)
     wanted = dense_solution(tire, problem, plan_x, plan_u, kappa, v_x)
     state["x"], state["u"] = plan_x, plan_u
-    command = tracker.solve(plan_x[0], kappa, v_x)
+    command = solve(tracker, plan_x[0], kappa, v_x)
     assert command.status == Status.OK
     np.testing.assert_allclose(command.plan_u, wanted, atol=1e-5)
 
@@ -104,7 +105,7 @@ def test_the_cases_have_active_limits(tire, problem):
     tracker = Tracker(tire, problem)
     x0 = np.zeros(tracker.instance.state["x"].shape[1])
     x0[:2] = 0.9, 0.15
-    plan = tracker.solve(x0, 0.0, 20.0)
+    plan = solve(tracker, x0, 0.0, 20.0)
     assert np.abs(plan.plan_u).max() == pytest.approx(problem.limits.steering_rate, rel=1e-6)
 
 
@@ -112,7 +113,7 @@ def test_too_few_iterations_are_said(tire, problem):
     tracker = Tracker(tire, problem, max_iterations=2)
     x0 = np.zeros(tracker.instance.state["x"].shape[1])
     x0[0] = 0.9
-    plan = tracker.solve(x0, 0.0, 20.0)
+    plan = solve(tracker, x0, 0.0, 20.0)
     assert plan.status == Status.ITERATION_LIMIT
     assert plan.iterations == 2
     assert np.abs(plan.plan_u).max() <= problem.limits.steering_rate  # kept all the same
@@ -121,20 +122,20 @@ def test_too_few_iterations_are_said(tire, problem):
 def test_what_is_not_finite_fails_and_leaves_the_plan(tire, problem):
     tracker = Tracker(tire, problem)
     x0 = np.zeros(tracker.instance.state["x"].shape[1])
-    before = tracker.solve(x0, 0.001, 20.0)
+    before = solve(tracker, x0, 0.001, 20.0)
     kappa = np.full(problem.horizon, 0.001)
     kappa[3] = np.nan
-    failed = tracker.solve(x0, kappa, 20.0)
+    failed = solve(tracker, x0, kappa, 20.0)
     assert failed.status == Status.QP_FAILED
     np.testing.assert_array_equal(failed.plan_u, before.plan_u)
-    assert tracker.solve(x0, 0.001, 20.0).status == Status.OK  # nothing of it stays
+    assert solve(tracker, x0, 0.001, 20.0).status == Status.OK  # nothing of it stays
 
 
 def test_float_finds_nearly_the_same(tire, problem):
     x0 = np.zeros(7 if tire.structure.lagged else 5)
     x0[:2] = 0.4, 0.05
     double, single = (
-        Tracker(tire, problem, single=is_single).solve_converged(x0, 0.004, 20.0, most=8)
+        iterated(Tracker(tire, problem, single=is_single), x0, 0.004, 20.0, most=8)
         for is_single in (False, True)
     )
     np.testing.assert_allclose(single.plan_u, double.plan_u, atol=0.02)
@@ -147,14 +148,14 @@ def test_feedback_makes_one_iteration_answer_a_jump_nearly_as_convergence_does(l
     misses = []
     for _ in range(20):
         x0 = np.array([0.1, 0.0, 0.2, 0.3, 0.05, 0.05, 0.05])
-        before = tracker.solve_converged(x0, kappa, 20.0).plan_u
+        before = iterated(tracker, x0, kappa, 20.0).plan_u
         settled = state.copy()
         x0[:4] += [0.02, 0.004, 0.05, 0.01] * rng.standard_normal(4)
-        with_feedback = tracker.solve(x0, kappa, 20.0).plan_u
+        with_feedback = solve(tracker, x0, kappa, 20.0).plan_u
         state[...] = settled
         state["feedback"], state["guessed"] = 0.0, 1  # the classical iteration, along the old plan
-        without = tracker.solve(x0, kappa, 20.0).plan_u
-        best = tracker.solve_converged(x0, kappa, 20.0).plan_u
+        without = solve(tracker, x0, kappa, 20.0).plan_u
+        best = iterated(tracker, x0, kappa, 20.0).plan_u
         asked = np.abs(best - before).max()
         misses.append([np.abs(u - best).max() / asked for u in (with_feedback, without)])
     with_feedback, without = np.median(misses, axis=0)

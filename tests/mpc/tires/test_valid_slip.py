@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from benchmarks.converged import iterated
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.tires import FialaTire
 from models.vehicle import sedan
@@ -117,7 +118,7 @@ def test_the_tracker_believes_what_is_of_use_of_the_tire_that_it_is_told():
 def test_the_c_predicts_with_curves_that_rise(oracle):
     tracker = Tracker(oracle, Problem(horizon=10, dt=0.02))
     x0, n = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.3, 0.0]), 10  # far beyond the peak
-    plan = tracker.solve_converged(x0, np.zeros(n), np.full(n, 15.0))
+    plan = iterated(tracker, x0, np.zeros(n), np.full(n, 15.0))
     step = build_rk4(oracle.structure)
     misses = []
     for valid in (valid_slip(oracle, tracker.problem.limits.slip), ALL):
