@@ -181,13 +181,14 @@ GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 #
 # Inertia: a car that swings about one axle leaves the other at rest where I_z = m l_f l_r. The cars
 # of CommonRoad (Ford Escort, BMW 320i, VW Vanagon) have 0.94, 1.00 and 1.10 of it, a sedan of
-# CarMaker 0.99. A scale model has less: 0.4 for one of 1:10.
+# CarMaker 0.99. A scale model has less: 0.41 and 0.46 for two of 1:10, 0.71 for one of 1:43.
 # Stiffness: the middle of the 12 to 20 static loads per rad that passenger cars have, on the soft
 # side, as on a road that is not of the best; 0.25 of the load a degree.
 
+MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
 STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
 RULES = {
-    "yaw_inertia": "mass l_f l_r",
+    "yaw_inertia": f"mass l_f l_r, {MODEL_INERTIA:g} of it for a model car",
     "cornering_stiffness_front": f"{STIFFNESS_SHARE:g} static axle loads per rad",
     "cornering_stiffness_rear": f"{STIFFNESS_SHARE:g} static axle loads per rad",
 }
@@ -241,7 +242,7 @@ __all__ = [
 
 
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
-    """Return yaw inertia and cornering stiffnesses of a road car of that size, by `RULES`.
+    """Return yaw inertia and cornering stiffnesses of a car of that size, by `RULES`.
 
     Parameters
     ----------
@@ -256,7 +257,7 @@ def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
     _require_size(mass, l_f, l_r)
     weight, wheelbase = mass * GRAVITY, l_f + l_r
     return {
-        "yaw_inertia": mass * l_f * l_r,
+        "yaw_inertia": mass * l_f * l_r * (MODEL_INERTIA if wheelbase < FULL_SIZE else 1.0),
         "cornering_stiffness_front": STIFFNESS_SHARE * weight * l_r / wheelbase,
         "cornering_stiffness_rear": STIFFNESS_SHARE * weight * l_f / wheelbase,
     }

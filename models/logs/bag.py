@@ -5,6 +5,7 @@ its header, and where there is none (or it is not set) the time at which the bag
 counts from the first message that is read of any topic.
 """
 
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -15,8 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.logs.bounded import bounded
 from models.logs.cdr import (
+    ORDERS,
+    PREFIX,
     CdrError,
     Definitions,
     Field,
@@ -101,21 +105,35 @@ class _Topic(NamedTuple):
     zero: int
 
 
-_Place = tuple[_Topic, Field]  # where a channel is
+class _Moving(NamedTuple):
+    """A frame of /tf in another, by name: t (n,) [ns], translation and rotation (n, 7)."""
+
+    name: str
+    t: NDArray[np.int64]
+    values: Array
+
+
+_Place = tuple[_Topic, Field] | tuple[_Moving, int]  # where a channel is
+TF = "tf2_msgs/msg/TFMessage"
+OF_TF = tuple(
+    f"{a}.{b}" for a, some in (("translation", "xyz"), ("rotation", "xyzw")) for b in some
+)
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
-    """List the channels of a bag.
-
-    Raises
-    ------
-    RecordingError
-        One line, where it is no such bag or no message in it has numbers.
-    """
+    """List the channels of a bag."""
     with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
         definitions, undefined = _definitions(path, bag)
         topics, rates, skipped = _topics(bag, definitions)
-    found = []
+        moving = _moving(path, bag)
+    first = min((int(one.t[0]) for one in moving), default=0)
+    zero = min((topic.zero for topic in topics if topic.stamp), default=first)
+    found: list[tuple[str, Listed, _Place]] = [
+        (TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
+                    rate=typical_rate((one.t - one.t[0]) / NS)), (one, k))
+        for one in moving
+        for k, field in enumerate(OF_TF)
+    ]  # fmt: skip
     for topic in topics:
         for field in topic.fields:
             name = f"{topic.name}/{field.path}"
@@ -130,25 +148,79 @@ def open_(path: Path) -> GroupedLog[_Place]:
         "message",
         found,
         _said(topics, {**undefined, **skipped}),
-        partial(_samples, path, definitions),
+        partial(_samples, path, definitions, zero),
         missing="message with numbers",
     )
 
 
 def _samples(
-    path: Path, definitions: Definitions, asked: Sequence[tuple[Listed, _Place]]
+    path: Path, definitions: Definitions, zero: int, asked: Sequence[tuple[Listed, _Place]]
 ) -> list[Samples]:
-    """Read fields of messages, topic by topic."""
+    """Read fields of messages, topic by topic; times of frames count from `zero` [ns]."""
     fields: dict[_Topic, dict[str, Field]] = {}
-    for listed, (topic, field) in asked:
-        fields.setdefault(topic, {})[listed.name] = field
+    frames: dict[str, tuple[_Moving, dict[str, Array]]] = {}
+    for listed, place in asked:
+        if isinstance(place[0], _Moving):
+            moving, k = place[0], place[1]
+            frames.setdefault(moving.name, (moving, {}))[1][listed.name] = moving.values[:, k]
+        else:
+            fields.setdefault(place[0], {})[listed.name] = place[1]
+    done = [Samples(one.name, (one.t - zero) / NS, values) for one, values in frames.values()]
     readings = {
         topic.name: _Reading(path, definitions, topic, some) for topic, some in fields.items()
     }
     with _opened(path) as bag:
         for name, received, raw in _messages(bag, list(fields)):
             readings[name].add(received, raw)
-    return [reading.finish() for reading in readings.values()]
+    return [*done, *(reading.finish() for reading in readings.values())]
+
+
+def _moving(path: Path, bag: Any) -> list[_Moving]:
+    """Return the frames of /tf that move."""
+    found: dict[str, tuple[list[int], list[tuple[float, ...]]]] = {}
+    count = 0
+    for connection, _, raw in bag.messages([c for c in bag.connections if c.msgtype == TF]):
+        for name, ns, values in _transforms(raw):
+            times, rows = found.setdefault(f"{connection.topic}/{name}", ([], []))
+            times.append(ns)
+            rows.append(values)
+            count += 1
+        require_few(RecordingError, str(path), count, "samples", "transforms")
+    return [
+        _Moving(name, np.array(times), np.array(rows))
+        for name, (times, rows) in found.items()
+        if len(set(rows)) > 1
+    ]
+
+
+def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
+    """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
+
+    It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
+    """
+    order, place = ORDERS.get(bytes(raw[:2])), PREFIX
+    if order is None:
+        raise CdrError("a message is not plain CDR")
+
+    def read(form: str, size: int) -> tuple[Any, ...]:
+        nonlocal place
+        place += -(place - PREFIX) % size
+        values = struct.unpack_from(order + form, raw, place)
+        place += struct.calcsize(order + form)
+        return values
+
+    def text() -> str:
+        nonlocal place
+        (length,) = read("I", 4)
+        place += length
+        return (
+            bytes(raw[place - length : place]).rstrip(b"\0").decode("utf-8", "replace").strip("/")
+        )
+
+    for _ in range(read("I", 4)[0]):
+        seconds, nanoseconds = read("iI", 4)
+        name = f"{text()}->{text()}"
+        yield name, seconds * 1_000_000_000 + nanoseconds, read("7d", 8)
 
 
 def _plugin(path: Path) -> str:

@@ -23,14 +23,7 @@ DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 
 @contextmanager
 def bounded(path: Path) -> Iterator[None]:
-    """Let rosbags read with limits.
-
-    Raises
-    ------
-    RecordingError
-        Where a file of a bag unpacks to more than is allowed, or its metadata are deep; chunks are
-        refused when they are read.
-    """
+    """Let rosbags read with limits."""
     reader, mcap, sqlite = (
         need(path, f"rosbags.rosbag2.{name}", "ROS 2 bags", "ros")
         for name in ("reader", "storage_mcap", "storage_sqlite3")

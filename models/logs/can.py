@@ -5,6 +5,7 @@ values that the DBC names as not available or invalid are NaN.
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
 from models.logs.foreign import need, one_line
-from models.logs.frames import EXTENDED, Frames, gather
+from models.logs.frames import EXTENDED, FROM_ALL, Frames, Known, gather, group_of
 from models.logs.grouped import GroupedLog, Samples
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import HEAD, frames_in
@@ -78,6 +79,7 @@ class _Dbc(NamedTuple):
     """
 
     messages: dict[int, Any]
+    known: Known
     faults: dict[tuple[str, str], str]
 
 
@@ -95,13 +97,7 @@ def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
 
 
 def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
-    """Read the frames of a log that a DBC knows and list their signals.
-
-    Raises
-    ------
-    RecordingError
-        One line, where the log or the DBC cannot be read, or they have no frame in common.
-    """
+    """Read the frames of a log that a DBC knows and list their signals."""
     if dbc is None:
         raise RecordingError(
             f"{path}: holds frames of a bus; give the DBC file that tells their signals, in the "
@@ -112,10 +108,13 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
         with path.open("rb") as file:
             kind = frames_in(file.read(HEAD))
         if not kind:
-            raise RecordingError(f"{path}: is no CAN log: neither ASC, BLF, candump, TRC nor MDF4")
-        log = gather(path, kind, {key: one.length for key, one in told.messages.items()})
+            raise RecordingError(
+                f"{path}: is no CAN log: neither ASC, BLF, candump, TRC, a table of frames nor MDF4"
+            )
+        log = gather(path, kind, told.known)
+        senders = Counter((bus, told.known.named(one)) for bus, one in log.frames)
         found = [
-            (f"bus {bus}", listed, place)
+            (_group(bus, identifier, senders[bus, told.known.named(identifier)]), listed, place)
             for (bus, identifier), frames in log.frames.items()
             for listed, place in _channels(told, identifier, frames)
         ]
@@ -134,9 +133,16 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     )
 
 
+def _group(bus: str, identifier: int, senders: int) -> str:
+    """Return what frames are said to be of: their bus and, of several senders of J1939, which."""
+    return f"bus {bus}" + f" from {identifier & 0xFF:02X}" * (senders > 1)
+
+
 def _channels(told: _Dbc, identifier: int, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
     """Yield the signals that are sent in the frames of a message."""
-    message = told.messages[identifier]
+    named = told.known.named(identifier)
+    assert named is not None
+    message = told.messages[named]
     groups: dict[tuple[tuple[str, tuple[int, ...]], ...], _Group] = {}
     for signal in message.signals:
         selectors = _selectors(message, signal)
@@ -182,7 +188,15 @@ def _read_dbc(path: Path) -> _Dbc:
         for signal in message.signals
         if (fault := _fault(message, signal))
     }
-    return _Dbc(messages, faults)
+    attributes = found.dbc.attributes if found.dbc else {}
+    j1939 = "ProtocolType" in attributes and attributes["ProtocolType"].value == "J1939"
+    groups = {
+        group_of(key): key
+        for key, one in messages.items()
+        if key & EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == FROM_ALL)
+    }
+    widths = {key: one.length for key, one in messages.items()}
+    return _Dbc(messages, Known(widths, groups), faults)
 
 
 def _fault(message: Any, signal: Any) -> str:

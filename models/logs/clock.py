@@ -39,7 +39,6 @@ class Raw(NamedTuple):
     """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand.
 
     holes : how many cells without a value were cut out.
-    mended : what was mended in its clock, one sentence each.
     """
 
     t: Array
@@ -47,7 +46,6 @@ class Raw(NamedTuple):
     place: str
     rows: NDArray[np.int64]
     holes: int = 0
-    mended: tuple[str, ...] = ()
 
 
 def holes(channel: Channel) -> NDArray[np.intp]:

@@ -12,12 +12,13 @@ from typing import Any
 
 from models.logs.log import LogFile, RecordingError
 from models.logs.magic import GZIP, HEAD, format_of
+from models.logs.table import TableLog
 
 # Endings of names that logs have; "LOG:RUN" is split after one, and a recording's name lacks it.
 TEXTS = (".csv", ".txt", ".dat", ".asc", ".tsv", ".vbo", ".log")  # which gzip may pack
 ENDINGS = (
     *TEXTS, *(ending + ".gz" for ending in TEXTS), ".parquet", ".mat", ".h5", ".hdf5", ".mf4",
-    ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc",
+    ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".npz", ".npy",
 )  # fmt: skip
 OPENERS = {
     "parquet": "models.logs.parquet:open_parquet",
@@ -27,9 +28,19 @@ OPENERS = {
     "can": "models.logs.can:open_",
     "text": "models.logs.text:open_text",
 }
+JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
+RATED = ("text", "parquet", "matlab")  # which may lack a time
 
 
-def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = False) -> LogFile:
+def open_log(
+    path: str | Path,
+    dbc: str | Path | None = None,
+    *,
+    mend: bool = False,
+    clock: str = "",
+    clock_unit: str = "",
+    rate: float = 0.0,
+) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
 
     Parameters
@@ -37,6 +48,8 @@ def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = Fa
     path : of a file; of a folder, where a format keeps a log in one.
     dbc : of the file that tells the signals in the frames of a CAN bus.
     mend : whether stamps that do not rise are mended, and not refused.
+    clock, clock_unit : channel that is the time, where it is not what the format takes for it.
+    rate : of the samples [Hz], where no channel is a time; 0 where none is told.
     """
     path = Path(path)
     if not path.exists():
@@ -45,19 +58,50 @@ def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = Fa
         head = _head(path)
         packed = head.startswith(GZIP)
         format = format_of(path, _unpacked(head) if packed else head)
-        if path.is_dir() and format == "text":
-            raise RecordingError(f"{path}: there is no such file, it is a folder")
-        told = () if dbc is None else (Path(dbc),)
+        told: tuple[Any, ...] = () if dbc is None else (Path(dbc),)
         if packed and (told or format != "text"):
             raise RecordingError(
                 f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
             )
-        module, _, function = OPENERS["can" if told else format].partition(":")
-        opened: Any = getattr(import_module(module), function)(path, *told)
-        log: LogFile = replace(opened, mend=mend)
+        if format == "folder":
+            inside: dict[Path, LogFile | RecordingError] = {}
+            for one in sorted(path.iterdir()):
+                if one.is_file() and one.name.lower().endswith(ENDINGS):
+                    inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
+            joined: LogFile = _function(JOINED)(path, inside)
+            return joined
+        format = "can" if told else format
+        if rate and format not in RATED:
+            raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
+        told += (rate,) * (format == "matlab")
+        opened: Any = _function(OPENERS[format])(path, *told)
+        if isinstance(opened, TableLog) and opened.may_be_long:
+            opened = _function(LONG)(opened.table) or opened
+        more = {"rate": rate} if isinstance(opened, TableLog) else {}
+        log: LogFile = replace(opened, mend=mend, clock_name=clock, clock_unit=clock_unit, **more)
         return log
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _function(place: str) -> Any:
+    """Import a function by its place."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
+def _of_folder(
+    path: Path, mend: bool, clock: str, clock_unit: str, rate: float
+) -> LogFile | RecordingError:
+    """Return a log of a folder, of which the clock may be that of another, or why it is none."""
+    try:
+        log = open_log(path, mend=mend)
+        if isinstance(log, TableLog) and (clock in log.names or rate):
+            log = replace(log, clock_name=clock, clock_unit=clock_unit, rate=rate)
+        log.listed()
+        return log
+    except RecordingError as error:
+        return error
 
 
 def _head(path: Path) -> bytes:

@@ -30,13 +30,7 @@ LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 
 def need(path: Path, module: str, format: str, extra: str) -> Any:
-    """Import what reads a format.
-
-    Raises
-    ------
-    RecordingError
-        Where it is not installed: how to install it.
-    """
+    """Import what reads a format."""
     library = module.partition(".")[0]
     try:
         with _quiet():

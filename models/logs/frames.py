@@ -1,14 +1,19 @@
-"""Frames of a CAN bus as logs keep them: ASC, BLF, candump, TRC and MDF4 with a bus in it.
+"""Frames of a CAN bus as logs keep them: ASC, BLF, candump, TRC, tables in text, MDF4 with a bus.
 
 Frames are gathered by bus and identifier, times beside bytes; what is no data frame, or not in the
-database, is counted.
+database, is counted. Those of J1939 are known by their parameter group: priority and addresses of
+the sender, and of the receiver where the group has one, may differ from the database's.
 """
 
+import csv
+import math
+import re
 import struct
 import zlib
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
+from codegen.escape import shown
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
 from models.logs.mdf_blocks import is_bus, opened
-from models.logs.stamps import CALENDAR, since
+from models.logs.stamps import CALENDAR, nanoseconds, since
 from models.schema import require_few
 
 FRAME = "CAN_DataFrame"  # of MDF
@@ -37,6 +43,33 @@ METHOD = struct.Struct("<H14x")  # of a container, before its data
 FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
 Key = tuple[str, int]  # bus, identifier with EXTENDED
+FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
+
+
+def group_of(identifier: int) -> int:
+    """Return the parameter group of J1939 that a long identifier is of."""
+    group = (identifier >> 8) & 0x3FFFF
+    return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00  # else it has a receiver
+
+
+@dataclass(frozen=True)
+class Known:
+    """The frames of a database.
+
+    Parameters
+    ----------
+    widths : how many bytes they have, by identifier with `EXTENDED`.
+    groups : parameter group of J1939 -> identifier of it in the database.
+    """
+
+    widths: Mapping[int, int]
+    groups: Mapping[int, int]
+
+    def named(self, identifier: int) -> int | None:
+        """Return the identifier by which the database knows a frame; None where it does not."""
+        if identifier in self.widths:
+            return identifier
+        return self.groups.get(group_of(identifier)) if identifier & EXTENDED else None
 
 
 class Frames(NamedTuple):
@@ -109,18 +142,8 @@ class Log(NamedTuple):
     others: Counter[str]
 
 
-def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
-    """Read the frames of a log.
-
-    Parameters
-    ----------
-    known : by identifier, with `EXTENDED`, how many bytes its frames have.
-
-    Raises
-    ------
-    RecordingError
-        Where there are more than is allowed, or the file is cut off.
-    """
+def gather(path: Path, kind: str, known: Known) -> Log:
+    """Read the frames of a log."""
     if kind == "MDF4":
         return _of_mdf(path, known)
     found: dict[Key, _Gathered] = {}
@@ -130,14 +153,14 @@ def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
         identifier = message.arbitration_id | (EXTENDED if message.is_extended_id else 0)
         if message.is_error_frame or message.is_remote_frame:
             others["error and remote"] += 1
-        elif identifier not in known:
+        elif (named := known.named(identifier)) is None:
             others["unknown"] += 1
-        elif len(message.data) < known[identifier]:
+        elif len(message.data) < (width := known.widths[named]):
             others["cut short"] += 1
         else:
             key = str(message.channel), identifier
             if key not in found:
-                found[key] = _Gathered(known[identifier])
+                found[key] = _Gathered(width)
             found[key].add(message.timestamp, message.data)
             count += 1
             if count % TOGETHER == 0:
@@ -152,6 +175,9 @@ def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
     """Yield the messages of a log."""
+    if kind in ("CSV", "candump text"):
+        yield from _of_table(path) if kind == "CSV" else _of_lines(path)
+        return
     io = need(path, "can.io", "CAN logs", "can")
     if kind == "BLF":
         _require_whole_blf(path)
@@ -168,6 +194,96 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
                     "timestamps absolute"
                 )
             yield message
+
+
+class _Frame(NamedTuple):
+    """A frame of a log in text."""
+
+    timestamp: float
+    arbitration_id: int
+    data: bytes
+    channel: str
+    is_extended_id: bool
+    is_error_frame: bool = False
+    is_remote_frame: bool = False
+
+
+_LINE = re.compile(  # of candump without -L: (1600000000.123456)  can0  18F0093E   [8]  01 02 ...
+    r"\s*\((?P<time>[\d.]+|[\d-]+ [\d:.]+)\)\s+(?P<bus>\w+)\s+(?:[RT]X\s[- \w]*\s)?"
+    r"(?P<id>[0-9A-Fa-f]{3,8})\s+\[\d+\]\s+(?P<data>remote request|(?:[0-9A-Fa-f]{2}\s*)*)"
+)
+
+
+def _of_lines(path: Path) -> Iterator[_Frame]:
+    """Yield the frames that candump prints."""
+    before = -math.inf
+    with path.open("r", encoding="latin-1") as text:
+        for number, line in enumerate(text, start=1):
+            found = _LINE.match(line)
+            if found is None:
+                if line.strip():
+                    raise RecordingError(
+                        f"{path}: line {number} has no time in front of its frame; record with "
+                        "candump -L"
+                    )
+                continue
+            ns = None if "." in found["time"][:12] else nanoseconds(found["time"])
+            time = float(found["time"]) if ns is None else ns / 1e9
+            if time < before - 1.0:
+                raise RecordingError(
+                    f"{path}: line {number} is {before - time:.3g} s before the one above: times "
+                    "must count from one instant; record with candump -L"
+                )
+            before = time
+            word = found["id"]
+            remote = found["data"].startswith("remote")
+            data = b"" if remote else bytes.fromhex(found["data"])
+            yield _Frame(time, int(word, 16), data, found["bus"], len(word) > 3, False, remote)
+
+
+_COLUMNS = {  # of tables of frames, by what each is
+    "time": "timestamp time timestampus timestamps t",
+    "id": "id addr address messageid arbitrationid canid identifier",
+    "bus": "bus channel interface",
+    "long": "extended ext ide isextended",
+    "data": "data message payload d1 d0",
+}
+
+
+def _of_table(path: Path) -> Iterator[_Frame]:
+    """Yield the frames of a table in text; identifiers and bytes are hexadecimal."""
+    with path.open("r", encoding="utf-8-sig", errors="replace", newline="") as text:
+        rows = csv.reader(text, delimiter=";" if ";" in text.readline() else ",")
+        text.seek(0)
+        header = [re.sub("[^a-z0-9]", "", one.lower()) for one in next(rows, [])]
+        at = {
+            what: next((header.index(one) for one in names.split() if one in header), -1)
+            for what, names in _COLUMNS.items()
+        }
+        if min(at["time"], at["id"], at["data"]) < 0:
+            lacking = ", ".join(what for what in ("time", "id", "data") if at[what] < 0)
+            raise RecordingError(f"{path}: a table of frames must have a column for {lacking}")
+        many = header[at["data"]] in ("d0", "d1")  # a byte a column
+        decimal = header[at["id"]] in ("addr", "address")
+        for number, row in enumerate(rows, start=2):
+            if not row:
+                continue
+            try:
+                word, cell = row[at["id"]].strip(), row[at["time"]].strip()
+                identifier = int(word, 10 if decimal and word.isdigit() else 16)
+                rest = row[at["data"] :] if many else row[at["data"]].split()
+                data = bytes.fromhex("".join(one.strip().removeprefix("0x") for one in rest))
+                # SavvyCAN counts whole microseconds, all others seconds.
+                time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
+                told = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
+                extended = told in ("true", "1") if told else identifier > SHORT
+                bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"
+            except (ValueError, IndexError):
+                raise RecordingError(
+                    f"{path}: line {number} must hold a frame: time, identifier and bytes in "
+                    f"hexadecimal, not {shown(','.join(row))}"
+                ) from None
+            yield _Frame(time, identifier & IDENTIFIER, data, bus, extended)
 
 
 def _require_whole_blf(path: Path) -> None:
@@ -198,7 +314,7 @@ def _require_whole_blf(path: Path) -> None:
             file.seek(body + length % 4, 1)
 
 
-def _of_mdf(path: Path, known: Mapping[int, int]) -> Log:
+def _of_mdf(path: Path, known: Known) -> Log:
     """Read the frames of the buses that an MDF4 file logs."""
     found: dict[Key, _Gathered] = {}
     others: Counter[str] = Counter()
@@ -279,16 +395,15 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
     )
 
 
-def _sort(
-    part: _Part, known: Mapping[int, int], found: dict[Key, _Gathered], others: Counter[str]
-) -> None:
+def _sort(part: _Part, known: Known, found: dict[Key, _Gathered], others: Counter[str]) -> None:
     """Add frames to those of their bus and identifier."""
     for identifier in np.unique(part.ids).tolist():
         mine = part.ids == identifier
-        if identifier not in known:
+        named = known.named(identifier)
+        if named is None:
             others["unknown"] += int(mine.sum())
             continue
-        width = known[identifier]
+        width = known.widths[named]
         whole = mine & (part.sizes >= width)
         others["cut short"] += int(mine.sum() - whole.sum())
         for bus in np.unique(part.buses[whole]).tolist():

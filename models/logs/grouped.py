@@ -24,7 +24,8 @@ from models.logs.log import (
     one_run,
     some,
 )
-from models.logs.stamps import risen
+from models.logs.stamps import Stamps, risen
+from models.logs.units import TIME, to_si
 from models.schema import require_few
 
 MOST_NOTED = 5  # names that a note lists
@@ -56,6 +57,7 @@ class GroupedLog(Generic[P]):
     samples : reads channels; a list, so that a file is not open any more when it is returned.
     mend : whether stamps that do not rise are mended, and not refused; not a clock of several that
         starts again.
+    clock_name, clock_unit : of the channel that is the time of all; empty leaves each its own.
     """
 
     path: Path
@@ -66,6 +68,8 @@ class GroupedLog(Generic[P]):
     said: tuple[str, ...]
     samples: Callable[[Sequence[tuple[Listed, P]]], list[Samples]]
     mend: bool = False
+    clock_name: str = ""
+    clock_unit: str = ""
     _mended: list[str] = field(default_factory=list, compare=False, repr=False)
 
     @classmethod
@@ -87,11 +91,6 @@ class GroupedLog(Generic[P]):
         Parameters
         ----------
         missing : what the file does not hold where there are none, for the message.
-
-        Raises
-        ------
-        RecordingError
-            Where there is no channel, or too many.
         """
         if not found:
             why = "".join(f"; {one}" for one in (*said, remedy) if one)
@@ -151,6 +150,8 @@ class GroupedLog(Generic[P]):
         run : None.
         """
         one_run(self.path, self.runs(), run)
+        if self.clock_name:
+            return self._timed(names)
         asked = chosen(self.path, names, {one[0].name: one for one in self.channels})
         found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
         with one_line(self.path, self.what):
@@ -176,6 +177,26 @@ class GroupedLog(Generic[P]):
                 )
             )
         return tuple(result)
+
+    def _timed(self, names: Sequence[str]) -> tuple[Channel, ...]:
+        """Return channels on the time that one of them tells."""
+        clock, *found = replace(self, clock_name="").read([self.clock_name, *names])
+        label = f"{self.path}: t (channel {clock.name!r})"
+        t = clock.values * to_si(self.clock_unit or clock.unit, TIME, label)
+        stamps = Stamps(t, ())
+        if self.mend:
+            stamps = risen(str(self.path), "t", t, clock.rows, clock.place, mend=True)
+            self._mended.extend(stamps.notes)
+        for one in found:
+            if one.values.size != clock.values.size:
+                raise RecordingError(
+                    f"{self.path}: {clock.name!r} must have a sample for each of {one.name!r} to "
+                    f"be its time, it has {clock.values.size} of {one.values.size}"
+                )
+        return tuple(
+            replace(one, t=stamps.t, values=stamps.of(one.values), rows=stamps.of(one.rows))
+            for one in found
+        )
 
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:

@@ -58,11 +58,6 @@ class Growing:
         Parameters
         ----------
         values : (n,), which are copied.
-
-        Raises
-        ------
-        RecordingError
-            Where the folder for temporary files has no room, or may not be written to.
         """
         part = np.array(values, dtype=self._dtype)
         self._size += part.size

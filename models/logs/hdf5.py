@@ -22,13 +22,7 @@ LONGEST_TEXT, MOST_TEXTS = 1_000_000, 10_000  # bytes of all texts of a dataset,
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
-    """Return the variables of a file; numbers are read when they are asked for.
-
-    Raises
-    ------
-    RecordingError
-        Where it holds more than is allowed.
-    """
+    """Return the variables of a file; numbers are read when they are asked for."""
     h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
     with h5py.File(path, "r") as file:
         reader = _Reader(path, h5py, file)

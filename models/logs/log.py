@@ -131,13 +131,7 @@ class LogFile(Protocol):
 
 
 def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
-    """Return what is known by names.
-
-    Raises
-    ------
-    RecordingError
-        Where a name is not there: the nearest one, or some that are.
-    """
+    """Return what is known by names."""
     for name in names:
         if name not in known:
             similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
@@ -148,13 +142,7 @@ def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
 
 
 def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
-    """Return the run that is read: the one that is asked for, or the only one; None of none.
-
-    Raises
-    ------
-    RecordingError
-        Where it is not there, or none of several is asked for.
-    """
+    """Return the run that is read: the one that is asked for, or the only one; None of none."""
     if not runs:
         if run is not None:
             raise RecordingError(

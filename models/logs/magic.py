@@ -14,6 +14,7 @@ HDF5, HDF5_PLACES = b"\x89HDF\r\n\x1a\n", (0, 512)  # MATLAB puts a header befor
 MATLAB, MATLAB_ORDERS = b"MATLAB", (b"IM", b"MI")
 SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
 BAG_METADATA = "metadata.yaml"  # in the folder of a bag
+NUMPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"  # an .npz is a ZIP file of .npy
 BLF = b"LOGG"
 FRAMES_IN_TEXT = {
     "ASC": re.compile(
@@ -21,12 +22,26 @@ FRAMES_IN_TEXT = {
     ),
     "candump": re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#"),
     "TRC": re.compile(rb"\s*;\$FILEVERSION="),
+    "candump text": re.compile(
+        rb"\s*(?:\([\d. :-]+\)\s+)?\w+\s+(?:[RT]X\s[- \w]+)?[0-9A-Fa-f]{3,8}\s+\[\d+\]\s"
+    ),
+    # SavvyCAN, cabana, python-can: a table of frames, in which an identifier stands beside bytes.
+    "CSV": re.compile(
+        rb"(?i)(?=[^\n]*(?:\bid\b|\baddr|message_?id|arbitration_id|can_?id))"
+        rb"(?=[^\n]*(?:\bdata\b|\bd[01]\b|\bmessage\b|payload))[^\n]*[,;][^\n]*\n"
+        rb"[^\n]*[,;][\"' ]*(?:0x)?(?:[0-9a-f]{2}[ ,;]?)+[\"' ,;]*\r?\n"
+    ),
 }
 
 
 def is_hdf5(head: bytes) -> bool:
     """Whether a file is HDF5, as MATLAB 7.3 writes it or others do."""
     return any(head[k : k + len(HDF5)] == HDF5 for k in HDF5_PLACES)
+
+
+def is_numpy(head: bytes) -> bool:
+    """Whether a file is an array of NumPy, or an archive of them."""
+    return head.startswith(NUMPY) or (head.startswith(ZIP) and b".npy" in head[:300])
 
 
 def is_mat5(head: bytes) -> bool:
@@ -44,19 +59,19 @@ def frames_in(head: bytes) -> str:
 
 
 def format_of(path: Path, head: bytes) -> str:
-    """Return the reader of a file or folder: "parquet", "mdf", "matlab", "bag", "can" or "text".
+    """Return the reader of a file or folder, as `door.OPENERS` has it, or "folder".
 
     Parameters
     ----------
     head : its first bytes, unpacked; none of a folder.
     """
     if path.is_dir():
-        return "bag" if (path / BAG_METADATA).is_file() else "text"
+        return "bag" if (path / BAG_METADATA).is_file() else "folder"
     if head.startswith(PARQUET) or path.suffix.lower() == ".parquet":
         return "parquet"
     if head.startswith(MDF):
         return "mdf"
-    if is_hdf5(head) or is_mat5(head):
+    if is_hdf5(head) or is_mat5(head) or is_numpy(head):
         return "matlab"
     if head.startswith((SQLITE, MCAP, ROS1)):
         return "bag"

@@ -1,4 +1,4 @@
-"""MATLAB files: version 5 to 7 as they are, 7.3 (which is HDF5) and other HDF5 files by h5py."""
+"""Files of arrays: MATLAB 5 to 7, 7.3 (which is HDF5) and other HDF5 by h5py, and NumPy's."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen.arrays import Array
-from models.logs import hdf5, mat5
+from models.logs import hdf5, mat5, npz
 from models.logs.foreign import one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import HEAD as HEAD_OF_FILE
-from models.logs.magic import MATLAB, is_hdf5, is_mat5
+from models.logs.magic import MATLAB, is_hdf5, is_mat5, is_numpy
 from models.logs.stamps import find_clock, typical_rate
 from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
 from models.logs.units import PER_SECOND
 
 REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
-    "save('log.mat', '-struct', 's')"
+    "save('log.mat', '-struct', 's'); or --rate HZ tells the samples per second"
 )
 
 
@@ -32,27 +32,28 @@ class _Time(NamedTuple):
     rate: float
 
 
-def open_(path: Path) -> GroupedLog[Signal]:
+def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
     """List the channels of a file.
 
-    Raises
-    ------
-    RecordingError
-        One line, where it is no such file or holds no vector with a time.
+    Parameters
+    ----------
+    rate : of vectors without a time beside them [Hz]; 0 takes that which the file tells.
     """
     with path.open("rb") as file:
         head = file.read(HEAD_OF_FILE)
-    if not (is_hdf5(head) or is_mat5(head)):
+    if not (is_hdf5(head) or is_mat5(head) or is_numpy(head)):
         raise RecordingError(
             f"{path}: is not a MATLAB file of version 5, 6, 7 or 7.3; save it with save(..., '-v7')"
         )
     of_matlab = head.startswith(MATLAB)
     format = "MATLAB" if not is_hdf5(head) else "MATLAB 7.3" if of_matlab else "HDF5"
+    format = "NumPy" if is_numpy(head) else format
     what = f"{'an' if format == 'HDF5' else 'a'} {format} file"
     with one_line(path, what):
-        read_tree = mat5.read_tree if format == "MATLAB" else hdf5.read_tree
-        found = signals_of(read_tree(path))
+        read_tree = {"MATLAB": mat5.read_tree, "NumPy": npz.read_tree}.get(format, hdf5.read_tree)
+        found = signals_of(read_tree(path), rate)
         said = (
+            *found.said,
             *noted("not read", found.unread),
             *noted("there is no vector t or time of the same length for", found.clockless),
         )

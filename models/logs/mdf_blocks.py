@@ -44,11 +44,6 @@ def opened(path: Path, format: str) -> Iterator[Any]:
     Parameters
     ----------
     format : that it is read as, for the message where the library is missing.
-
-    Raises
-    ------
-    RecordingError
-        Where its blocks do not fit together.
     """
     asammdf = need(path, "asammdf", format, "mdf")
     _require_ends(path)

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.spelling import without_unit
 from models.logs.stamps import Stamps, risen
+from models.logs.units import TIME, to_si
 
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
+EVEN = "(even)"  # a time that a rate makes
 NANOSECONDS = 1e9  # of a second
 
 
@@ -24,15 +27,21 @@ class ArrayLog:
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
+    clock_unit : of it, where it is numbers; empty are seconds.
     mend : whether times that do not rise are mended, and not refused.
-
-    Raises
-    ------
-    RecordingError
-        Where there are no columns, their lengths differ, or none is the time.
+    rate : of the samples [Hz], in place of a time; 0 where none is told.
     """
 
-    def __init__(self, name: str, data: Any, clock: str = "", *, mend: bool = False) -> None:
+    def __init__(
+        self,
+        name: str,
+        data: Any,
+        clock: str = "",
+        clock_unit: str = "",
+        *,
+        mend: bool = False,
+        rate: float = 0.0,
+    ) -> None:
         found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
         try:
             header = [str(column) for column in found]
@@ -42,11 +51,16 @@ class ArrayLog:
             raise RecordingError(
                 f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
             ) from None
+        if rate and arrays:
+            clock = EVEN
+            arrays[EVEN] = np.arange(next(iter(arrays.values())).size) / rate
         self._name, self._arrays, self._mend = name, arrays, mend
         self._noted: list[str] = []
         lower = {column.lower(): column for column in reversed(header)}
         named = next((lower[one] for one in TIMES if one in lower), None)
-        self._clock = clock or named
+        if clock and clock not in arrays:  # it may stand with its unit
+            clock = next((one for one in header if without_unit(one) == clock), clock)
+        self._clock, self._second = clock or named, to_si(clock_unit, TIME, f"{name}: {clock}")
         if self._clock not in arrays:
             missing = f"{clock!r}" if clock else "t"
             raise RecordingError(
@@ -108,11 +122,6 @@ class ArrayLog:
         Parameters
         ----------
         run : one of `runs`; None where there are none, or one.
-
-        Raises
-        ------
-        RecordingError
-            Where a column or run is not there, is not numeric, has not one axis, or another length.
         """
         run = one_run(self.path, self.runs(), run)
         chosen(self.path, names, self._arrays)
@@ -154,7 +163,8 @@ class ArrayLog:
         try:
             if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
                 raise TypeError
-            return value.astype(np.float64)
+            number = value.astype(np.float64)
+            return number * self._second if name == self._clock else number
         except (TypeError, ValueError):
             raise RecordingError(
                 f"{self._name}: {name} must be numeric, its type is {value.dtype}"

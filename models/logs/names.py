@@ -10,19 +10,23 @@ that are equal none is taken.
 import itertools
 import math
 import re
+import tomllib
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
+from models.logs.axes import Triad, along_axes, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import (
     BETA,
     COLUMNS,
     NEEDED,
+    POSE,
     QUANTITIES,
     WHEELS,
     Signal,
@@ -35,6 +39,7 @@ from models.logs.units import (
     ANGLE,
     FORCE,
     HAND_WHEEL,
+    LENGTH,
     RATE,
     SPEED,
     is_told,
@@ -42,7 +47,6 @@ from models.logs.units import (
     to_si,
     unit_of_range,
 )
-from models.logs.wheel_names import wheel_words
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
 STANDARD, KNOWN, WORDS, VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
@@ -57,202 +61,49 @@ LOOKED_AT = 20_000  # samples at most, in telling contents apart
 SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is told, "" SI.
 UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
+OBLIQUE = "its box lies oblique: no axis of it is one of the car"
 SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
 class Rule(NamedTuple):
     """How a signal is called.
 
-    known : whole names, words joined.   words : sets of words that all occur; "a|b" is either.
-    vague : sets of words that may mean something else.   never : words that mean something else.
+    known : whole names, words joined.   vague : names that may mean something else.
+    never : words that mean something else.   words : sets of words that all occur; "a|b" is either.
     """
 
-    known: tuple[str, ...]
+    known: frozenset[str]
+    vague: frozenset[str]
+    never: frozenset[str]
     words: tuple[str, ...]
-    vague: tuple[str, ...]
-    never: tuple[str, ...]
 
 
-LONGITUDINAL = "long|longitudinal|longitudinale|fwd|forward|x|laengs|lon|lgt"
-ACROSS = "transversal|transversale|trasversale|transverse|transv"
-LATERAL = f"lat|lateral|laterale|y|quer|side|{ACROSS}"
-ROMANCE_SPEED = "vitesse|velocita|velocidad"
-VELOCITY = f"vel|velocity|velocities|v|speed|spd|geschwindigkeit|geschw|{ROMANCE_SPEED}"
-ACCELERATIONS = (
-    "acc|accel|acceleration|accelerations|a|beschleunigung|beschl|gforce|accelerazione|"
-    "aceleracion|acel"
+TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+_WORDS = {name: some.replace("|", " ").split() for name, some in TABLES["words"].items()}
+
+
+def _spelled(text: str, apart: str = "|") -> str:
+    """Return a text of the table with the words that stand in braces for."""
+    while "{" in text:
+        text = re.sub(r"{(\w+)}", lambda found: apart.join(_WORDS[found[1]]), text)
+    return text
+
+
+REFERENCE, CORNERS, SOURCES, FILTERED, SIGN = (
+    frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
 )
-YAW = "yaw|gier|psi|lacet|imbardata|guinada"
-CHANGE = f"rate|vel|velocity|velocities|speed|geschwindigkeit|geschw|dot|p|d|w|taux|{ROMANCE_SPEED}"
-WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl", "roue", "roues", "ruota",
-               "ruote", "rueda", "ruedas", "pneu", "pneus", "pneumatico", "neumatico")  # fmt: skip
-CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
-CARRIERS = {"cfl": "fl", "cfr": "fr", "crl": "rl", "crr": "rr"}  # of CarMaker: Car.CFL.rz
-REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
-             "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
-             "status", "soll", "accuracy", "sigma", "bias", "offset", "dev", "commanded", "demand",
-             "requested", "reference", "setpoint", "wanted", "planned", "goal", "limiter", "cruise",
-             "actuator", "actuators", "sollwert", "vorgabe", "anforderung", "consigne", "cible",
-             "riferimento", "richiesta", "consigna", "objetivo", "deseado", "deseada", "sign",
-             "sgn", "vz", "vorzeichen")  # fmt: skip
-NOT_BODY = (*WHEEL_WORDS, *CORNERS, *REFERENCE)
-OTHER_CARS = ("radar", "lidar", "obj", "object", "objekt", "lead", "rel", "relative", "relativ")
-SHOWN = ("ui", "display", "displayed", "indicated", "cluster", "angez", "anzeige", "angezeigt",
-         "setspeed", "setspd", "speedset")  # fmt: skip
-NO_VELOCITY = ("speed", "velocity", "velocities", "vel", "geschw", "geschwindigkeit",
-               *ROMANCE_SPEED.split("|"))  # fmt: skip
-NO_SPEED = (*NO_VELOCITY, "rate", "dot")
-NO_ACCELERATION = ("accel", "acceleration", "accelerations", "acc", "beschl", "beschleunigung",
-                   "accelerazione", "aceleracion", "acel")  # fmt: skip
-NO_TORQUE = ("torque", "moment", "force", "power", "couple", "coppia", "par", "kraft")
-UPRIGHT = ("z", "vert", "vertical", "vertikal", "verticale", "hoch")
-BEHIND = ("rear", "hinten", "hinterachse", "hinterachs", "ha", "arriere", "posteriore", "trasera",
-          "trasero")  # fmt: skip
-TURNING = ("angular", "ang", "yaw", "gier", "lacet", "imbardata", "guinada")
-FILTERED = {"filt", "filtered", "filter", "flt", "lowpass", "lp", "smooth", "smoothed",
-            "gefiltert", "filtre", "filtree", "filtrata", "filtrado"}  # fmt: skip
-RULES: Mapping[str, Rule] = {
-    "v_x": Rule(
-        ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
-         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog", "ux", "vxbody", "vxsm",
-         "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed", "vego",
-         "egospeed"),
-        (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
-        ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|speedveh|"
-         "vsignal|vist|speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|"
-         f"fahrgeschw|fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
-        (*NOT_BODY, *OTHER_CARS, *SHOWN, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine",
-         "motor", "moteur", "motore", "sas", "lws", "lateral", "lat", "laterale", "quer",
-         *ACROSS.split("|"), "trans", "fan", "pump", "turbo", "turbine", "wind", "vent", "vento",
-         "viento", "steering", "steer", "lenkrad", "lenk", "volant", "volante", "sterzo", "east",
-         "north", "up", "down", "n", "e"),
-    ),
-    "v_y": Rule(
-        ("vy", "vely", "yvel", "velocityy", "vyb", "vlat", "vellat", "vellateral", "latvel",
-         "vquer", "vycg", "vycog", "carvy", "vycar", "uy", "vybody", "vysm", "vtrans", "veltrans",
-         "vtransversal", "vlateral"),
-        (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit", "trans;vel|velocity|v"),
-        (),
-        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_ACCELERATION, "x", "east", "north",
-         "up", "down", "wind", "vent", "vento", "viento"),
-    ),
-    BETA: Rule(
-        ("beta", "sideslip", "sideslipangle", "bodyslip", "bodyslipangle", "schwimmwinkel",
-         "carsideslipangle", "slipangle", "anglebeta", "carbeta", "betacog", "driftangle"),
-        ("sideslip|schwimmwinkel|beta", "side|body|vehicle;slip;angle", "side;slip", "slip;angle",
-         "drift;angle", "slip;cog|cg", "schwimm;winkel", "derive;caisse|vehicule",
-         "angolo;assetto"),
-        (),
-        (*NOT_BODY, *BEHIND, "rate", "dot", "ratio", "longitudinal", "front", "brake",
-         "vorderachse", "va", "avant", "anteriore"),
-    ),
-    "r": Rule(
-        ("r", "yawrate", "psip", "psidot", "dpsi", "gierrate", "giergeschwindigkeit", "gyroz",
-         "zgyro", "omegaz", "wz", "angratez", "ratez", "zrate", "caryawrate", "yawvel", "gz",
-         "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate", "avz", "avzs",
-         "avzsm", "yawdot", "dyaw", "dpsidt"),
-        (f"{YAW};{CHANGE}", "angular|gyro|gyr|gyroscope|omega|rate|ang;z",
-         "gierrate|giergeschwindigkeit|yawrate", "heading|turn;rate", "rotation;rate;z"),
-        ("omega|angularvelocity|angularspeed|angularrate|angvel",),
-        (*NOT_BODY, *NO_ACCELERATION, "x", "y", "roll", "pitch", "linear", "moment", "torque",
-         "engine", "motor", "moteur", "motore", "crank", "shaft", "turbo", "turbine", "fan",
-         "pump", "gear", "rotor"),
-    ),
-    "delta_f": Rule(
-        ("deltaf", "deltafront", "roadwheelangle", "frontwheelangle", "frontsteer",
-         "frontsteerangle", "steerfront", "radlenkwinkel", "steeringtireangle", "radeinschlag",
-         "roadwheelsteerangle", "steeranglefront", "deltav", "frontsteeringangle"),
-        ("road|front;wheel;angle", "steering|steer;tire|tyre;angle", "front|f;steer|steering",
-         "drive;steering;angle", "road;steer|steering", "radlenkwinkel|radeinschlag",
-         "ackermann;steering;angle"),
-        ("delta|deltawheel",),
-        (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, *BEHIND, "mode", "assist"),
-    ),
-    HAND: Rule(
-        ("steeringwheelangle", "steeringwheel", "handwheel", "handwheelangle", "swa", "sasangle",
-         "lenkradwinkel", "lrw", "deltasw", "steerwhlang", "steeringwheelposition", "sas",
-         "steerwhlangle", "stwhlang", "deltah", "lenkradw", "steersw",
-         "swangle", "swang", "lwwinkel"),
-        ("steer|steering|hand|stw|st|driv;wheel|whl;angle|ang|angl|position|pos",
-         "handwheel;angle|ang",
-         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|agl|winkel", "steer|steering;wheel",
-         "volant|volante;angle|angolo|angulo|ang"),
-        ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle|"
-         "steerpos|steeringpos|steerposition|steeringposition|"
-         "braquage|anglebraquage|angledebraquage|sterzo|angolosterzo|angolodisterzo|"
-         "angulodireccion|angulodedireccion",),
-        (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, *BEHIND, "front", "road", "tire", "tyre",
-         "mode", "assist", "drive", "roue", "roues", "ruota", "ruote", "rueda", "ruedas"),
-    ),
-    "delta_r": Rule(
-        ("deltar", "deltarear", "rearsteer", "rearsteerangle", "steerrear", "rearwheelangle",
-         "hinterradlenkwinkel", "hinterachslenkwinkel"),
-        ("rear|r;steer|steering", "rear;wheel;angle", "hinten|hinterachse;lenkwinkel"),
-        (),
-        (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, "front"),
-    ),
-    "a_y": Rule(
-        ("ay", "accy", "accely", "yaccel", "accelerationy", "latacc", "lataccel", "acclat",
-         "glat", "latg", "gforcelat", "querbeschleunigung", "aquer", "aqu", "bquer", "caray",
-         "lateralacceleration", "lateralacc", "accelerometery", "aycog", "aycg", "ayb",
-         "alhori", "lateralg", "alat", "aysm", "ayveh"),
-        (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung",
-         "trans;acc|accel|acceleration"),
-        (),
-        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, "x", "gyro", "twist",
-         "magnetic"),
-    ),
-    "a_x": Rule(
-        ("ax", "accx", "accelx", "xaccel", "accelerationx", "longacc", "longaccel", "acclong",
-         "acclon", "glong", "longg", "gforcelong", "laengsbeschleunigung", "alaengs", "blaengs",
-         "carax", "longitudinalacceleration", "longitudinalacc", "accelerometerx", "axcog", "axcg",
-         "axb", "longitudinalg", "alon", "axsm", "axveh"),
-        (f"{LONGITUDINAL};{ACCELERATIONS}|g", "linear;acceleration;x", "laengsbeschleunigung"),
-        (),
-        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, *LATERAL.split("|"), "gyro",
-         "twist", "magnetic", "pedal", "latitude", "longitude"),
-    ),
-    "Fyf": Rule(
-        ("fyf", "fyfront", "fyfrontaxle", "fyfinv"),
-        ("fy|flat;front|f|va", "lateral|side;force;front"),
-        (),
-        (*REFERENCE, "rear", "r"),
-    ),
-    "Fyr": Rule(
-        ("fyr", "fyrear", "fyrearaxle", "fyrinv"),
-        ("fy|flat;rear|r|ha", "lateral|side;force;rear"),
-        (),
-        (*REFERENCE, "front", "f"),
-    ),
-}  # fmt: skip
-# A signal of several wheels: words of the name beside those of the corners.
-PER_WHEEL: Mapping[str, tuple[str, ...]] = {
-    "delta_f": ("steer|steering|delta|radlenkwinkel|rwa|toe", "steer|wheel;angle|ang", "car;rz"),
-    "Fyf": ("fy|flat", "lateral|side;force"),
-    "Fyr": ("fy|flat", "lateral|side;force"),
-}
-SIDES = {
-    "delta_f": (("fl", "fr"), ("lf", "rf"), ("vl", "vr")),
-    "Fyf": (("fl", "fr"), ("lf", "rf"), ("vl", "vr")),
-    "Fyr": (("rl", "rr"), ("lr", "rr"), ("hl", "hr")),
-}
-LONG_SIDES = (  # words of a corner, in either order, and what they are cut down to
-    (("front", "left"), "fl"),
-    (("front", "right"), "fr"),
-    (("rear", "left"), "rl"),
-    (("rear", "right"), "rr"),
-    (("vorne", "links"), "fl"),
-    (("vorne", "rechts"), "fr"),
-    (("hinten", "links"), "rl"),
-    (("hinten", "rechts"), "rr"),
-)
-# Words in a name beside a unit that fits, by what they begin with: they may mean the signal.
-HINTS: Mapping[str, tuple[str, ...]] = {
-    "r": ("yaw", "gier", "gyro"),
-    "delta_f": ("steer", "lenk"),
-    "v_y": ("quer", "transv", "trasv", "lateral", "side", "seit"),
-    BETA: ("slip", "schwimm", "drift", "deriv", "assetto"),
-}
+
+
+def _rule(one: Mapping[str, Any]) -> Rule:
+    known, vague, never = (
+        frozenset(_spelled(one.get(key, ""), " ").split()) for key in ("known", "vague", "never")
+    )
+    return Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
+
+
+RULES: Mapping[str, Rule] = {name: _rule(one) for name, one in TABLES["signals"].items()}
+PER_WHEEL, HINTS = TABLES["per_wheel"], {k: tuple(v.split()) for k, v in TABLES["hints"].items()}
+SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in TABLES["sides"].items()}
 # German words are written together: "Querbeschl", "Lenkradwinkel", "Sollgierrate".
 _FIRST = "soll|ist|fahrzeug|fahr|quer|laengs|gier|vertikal|hoch|radlenk|lenkrad|lenk|schwimm|rad"
 _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
@@ -260,10 +111,54 @@ _COMPOUND = re.compile(f"(?:{_FIRST})+(?:{_LAST})+")
 _PARTS = re.compile(f"{_FIRST}|{_LAST}")
 # CarSim says left or right and the number of the axle: "Steer_L1", "Fy_R2".
 _SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
+_SPIN = re.compile(r"(?<![A-Za-z])AV[xyz](?![A-Za-z])")  # and "AVy_L1" of the spin of a wheel
 CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
 GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
                          "δ": "delta", "ω": "omega"})  # fmt: skip
+
+
+_WHEELS = TABLES["wheels"]
+PLACES = {
+    name: [frozenset(way.split()) for way in _WHEELS[name].split(",")] for name in WHEELS[:-1]
+}
+ANYWHERE = frozenset(word for ways in PLACES.values() for way in ways for word in way)
+WHEEL, TURNING, SPEEDS, BOTH, ENCODER, OTHERS = (
+    frozenset(_WHEELS[name].split())
+    for name in ("wheel", "turns", "speeds", "both", "encoder", "others")
+)
+
+
+def _with_corner(word: str) -> tuple[str, ...]:
+    """Return a word, or what it is made of where a corner of the car is written with it."""
+    for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
+        if corner in CORNERS and stem in BOTH:
+            return stem, corner
+    return (word,)
+
+
+def wheel_words(signal: str, words: Sequence[str]) -> bool:
+    """Return whether a name is that of the speed of a wheel.
+
+    Parameters
+    ----------
+    signal : one of `WHEELS`.
+    """
+    listed = frozenset(part for word in words for part in _with_corner(word))
+    if listed & OTHERS:
+        return False
+    if signal == WHEELS[-1]:
+        turns = listed & ENCODER or (listed & WHEEL and listed & TURNING) or listed == {signal}
+        return bool(turns and not listed & ANYWHERE)
+    for place in PLACES[signal]:
+        rest = listed - place
+        if listed >= place and not rest & ANYWHERE:
+            return bool(
+                rest & BOTH
+                or (rest & WHEEL and (rest & TURNING or rest <= WHEEL))
+                or (rest <= SPEEDS and rest)
+            )
+    return False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,12 +170,16 @@ class Guess:
     confidence : from 0 to 1.
     hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
+    sign : channel that has the sign of the amounts in this one; empty where there is none.
+    factor : -1 of an axis that points the other way.
     """
 
     channel: tuple[str, ...]
     confidence: float
     hand: bool = False
     unit: str = ""
+    sign: str = ""
+    factor: float = 1.0
     why: str = ""
 
 
@@ -325,8 +224,8 @@ class Proposal:
         if len(forces & set(kept)) == 1:
             kept = [name for name in kept if name not in forces]
         return {
-            name: Signal(channel=self.guesses[name].channel, unit=self.guesses[name].unit)
-            for name in kept
+            name: Signal(channel=one.channel, unit=one.unit, sign=one.sign, factor=one.factor)
+            for name, one in ((name, self.guesses[name]) for name in kept)
         }
 
 
@@ -334,7 +233,9 @@ def words_of(name: str) -> tuple[str, ...]:
     """Return a name as small words: "Car.YawRate" is car, yaw, rate."""
     plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
+    plain = re.sub(r"\(([xyzXYZ])\)", r" \1 ", plain)  # "G(x)"
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
+    plain = _SPIN.sub(lambda found: f" {found[0].lower()} ", plain)
     plain = _SIDE_AND_AXLE.sub(lambda found: CORNER_OF_AXLE[found[0]], plain)
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
@@ -377,18 +278,21 @@ def name_confidence(signal: str, name: str) -> float:
         listed = listed[:-1]
     rule, words = RULES[signal], _with_parts(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
-    if set(rule.known) & set(ends[:1]):
+    while len(listed) > 1 and listed[-1] in SOURCES:
+        listed = listed[:-1]
+        ends += ["".join(listed[k:]) for k in range(len(listed))]
+    if rule.known & {ends[0], "".join(listed)}:
         return KNOWN
-    if _with_parts(words_of(_field(name))).union(ends) & set(rule.never):
+    if _with_parts(words_of(_field(name))).union(ends) & rule.never:
         return 0.0
+    if (
+        len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
+    ):  # the R of "M_Mtr_D2_R" is a side, or anything
+        ends = [end for end in ends if len(end) > 1]
     loss = FILTERED_LOSS if words & FILTERED else 0.0
-    if set(rule.known) & set(ends):
+    if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
         return WORDS - loss
-    if any(_matches(group, words) for group in rule.words):
-        return WORDS - loss
-    if set(ends) & {word for group in rule.vague for word in group.split("|")}:
-        return VAGUE
-    return 0.0
+    return VAGUE if rule.vague & set(ends) else 0.0
 
 
 def _is_hint(signal: str, one: Heading) -> bool:
@@ -397,7 +301,7 @@ def _is_hint(signal: str, one: Heading) -> bool:
     starts = HINTS.get(signal, ())
     fits = is_told(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
-    return fits and named and not words & set(RULES[signal].never)
+    return fits and named and not words & RULES[signal].never
 
 
 def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -> Proposal:
@@ -408,12 +312,16 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     log : as a format reads it; numbers are read of the channels that are in question.
     run : which of its runs is looked at; None the only one, or the first.
     """
-    candidates = {name: _candidates(name, headings) for name in QUANTITIES}
+    candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
+    posed = _pose(headings)
     asked = {name for found in candidates.values() for guess in found for name in guess.channel}
+    boxes = _triads(headings)
+    asked |= {name for box in boxes for name in box.names.values()}
     seen = _seen(log, [one.name for one in headings if one.name in asked], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
+    candidates = _along_axes(_with_signs(candidates, headings, seen), boxes, headings, seen)
     candidates = _beside_turning(candidates, seen)
     guesses: dict[str, Guess] = {}
     rivals: dict[str, tuple[Guess, ...]] = {}
@@ -434,7 +342,131 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
             others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
             if others:
                 rivals[name] = (equal[0], *others)
-    return Proposal(guesses=guesses, rivals=rivals)
+    return Proposal(guesses={**guesses, **posed}, rivals=rivals)
+
+
+_PLACE = re.compile(TABLES["pose"]["place"])
+_ANGLE = re.compile(TABLES["pose"]["angle"])
+_TURN = re.compile(TABLES["pose"]["turn"])
+_NO_POSE = set(TABLES["pose"]["never"].split())
+
+
+def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
+    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
+    groups: dict[str, dict[str, Heading]] = {}
+    for one in map(_with_told_unit, headings):
+        words = "_".join(words_of(without_ending(one.name, one.unit)))
+        told = quantities(one.unit) if is_told(one.unit) else (LENGTH, ANGLE)
+        for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
+            found = form.fullmatch(words)
+            of = set((found["of"] or "").split("_")) if found else set()
+            if found and wanted in told and not of & _NO_POSE:
+                key = mark if mark == "h" else mark + found["axis"]
+                groups.setdefault(found["of"] or "", {}).setdefault(key, one)
+                break
+    whole = {
+        name: some
+        for name, some in groups.items()
+        if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some))
+    }
+    measured = [name for name in whole if "odom" not in name] or list(whole)
+    if not measured:
+        return {}
+    some = whole[measured[0]]
+    sure = KNOWN if len(measured) == 1 else HINT
+    why = "" if len(measured) == 1 else "there are several poses"
+    lost = NO_UNIT_LOSS if measured[0] and not is_told(some["x"].unit) else 0.0
+    turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
+    turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
+    channels = {"x": [some["x"].name], "y": [some["y"].name], "heading": turned}
+    units = {
+        "x": some["x"].unit,
+        "y": some["y"].unit,
+        "heading": some["h"].unit if "h" in some else "",
+    }
+    return {
+        name: Guess(
+            channel=tuple(listed), confidence=sure - lost, unit=units[name].strip(), why=why
+        )
+        for name, listed in channels.items()
+    }
+
+
+def _with_signs(
+    candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: Mapping[str, Channel]
+) -> dict[str, list[Guess]]:
+    """Return the guesses; amounts with the channel of their sign, which is called as they are."""
+    signs: dict[frozenset[str], str] = {}
+    for one in headings:
+        words = frozenset(words_of(one.name))
+        if words & SIGN and not is_told(one.unit):
+            signs[words - SIGN] = one.name
+
+    def completed(guess: Guess) -> Guess:
+        sign = signs.get(frozenset(words_of(guess.channel[0])), "")
+        values = seen[guess.channel[0]].values if sign and guess.channel[0] in seen else np.zeros(0)
+        if not values.size or np.nanmin(values) < 0.0:
+            return guess
+        return replace(_said(guess, f"its sign is in {sign!r}"), sign=sign)
+
+    return {name: [completed(one) for one in found] for name, found in candidates.items()}
+
+
+def _triads(headings: Sequence[Heading]) -> list[Triad]:
+    """Return the channels that are called alike but for x, y and z."""
+    named = map(_with_told_unit, headings)
+    units = {one.name: told.unit for one, told in zip(headings, named, strict=True)}
+    words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
+    bad = REFERENCE | CORNERS
+    return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
+
+
+def _along_axes(
+    candidates: Mapping[str, list[Guess]],
+    boxes: Sequence[Triad],
+    headings: Sequence[Heading],
+    seen: Mapping[str, Channel],
+) -> dict[str, list[Guess]]:
+    """Return the guesses; of boxes whose letters mislead those that their numbers tell."""
+    if not boxes:
+        return dict(candidates)
+    within = {name for box in boxes for name in box.names.values()}
+
+    def best(name: str) -> str:
+        free = [one for one in candidates[name] if not within & set(one.channel)]
+        likely = max(free, key=lambda one: one.confidence, default=None)
+        return likely.channel[0] if likely and likely.confidence > STILL else ""
+
+    speed = best("v_x") or _of_a_triad(candidates["v_x"])
+    found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
+    units = {one.name: _with_told_unit(one).unit.strip() for one in headings}
+    mended = {
+        name: [
+            replace(_said(one, OBLIQUE), confidence=min(one.confidence, HINT))
+            if found.oblique & set(one.channel)
+            else one
+            for one in some
+            if not found.misled & set(one.channel)
+        ]
+        for name, some in candidates.items()
+    }
+    for one in found.axes:
+        near = KNOWN if is_told(units[one.name]) else KNOWN - NO_UNIT_LOSS
+        guess = Guess(
+            channel=(one.name,),
+            confidence=near,
+            unit=units[one.name],
+            factor=one.factor,
+            why=one.why,
+        )
+        mended[one.signal].append(guess)
+    return mended
+
+
+def _of_a_triad(found: Sequence[Guess]) -> str:
+    """Return the channel that is the speed by its letter; "" where there is none."""
+    likely = max(found, key=lambda one: one.confidence, default=None)
+    return likely.channel[0] if likely and likely.confidence > STILL else ""
 
 
 def _rank(guess: Guess) -> tuple[bool, float]:
@@ -486,9 +518,10 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     found = []
     listed = [_with_told_unit(one) for one in headings]
     for one in listed:
-        name = without_ending(one.name, one.unit)
-        by_name = name_confidence(signal, name)
-        by_hand = name_confidence(HAND, name) if signal == "delta_f" else 0.0
+        names = {without_ending(one.name, one.unit)}
+        names |= {one.name} if one.name.lower().endswith("_g") else set()  # "lat_g" is in g, and g
+        by_name = max(name_confidence(signal, name) for name in names)
+        by_hand = max(name_confidence(HAND, name) for name in names) * (signal == "delta_f")
         best = max(by_name, by_hand)
         if best > 0.0:
             found.append(
@@ -532,11 +565,11 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
 def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
     """Return the corner of the car that a name speaks of, and its other words."""
     rest = frozenset(words)
-    for pair, short in LONG_SIDES:
-        if rest >= set(pair):
-            return short, rest - set(pair)
-    corners = [word for word in words if word in CORNERS or word in CARRIERS]
-    return (CARRIERS.get(corners[-1], corners[-1]), rest - {corners[-1]}) if corners else None
+    for pair, short in TABLES["corners"].items():
+        if rest >= set(pair.split()):
+            return short, rest - set(pair.split())
+    corners = [word for word in words if word in CORNERS]
+    return (corners[-1], rest - {corners[-1]}) if corners else None
 
 
 def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
@@ -546,7 +579,7 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
         found = _corner(words_of(one.name))
         quantity = QUANTITIES[signal]
         fits = not is_told(one.unit) or quantity in quantities(one.unit)
-        if found and fits and not found[1] & set(REFERENCE):
+        if found and fits and not found[1] & REFERENCE:
             by_corner.setdefault(found, one)
     pairs = []
     for (corner, rest), left in by_corner.items():

@@ -23,13 +23,7 @@ BATCH = 1 << 16  # rows that are read at once
 
 
 def open_parquet(path: Path) -> TableLog:
-    """Return the log in a Parquet file.
-
-    Raises
-    ------
-    RecordingError
-        Where pyarrow is missing, or the file is none or too large.
-    """
+    """Return the log in a Parquet file."""
     parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
     with one_line(path, WHAT), parquet.ParquetFile(path) as file:
@@ -62,6 +56,7 @@ class ParquetTable:
 
     format = "Parquet"
     place = "row"
+    rate = 0.0
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -109,11 +104,6 @@ class ParquetTable:
         ----------
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
-
-        Raises
-        ------
-        RecordingError
-            Where a column is not of its kind, or there is no row.
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         for column, kind in wanted.items():

@@ -21,7 +21,8 @@ from typing import NamedTuple
 from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
-from models.logs.units import quantities
+from models.logs.stamps import nanoseconds
+from models.logs.units import PER_SECOND, quantities, time_unit
 from models.schema import require_few
 
 HEAD, LINES = 1 << 18, 1500  # bytes and lines that are looked at
@@ -30,6 +31,7 @@ TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
+PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
 ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
 MANY = 300  # cells of a line that tell how all are written
@@ -39,15 +41,25 @@ _DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
 _POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
 _COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
-_INSTANT = re.compile(
-    r"(?:\d{4}-?\d\d-?\d\d|\d{1,2}[./]\d{1,2}[./]\d{4}|\d{4}/\d\d/\d\d)"
-    r"(?:[T ]\d\d:?\d\d(?::?\d\d(?:[.,]\d+)?)?(?: ?(?:Z|UTC|[-+]\d\d:?\d\d))?)?"
-    r"|(?:\d+:)?\d{1,2}:\d\d(?:[.,]\d+)?"
+_MAYBE_INSTANT = re.compile(r"(?=.*\d).*[-:/.]\w.*")
+# A rate or an interval of samples that a preamble tells: "Sample Rate","100.000","Hz".
+_TOLD_RATE = re.compile(
+    r"(?i)(?:sampl\w*[ _]*(?:rate|freq\w*)|abtast(?:rate|frequenz)|\bfs\b"
+    r"|(?:log|logging|data)[ _]*rate)"
+    r"[^\d\n]{0,20}(\d+(?:\.\d+)?)(?:\W{0,5}(k?hz|sps|1/s)\b)?"
+    r"|(?:rate|freq\w*)[^\d\n]{0,20}(\d+(?:\.\d+)?)\W{0,5}(k?hz|sps)\b"
 )
+_TOLD_STEP = re.compile(
+    r"(?i)(?:(?:sampl\w*|time)[ _]*(?:interval|period|time|step)|abtastzeit"
+    r"|delta[ _]?[xt]\b|\bd[tx]\b)"
+    r"[^\d\n]{0,20}(\d*\.?\d+(?:e-?\d+)?)(?:\W{0,5}(ms|us|s|sec)\b)?"
+)
+RATES = (1.0, 1e5)  # [Hz]
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
+LONGEST_INSTANT = 60  # characters
 LONGEST_CELL = csv.field_size_limit()  # characters
 
 
@@ -67,6 +79,7 @@ class Layout:
     numeric : which columns hold numbers, as far as the beginning tells.
     rows : cells of the first rows of data.
     made_by : the logger or program whose format it is, "" where nothing tells.
+    rate : of samples, that the preamble tells [Hz]; 0 where it tells none.
     """
 
     encoding: str
@@ -81,6 +94,7 @@ class Layout:
     rows: tuple[tuple[str, ...], ...]
     words: tuple[str, ...]
     made_by: str
+    rate: float = 0.0
 
 
 class _Line(NamedTuple):
@@ -111,11 +125,6 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     Parameters
     ----------
     whole : whether they are all of it.
-
-    Raises
-    ------
-    RecordingError
-        Where it is binary, empty, or has no header.
     """
     encoding = _encoding(path, head)
     text = _decoded(path, head, encoding)
@@ -222,11 +231,16 @@ def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
 def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
     """Return whether a cell is a number, a time, or nothing, in this way of writing."""
     pattern = _DOT if decimal == "." else _COMMA
-    if pattern.fullmatch(cell) or _INSTANT.fullmatch(cell):
+    if pattern.fullmatch(cell) or _is_instant(cell):
         return True
     if thousands:
         return bool((_COMMAS if thousands == "," else _POINTS).fullmatch(cell))
     return cell.lower() in ("nan", "inf", "-inf", "+inf", "infinity", "-infinity", "-nan")
+
+
+def _is_instant(cell: str) -> bool:
+    maybe = len(cell) < LONGEST_INSTANT and _MAYBE_INSTANT.fullmatch(cell) is not None
+    return maybe and nanoseconds(cell) is not None
 
 
 def _way(tail: list[str]) -> _Way | None:
@@ -254,6 +268,12 @@ def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
     cell = (_DOT if decimal == "." else _COMMA).pattern
     apart = r"\s+" if delimiter == BLANKS else f" *{re.escape(delimiter)} *"
     return re.compile(rf" *{cell}(?:{apart}{cell})* *")
+
+
+def _numbers_in(line: _Line, way: _Way) -> int:
+    """Return how many cells of a line are numbers."""
+    cells = [cell for cell in line.cells[:MANY] if cell]
+    return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
 def _is_data(line: _Line, way: _Way) -> bool:
@@ -325,12 +345,30 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         rows=data,
         words=tuple(words),
         made_by=made_by,
+        rate=_told_rate([line.text for line in lines[: lines.index(names_line)]]),
     )
+
+
+def _told_rate(preamble: Sequence[str]) -> float:
+    """Return the samples per second that a preamble tells [Hz]; 0 where it tells none."""
+    for line in preamble:
+        if found := _TOLD_RATE.search(line):
+            kilo = (found[2] or found[4] or "").lower().startswith("k")
+            rate = float(found[1] or found[3]) * (1e3 if kilo else 1.0)
+        elif found := _TOLD_STEP.search(line):
+            step = float(found[1])
+            rate = PER_SECOND[time_unit(found[2] or "s")] / step if step else 0.0
+        else:
+            continue
+        if RATES[0] <= rate <= RATES[1]:
+            return rate
+    return 0.0
 
 
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
-    above = [k for k, line in enumerate(lines) if line.text.strip()]
+    above = [k for k, line in enumerate(lines) if line.text.strip(PADDING)]
+    full = sorted(_numbers_in(lines[k], way) for k in above[-TAIL:])[len(above[-TAIL:]) // 2]
     first = None
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
@@ -341,7 +379,12 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
         if first is None:
             continue
         higher = [lines[k] for k in above[max(0, place - 40) : place]]
-        alike = sum(len(one.cells) == way.width and _is_data(one, way) for one in higher)
+        alike = sum(
+            len(one.cells) == way.width
+            and _is_data(one, way)
+            and 2 * _numbers_in(one, way) >= full  # not "Duration,30,,," of a padded preamble
+            for one in higher
+        )
         if alike >= 2 and way.width > 2:
             continue  # a spoiled row, a comment, or the header once more: there is data above
         zone = above[: place + 1][::-1]
@@ -393,7 +436,9 @@ def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> 
 
 
 def _all_instants(cells: Sequence[str]) -> bool:
-    return bool(cells) and all(":" in cell or cell.count("-") == 2 for cell in cells)
+    times = (_is_instant(cell) and not _DOT.fullmatch(cell) for cell in cells)
+    marked = (":" in cell or cell.count("-") == 2 for cell in cells)
+    return bool(cells) and (all(marked) or all(times))
 
 
 def _sure(share: float) -> str:

@@ -14,12 +14,13 @@ import numpy as np
 from codegen.arrays import Array, filled
 from codegen.escape import shown
 from models.logs.log import RecordingError
-from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED, TURNS, quantities
+from models.logs.units import ACCELERATION, ANGLE, FORCE, LENGTH, RATE, SPEED, TURNS, quantities
 
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
 AXLES = (("wheel_fl", "wheel_fr"), ("wheel_rl", "wheel_rr"))
 WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # turns or speeds, the last of one encoder: for v_x
+POSE = ("x", "y", "heading")  # position and angle from x to y, of which v_x, v_y and r are made
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -31,6 +32,9 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "delta_r": ANGLE,
         "a_y": ACCELERATION,
         "a_x": ACCELERATION,
+        "x": LENGTH,
+        "y": LENGTH,
+        "heading": ANGLE,  # or four channels, of a quaternion x, y, z, w
         "Fyf": FORCE,
         "Fyr": FORCE,
         **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
@@ -52,6 +56,9 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "delta_r": "rear steering angle",
         "a_y": "lateral acceleration",
         "a_x": "longitudinal acceleration",
+        "x": "position",
+        "y": "position",
+        "heading": "heading",
         "Fyf": "front axle force",
         "Fyr": "rear axle force",
         "wheel_fl": "speed of the front left wheel",
@@ -66,15 +73,22 @@ LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
 def told_by(signals: Iterable[str]) -> set[str]:
-    """Return what signals tell, by name; beta tells v_y, wheels tell v_x."""
+    """Return what signals tell, by name; beta tells v_y, wheels v_x, a pose v_x, v_y and r."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
-    return {stands_for.get(name, name) for name in signals}
+    told = {stands_for.get(name, name) for name in signals}
+    return told | {"v_x", "v_y", "r"} if set(POSE) <= told else told
+
+
+def has_speed(signals: Iterable[str]) -> bool:
+    """Return whether signals tell v_x without wheels: themselves, or by a pose."""
+    there = set(signals)
+    return "v_x" in there or set(POSE) <= there
 
 
 def quantity_of(name: str, unit: str) -> str:
     """Return what a signal is; of wheels a speed or a rate, as the unit has it."""
     turns = [one for one in quantities(unit) if one in (RATE, TURNS)]
-    return turns[0] if name in WHEELS and turns else QUANTITIES[name]
+    return turns[-1] if name in WHEELS and turns else QUANTITIES[name]
 
 
 def signal_name(name: str) -> str | None:
@@ -104,11 +118,8 @@ class Signal:
     offset : what the channel shows at zero, in SI; it is taken off.
     ratio : angle of the hand wheel over that of the road wheels [-], of steering.
     table : pairs of angles of hand wheel and road wheels [rad], rising, in place of a ratio.
-
-    Raises
-    ------
-    RecordingError
-        Where a channel is missing or named twice, or a number impossible.
+    sign : channel that has the sign of one that holds amounts: below zero, or 1 of 0 and 1, is
+        negative; empty where there is none.
     """
 
     channel: tuple[str, ...]
@@ -117,6 +128,7 @@ class Signal:
     offset: float = 0.0
     ratio: float = 1.0
     table: tuple[tuple[float, float], ...] = ()
+    sign: str = ""
 
     def __post_init__(self) -> None:
         if not self.channel or not all(self.channel):
@@ -142,6 +154,11 @@ class Signal:
                     f"not {shown(str(self.table))}"
                 )
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The channels that are read, that of the sign last."""
+        return (*self.channel, self.sign) if self.sign else self.channel
+
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
         """Return the signal of its channels.
 
@@ -149,7 +166,7 @@ class Signal:
         ----------
         parts : each channel in SI, on one clock (n,).
         """
-        plain = Signal(channel=self.channel[:1], unit=self.unit)
+        plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
         if len(parts) == 1 and self == plain:
             return parts[0]
         return filled(
@@ -179,15 +196,21 @@ class Signal:
         return road_wheel
 
 
-def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
-    """Refuse signals that are no signals of ours, or that contradict one another.
+def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
+    """Return amounts with the sign that another channel has then, (n,).
 
-    Raises
-    ------
-    RecordingError
-        Where a name is unknown, beta stands beside v_y, a ratio is no angle's, or an axle has a
-        force and the other none.
+    Parameters
+    ----------
+    t : times of the amounts [s], (n,).
+    sign_t, sign : times and values of the other channel, (m,).
     """
+    last = np.maximum(np.searchsorted(sign_t, t, side="right") - 1, 0)
+    negative = sign < 0.0 if (sign < 0.0).any() else sign > 0.5 * np.nanmax(sign, initial=1.0)
+    return np.where(negative[last], -amounts, amounts)
+
+
+def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
+    """Refuse signals that are no signals of ours, or that contradict one another."""
     for name, signal in signals.items():
         if name not in QUANTITIES:
             raise RecordingError(
@@ -197,6 +220,8 @@ def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
             raise RecordingError(f"{where}signals.{name} can have no ratio or table: no steering")
     if BETA in signals and "v_y" in signals:
         raise RecordingError(f"{where}signals.beta stands in for v_y: give one of them")
+    if 0 < len(set(POSE) & set(signals)) < len(POSE):
+        raise RecordingError(f"{where}x, y and heading are a pose together: give all three")
     if ("Fyf" in signals) != ("Fyr" in signals):
         lonely = "Fyf" if "Fyf" in signals else "Fyr"
         raise RecordingError(f"{where}{lonely} needs its partner, give both Fyf and Fyr or neither")

@@ -3,32 +3,18 @@
 import re
 from collections.abc import Sequence
 
-from models.logs.units import are_same, is_known
+from models.logs.units import TABLES, are_same, is_known
 from models.schema import LONGEST_NAME
 
-_OTHERS = (
-    "hhmmss", "rad/s2", "rad/s^2", "rad/s²", "deg/s2", "deg/s^2",
-    "deg/s²", "°/s²", "volts", "amp", "amps", "bool", "enum", "#", "count", "counts", "gear", "rev",
-    "1/s", "l", "l/h",
-)  # fmt: skip
+_OTHERS = TABLES["header"]["others"].split()
 _EMPTY = ("1", "-", "--", "none", "")
 _BRACKETS = re.compile(r".*?[\[({]\s*([^\])}]{0,24}?)\s*[\])}]\s*")
 _NUMBER = re.compile(r"[-+]?[\d.,]+(?:[eE][-+]?\d+)?")
-# What a name may end in after "_", as "speed_kmh", or with a capital letter, as "speedKmh" and
-# "ACC_MPS2"; "r", "f", "t" and "x" end names of signals.
-_ENDINGS = {
-    "kmh": "km/h", "km_h": "km/h", "kph": "km/h", "mph": "mph", "mps": "m/s", "m_s": "m/s",
-    "mps2": "m/s^2", "ms2": "m/s^2", "m_s2": "m/s^2", "deg": "deg", "rad": "rad", "degs": "deg/s",
-    "deg_s": "deg/s", "degps": "deg/s", "dps": "deg/s", "rads": "rad/s", "rad_s": "rad/s",
-    "radps": "rad/s", "g": "g", "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
-    "N": "N", "kN": "kN",
-}  # fmt: skip
+_ENDINGS, _CAPITAL = (
+    dict(pair.split("=") for pair in TABLES["endings"][kind].split())
+    for kind in ("plain", "capital")
+)
 _LONGEST_FIRST = sorted(_ENDINGS.items(), key=lambda one: -len(one[0]))
-_CAPITAL = {  # in small letters
-    "radpersec": "rad/s", "radps": "rad/s", "rads": "rad/s", "rad": "rad", "degpersec": "deg/s",
-    "degps": "deg/s", "degs": "deg/s", "dps": "deg/s", "deg": "deg", "kmperh": "km/h",
-    "kmph": "km/h", "kmh": "km/h", "kph": "km/h", "mph": "mph", "mps2": "m/s^2", "mps": "m/s",
-}  # fmt: skip
 _CAPITAL_ENDING = re.compile(
     f"(?:(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Za-z0-9])_(?=[A-Z]))(?i:(?P<unit>{'|'.join(_CAPITAL)}))$"
 )
@@ -65,7 +51,7 @@ def _split(name: str) -> tuple[str, str]:
     if len(name) > LONGEST_NAME:
         return name, ""
     held = _BRACKETS.fullmatch(name)
-    if held and (is_unit(held[1]) or "[" in name):
+    if held and not held[1].isdigit() and (is_unit(held[1]) or "[" in name):
         return without_unit(name), held[1]
     for mark in (":", " / ", ", ", " in "):
         bare, there, unit = name.rpartition(mark)

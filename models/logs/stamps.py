@@ -17,20 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
+from codegen.escape import shown
 from models.logs.growing import LONGEST_IN_MEMORY
 from models.logs.log import Clock, RecordingError
 from models.logs.spelling import unit_in_name
-from models.logs.units import PER_SECOND, time_unit
+from models.logs.units import PER_SECOND, TABLES, time_unit
 
 MISSING = -(2**63)  # an instant that is not there, in ns
 DAY = 86400.0
-NAMES = (
-    "t", "time", "timestamp", "timestamps", "times", "zeit", "sec", "secs", "second", "seconds",
-    "elapsed", "elapsedtime", "sessiontime", "logtime", "systime", "epoch", "unixtime",
-    "unixepoch", "datetime", "stamp", "utc", "utctime", "timeutc", "gpstime", "timeofday",
-    "tod", "relativetime", "reltime", "testtime", "simtime", "rostime", "headerstamp",
-    "zeitstempel", "temps", "tiempo",
-)  # fmt: skip
+NAMES: tuple[str, ...] = tuple(TABLES["clock"]["names"].split())
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 CALENDAR = 1e8  # [s]: times above count from 1970
@@ -41,19 +36,43 @@ TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
 WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
 MOST_STEPS = 100_000  # samples that a rate is taken from
 SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
+JITTER, WINDOW = 1.2, 50  # steps that stamps of an even clock may lie apart, samples of a mean
 PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
 BACK, FEWEST = 1.0, 10  # [s], samples: what goes back so far and lasts so long is no sample astray
+
+REPEATED = 0.2  # share of stamps of a column that repeat, of which another may be finer
+WAYS = TABLES["clock"]["ways"].split()
+COUNTERS = tuple(TABLES["clock"]["counters"].split())
 
 MENDING = '--mend-clock (in Python LogMap(order="mend"))'
 
 OTHER_RATE, NEAR = 0.2, 60.0  # share of a step, [s]: of a clock that another column has for itself
 
 _DATE = re.compile(
-    r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}))(?:[T ]+(.+))?"
+    r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d))(?:[T, ]+(.+))?"
 )
 _TIME = re.compile(
-    r"(?:(\d+):)?(\d{1,2}):(\d\d)(?:[.,](\d+))?(?: ?(Z|UTC)| ?([-+])(\d\d):?(\d\d))?"
+    r"(?:(\d+):)?(\d{1,2}):(\d\d)(?:[.,](\d+))?(?: ?([AP])\.?M\.?)?"
+    r"(?: ?(?:Z|UTC|GMT))?(?: ?([-+])(\d\d):?(\d\d))?",
+    re.I,
 )
+_MONTH = r"(?P<month>[^\W\d_]{3,9})\.?"
+_NAMED = tuple(  # dates whose month is a word: 04-Apr-2025 18:10, 2025-Apr-04, Apr 4, 2025 6:10 PM
+    re.compile(r"(?:[^\W\d_]{2,9}[.,]? +)?" + form)
+    for form in (
+        rf"(?P<day>\d{{1,2}})[-/. ]+{_MONTH}[-/, ]+(?P<year>\d{{4}}|\d\d)(?:[T, ]+(?P<time>.+))?",
+        rf"(?P<year>\d{{4}})[-/. ]{_MONTH}[-/. ](?P<day>\d{{1,2}})(?:[T, ]+(?P<time>.+))?",
+        rf"{_MONTH} +(?P<day>\d{{1,2}}),? +(?P<year>\d{{4}})(?:[T, ]+(?P<time>.+))?",
+        # Fri Apr 04 18:10:23 GMT+02:00 2025
+        rf"{_MONTH} +(?P<day>\d{{1,2}}) +(?P<time>[\d:.,]+(?: (?:GMT|UTC)?[-+:\d]*)?)"
+        r"(?: [A-Z]{3,5})? +(?P<year>\d{4})",
+    )
+)
+_MONTHS = {
+    word: 1 + k
+    for k, some in enumerate(TABLES["clock"]["months"].split(","))
+    for word in some.split()
+}
 _SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
 
 
@@ -78,7 +97,10 @@ class Stamps(NamedTuple):
 def find_clock(
     names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]]
 ) -> Clock | None:
-    """Return the column that is the time, by its name or else as the first that rises evenly.
+    """Return the column that is the time, by its name or else as the one that rises evenly.
+
+    Of several that are called so it is the first whose stamps hardly ever repeat, as one that is
+    rounded to seconds does. One that counts samples, or the way, is none.
 
     Parameters
     ----------
@@ -86,18 +108,75 @@ def find_clock(
     """
     named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
     named.sort(key=lambda k: NAMES.index(_plain(names[k])))
-    for k in named:
-        if (clock := _clock(k, names[k], units[k], head(k), _rises)) is not None:
-            return clock
-    for k, name in enumerate(names):
-        if k in named or (units[k] and not time_unit(units[k])):
-            continue
-        if (clock := _clock(k, name, units[k], head(k), _rises_evenly)) is not None:
-            return clock
+    for fits in (_moves, _rises):
+        for k in named:
+            if (clock := _clock(k, names[k], units[k], head(k), fits)) is not None:
+                return clock
+    even = _even(names, units, head, named)
+    if even and (len(even) == 1 or time_unit(units[even[0].column])):
+        return even[0]
     for k in named:  # which does not rise, and what is wrong with it will be said
-        if (clock := _clock(k, names[k], units[k], head(k), _is_any)) is not None:
+        if not even and (clock := _clock(k, names[k], units[k], head(k), _is_any)) is not None:
             return clock
     return None
+
+
+def no_clock(
+    names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]]
+) -> str:
+    """Return why no column is the time, and what to do; arguments as of `find_clock`."""
+    even = [one.name for one in _even(names, units, head, ())]
+    if len(even) > 1:
+        return (
+            f"several columns rise evenly ({', '.join(even[:3])}): tell the time by "
+            f'--columns "t={even[0]}"'
+        )
+    way = [name for name, unit in zip(names, units, strict=True) if _is_way(name, unit)]
+    counted = [
+        one for k, one in enumerate(names) if units[k] in ("", "-") and _counts(one, head(k))
+    ]
+    if way and not counted:
+        return f"no column is a time: {shown(way[0])} is a distance; export the log over time"
+    counts = f", {shown(counted[0])} counts samples" if counted else ""
+    told = "--rate HZ tells the samples per second, or --columns t=COLUMN the time"
+    return f"no column is a time that rises{counts}; {told}"
+
+
+def _even(
+    names: Sequence[str],
+    units: Sequence[str],
+    head: Callable[[int], Sequence[str]],
+    named: Sequence[int],
+) -> list[Clock]:
+    """Return the columns that rise evenly and count neither samples nor the way; a time first."""
+    found = []
+    for k, name in enumerate(names):
+        if k in named or (units[k] and not time_unit(units[k])) or _is_way(name, ""):
+            continue
+        if not units[k] and _counts(name, head(k)):
+            continue
+        if (clock := _clock(k, name, units[k], head(k), _rises_evenly)) is not None:
+            found.append(clock)
+    return sorted(found, key=lambda one: not time_unit(units[one.column]))
+
+
+def _is_way(name: str, unit: str) -> bool:
+    """Whether a column is the distance driven, by its name, or by that and its unit."""
+    plain = _plain(name)
+    return plain in WAYS or (plain.endswith(("distance", "dist")) and unit in ("", "m", "km", "ft"))
+
+
+@np.errstate(all="ignore")
+def _counts(name: str, cells: Sequence[str]) -> bool:
+    """Whether a column numbers its rows: by ones, or in whole steps by a name that says so."""
+    values = [_number(cell) for cell in cells if cell.strip()]
+    if len(values) < 3 or None in values:
+        return False
+    steps = np.diff(np.array(values, dtype=np.float64))
+    one = float(steps[0])
+    word = re.sub("[^a-z]", "", name.lower())
+    called = word.endswith(COUNTERS) or not word
+    return one > 0.0 and one.is_integer() and bool((steps == one).all()) and (one == 1.0 or called)
 
 
 def own_clocks(
@@ -158,7 +237,8 @@ def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock 
     ----------
     column : from 0.
     """
-    return _clock(column, name, unit, head, _is_any)
+    found = _clock(column, name, unit, head, _is_any)
+    return found and found._replace(words=found.words.replace("by its name (sure)", "as is told"))
 
 
 def _plain(name: str) -> str:
@@ -203,6 +283,11 @@ def _clock(
 def _is_any(_: Array) -> bool:
     """Return that any steps will do."""
     return True
+
+
+def _moves(steps: Array) -> bool:
+    """Return whether steps rise, and hardly any stands still."""
+    return _rises(steps) and not (steps.size and float((steps == 0.0).mean()) > REPEATED)
 
 
 def _rises(steps: Array) -> bool:
@@ -259,7 +344,7 @@ def nanoseconds(cell: str) -> int | None:
     text = cell.strip()
     if not text:
         return MISSING
-    found = _DATE.fullmatch(text)
+    found = _DATE.fullmatch(text) or _DATE.fullmatch(_in_digits(text))
     if found is None:
         lasting = _DURATION.fullmatch(text)
         return _of_day(text) if lasting is None else _of_duration(lasting)
@@ -267,6 +352,7 @@ def nanoseconds(cell: str) -> int | None:
         year, month, day = int(found[1]), int(found[2]), int(found[3])
     else:
         day, month, year = int(found[4]), int(found[5]), int(found[6])
+        year += 2000 * (year < 100)
         if month > 12:
             day, month = month, day
     try:
@@ -276,6 +362,18 @@ def nanoseconds(cell: str) -> int | None:
     time = _of_day(found[7]) if found[7] else 0
     total = None if time is None else days * 86_400_000_000_000 + time
     return total if total is not None and abs(total) < 2**62 else None
+
+
+def _in_digits(text: str) -> str:
+    """Return a date whose month is a word as digits; "" of what is none."""
+    for form in _NAMED if re.search(r"[^\W\d_]{3}", text) and len(text) < 60 else ():
+        found = form.fullmatch(text)
+        word = found["month"].lower() if found else ""
+        month = _MONTHS.get(word, _MONTHS.get(word[:3]))
+        if found and month:
+            year = int(found["year"]) + 2000 * (len(found["year"]) == 2)
+            return f"{year}-{month:02d}-{int(found['day']):02d} {found['time'] or ''}".strip()
+    return ""
 
 
 _FIRST = datetime.date(1970, 1, 1).toordinal()
@@ -299,6 +397,10 @@ def _of_day(text: str) -> int | None:
         zone = 0
     else:
         hours, minutes, whole, part = found[1], found[2], found[3], found[4]
+        if found[5]:
+            if not hours or not 1 <= int(hours) <= 12:
+                return None
+            hours = str(int(hours) % 12 + 12 * (found[5] in "pP"))
         zone = 0
         if found[6]:
             zone = (int(found[7]) * 60 + int(found[8])) * (-1 if found[6] == "-" else 1)
@@ -334,12 +436,6 @@ def seconds(
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
         and what follows where the clock goes back for long is put after the rest; refused else.
     restarts : whether a clock that goes back for long is mended, too: not one of several.
-
-    Raises
-    ------
-    RecordingError
-        Where a stamp is missing, or stamps fall or repeat, which no even clock explains and
-        nothing mends.
     """
     if values.size == 0:
         return Stamps(np.empty(0), ())
@@ -349,7 +445,7 @@ def seconds(
         raise RecordingError(
             f"{label}: {clock.name} must be a time in every row, {place} {rows[missing]} has none"
         )
-    t = _in_seconds(clock, values)
+    t = in_seconds(clock, values)
     fall = _first_step(t, lambda step: step < 0.0)
     if fall is not None and clock.unit in ("instant", "hhmmss"):
         t = _past_midnight(t)
@@ -383,11 +479,6 @@ def risen(
     ----------
     t : times [s], (n,).
     rows : (n,) where each is in the file.
-
-    Raises
-    ------
-    RecordingError
-        As `seconds`.
     """
     clock = Clock(0, name, "s", False, "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
@@ -469,8 +560,13 @@ def since(t: Array, first: float) -> Array:
     return filled(t.size, lambda part: np.round((t[part] - first) * MICROSECONDS) / MICROSECONDS)
 
 
-def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
-    """Return stamps in seconds; those of the calendar from the first on."""
+def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
+    """Return stamps in seconds, (n,); those of the calendar from the first on.
+
+    Parameters
+    ----------
+    values : (n,) as in the file.
+    """
     first = values[0]
     per_second = PER_SECOND.get(clock.unit, 1.0)
     if clock.unit == "instant":
@@ -481,6 +577,18 @@ def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     if per_second == 1.0:
         return values
     return filled(values.size, lambda part: values[part] / per_second)
+
+
+def started(clock: Clock, cell: str) -> float:
+    """Return the instant that a clock of the calendar counts from [s]; 0 of any other.
+
+    Parameters
+    ----------
+    cell : its first one.
+    """
+    if clock.unit == "instant":
+        return (nanoseconds(cell) or 0) / 1e9
+    return float(_of_digits(np.array([float(cell)]))[0]) if clock.unit == "hhmmss" else 0.0
 
 
 def _of_digits(values: Array) -> Array:
@@ -544,12 +652,31 @@ def even_clock(t: Array) -> Even | None:
         return None
     repeats = bool(moves.size < steps.size)
     if repeats and shared < SHARED:
-        return None
+        return _unjittered(t)
     usual = float(np.median(moves))
     near = moves[moves < usual + 1.5 * tick]
     if not repeats and (not WORTH * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick):
         return None  # by a coarser tick a lost sample could look rounded
     return _fitted(t, tick)
+
+
+def _unjittered(t: Array) -> Even | None:
+    """Return the even clock of stamps that jitter so far that some are there twice; or None.
+
+    They must wander about it by less than a step, and not drift by half of one: then none is lost.
+    """
+    usual = float(np.median(np.diff(t)))
+    dt = _even_step(t, JITTER * usual) if usual > 0.0 else None
+    if dt is None or t.size < 2 * WINDOW:
+        return None
+    off = t - dt * np.arange(t.size)
+    smooth = np.convolve(off, np.full(WINDOW, 1.0 / WINDOW), "valid")
+    rough = float(np.median(np.abs(np.diff(off))))
+    if np.ptp(off) > JITTER * dt or np.ptp(smooth) > 0.5 * dt or rough < 0.1 * dt:
+        return None
+    begin = float(off.max() + off.min()) / 2.0
+    even = np.round(begin + dt * np.arange(t.size), 9)
+    return Even(even, f"jitters, some stamps are there twice: taken as even at {1.0 / dt:.6g} Hz")
 
 
 def _tick(t: Array) -> float | None:

@@ -23,18 +23,22 @@ from models.logs.log import (
     one_run,
     some,
 )
+from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,
     Stamps,
     find_clock,
+    no_clock,
     own_clocks,
     seconds,
+    started,
     told_clock,
     typical_rate,
 )
 from models.schema import LONGEST_NAME, limits, require_few
 
 RUN = "run"
+LONG = 8  # columns at most of a table with a row for each value
 MOST_WORDS = 10_000  # names of runs in one log
 
 
@@ -105,6 +109,10 @@ class Table(Protocol):
     @property
     def words(self) -> tuple[str, ...]:
         """How the file is written, for people."""
+
+    @property
+    def rate(self) -> float:
+        """Samples per second that the file tells of all rows [Hz], 0 where it tells none."""
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column as text, "" where one is missing."""
@@ -198,12 +206,15 @@ class TableLog:
 
     Parameters
     ----------
-    clock_name : of the column that is the time; empty finds it.
+    clock_name, clock_unit : of the column that is the time; empty finds them.
+    rate : of all samples [Hz], in place of a time; 0 where none is told.
     mend : whether stamps that do not rise are mended, and not refused.
     """
 
     table: Table
     clock_name: str = ""
+    clock_unit: str = ""
+    rate: float = 0.0
     mend: bool = False
     _noted: list[str] = field(default_factory=list, compare=False, repr=False)
 
@@ -226,7 +237,9 @@ class TableLog:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was mended in what has been read so far, one sentence each."""
-        return tuple(dict.fromkeys(self._noted))
+        even = f"time is even at {self._even:g} Hz, as "
+        even += "is told" if self.rate else "the lines above the table say"
+        return (*([even] if self._even else []), *dict.fromkeys(self._noted))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -243,16 +256,39 @@ class TableLog:
     def clock(self) -> Clock | None:
         """The column that is the time; None where no column can be."""
         table = self.table
+        if self.rate:
+            return None
         if not self.clock_name:
             return find_clock(self.names, table.units, table.first_rows)
-        (column,) = chosen(self.path, [self.clock_name], self._places)
-        told = told_clock(column, self.clock_name, table.units[column], table.first_rows(column))
+        name = self.clock_name
+        if name not in self._places:  # it may stand with its unit in the file, or the unit be told
+            bare = [one for one in self.names if without_unit(one) == without_unit(name)]
+            name = bare[0] if len(bare) == 1 else name
+        (column,) = chosen(self.path, [name], self._places)
+        unit = self.clock_unit or table.units[column] or unit_in_name(self.clock_name)
+        told = told_clock(column, name, unit, table.first_rows(column))
         if told is None:
             raise RecordingError(
-                f"{self.path}: {self.clock_name} must be a time, its first cells are "
+                f"{self.path}: {name} must be a time, its first cells are "
                 f"{shown(', '.join(table.first_rows(column)[:3]))}"
             )
         return told
+
+    @property
+    def may_be_long(self) -> bool:
+        """Whether a row may be one value of a channel that it names."""
+        return len(self.names) <= LONG and not all(self.table.numeric) and RUN not in self.names
+
+    @cached_property
+    def start(self) -> float:
+        """The instant that times of the calendar count from [s]; 0 of others."""
+        head = [] if self.clock is None else self.table.first_rows(self.clock.column)
+        return started(self.clock, head[0]) if self.clock and head else 0.0
+
+    @cached_property
+    def _even(self) -> float:
+        """The rate of samples [Hz], told or, without a time, of the preamble; 0 where none is."""
+        return self.rate or (self.table.rate if self.clock is None else 0.0)
 
     @cached_property
     def _own_clocks(self) -> dict[int, Clock]:
@@ -290,7 +326,7 @@ class TableLog:
     def _listed(self) -> tuple[Listed, ...]:
         kinds = {} if self._run_column is None else {self._run_column: Kind.WORD}
         clocks = {one.column: one for one in (self.clock, *self._own_clocks.values()) if one}
-        cells = self.table.cells(kinds | {k: _kind(one) for k, one in clocks.items()})
+        cells = self.table.cells(kinds | {k: kind_of(one) for k, one in clocks.items()})
         size = cells.rows.size
         for words in cells.words.values():  # each run has a clock of its own
             first = words.codes == 0
@@ -309,13 +345,15 @@ class TableLog:
                     name=heading.name,
                     unit=heading.unit,
                     samples=stamps[own.column].size if own and self._own_clocks else size,
-                    rate=rates[own.column] * filled if own else math.nan,
+                    rate=(rates[own.column] if own else self._even or math.nan) * filled,
                 )
             )
         return tuple(listed)
 
-    def _stamps(self, label: str, clock: Clock, cells: Cells) -> Stamps:
-        """Return the stamps of a clock; of several each ends where it ends."""
+    def _stamps(self, label: str, clock: Clock | None, cells: Cells) -> Stamps:
+        """Return the stamps of a clock, or of an even rate; of several each ends where it ends."""
+        if clock is None:
+            return Stamps(np.arange(cells.rows.size) / self._even, ())
         column, rows, place = cells.columns[clock.column], cells.rows, self.table.place
         if not self._own_clocks:
             return seconds(label, clock, column, rows, place, mend=self.mend)
@@ -343,26 +381,26 @@ class TableLog:
         run : one of `runs`; None where there are none.
         """
         places, clock = chosen(self.path, names, self._places), self.clock
-        if clock is None:
-            raise RecordingError(
-                f"{self.path}: no column is a time that rises; columns found: '{some(self.names)}'"
-            )
+        if clock is None and not self._even:
+            why = no_clock(self.names, self.table.units, self.table.first_rows)
+            raise RecordingError(f"{self.path}: {why}; columns found: '{some(self.names)}'")
         clocks = {k: self._own_clocks.get(k, clock) for k in places}
-        kinds = {one.column: _kind(one) for one in clocks.values()}
-        timed = clock.column in places and _kind(clock) is Kind.NUMBER  # asked for as it stands
-        kinds |= {k: Kind.NUMBER for k in places if timed or k != clock.column}
+        kinds = {one.column: kind_of(one) for one in clocks.values() if one}
+        column = None if clock is None else clock.column
+        timed = clock is None or kind_of(clock) is Kind.NUMBER  # asked for as it stands
+        kinds |= {k: Kind.NUMBER for k in places if timed or k != column}
         cells = self.table.cells(kinds, self._one_run(run))
         label = str(self.path) if run is None else f"{self.path}:{run}"
-        found = {one.column: self._stamps(label, one, cells) for one in clocks.values()}
+        found = {one: self._stamps(label, one, cells) for one in dict.fromkeys(clocks.values())}
         self._noted.extend(note for stamps in found.values() for note in stamps.notes)
-        if self._own_clocks:
+        if self._own_clocks and clock is not None:
             own = dict.fromkeys(shown(one.name) for one in (clock, *self._own_clocks.values()))
             said = "channels have times of their own, each the one before it: "
             self._noted.append(said + ", ".join(own))
         channels = []
         for name, k in zip(names, places, strict=True):
-            stamps = found[clocks[k].column]
-            asked = k == clock.column and not timed
+            stamps = found[clocks[k]]
+            asked = k == column and not timed
             channels.append(
                 Channel(
                     name=name,
@@ -387,6 +425,6 @@ class TableLog:
         return self._run_column, found
 
 
-def _kind(clock: Clock) -> Kind:
+def kind_of(clock: Clock) -> Kind:
     """Return how the cells of a clock are read."""
     return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER

@@ -35,13 +35,7 @@ _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
 def open_text(path: Path) -> TableLog:
-    """Return the log in a text file of any dialect, its layout understood.
-
-    Raises
-    ------
-    RecordingError
-        Where there is no table with a header in it.
-    """
+    """Return the log in a text file of any dialect, its layout understood."""
     head, whole = b"", True
     for part in pieces(path, RecordingError, limit="megabytes"):
         head += part
@@ -50,7 +44,8 @@ def open_text(path: Path) -> TableLog:
             break
     layout = find_layout(path, head, whole)
     require_few(RecordingError, str(path), len(layout.names), "columns", "columns")
-    return TableLog(table=TextTable(path=path, layout=layout))
+    table = TextTable(path=path, layout=layout)
+    return TableLog(table=table)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +87,11 @@ class TextTable:
         return self.layout.words
 
     @property
+    def rate(self) -> float:
+        """Samples per second by the lines above the table [Hz], 0 where they tell none."""
+        return self.layout.rate
+
+    @property
     def numeric(self) -> tuple[bool, ...]:
         """Which columns hold numbers, by the first rows."""
         return self.layout.numeric
@@ -116,11 +116,6 @@ class TextTable:
         ----------
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
-
-        Raises
-        ------
-        RecordingError
-            Where a cell is not what its kind asks for, a row is cut, or there is no row.
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         gathered = Gathered(self.path, wanted, self.names, "line", run)

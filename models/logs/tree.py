@@ -7,6 +7,7 @@ A matrix is a channel for each column, or row. What has no clock is no channel.
 """
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -24,6 +25,9 @@ DATA = ("data", "values", "value", "samples", "raw")
 NAME = ("name", "label", "signalname", "blockname")
 UNIT = ("unit", "units")
 COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
+RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq")
+STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
+LEAST_RATE, MOST_RATE = 1.0, 1e5  # [Hz]
 MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
 
@@ -87,13 +91,36 @@ class Found(NamedTuple):
     signals: tuple[Signal, ...]
     clockless: tuple[str, ...]
     unread: tuple[str, ...]
+    said: tuple[str, ...] = ()
 
 
-def signals_of(tree: Mapping[str, Tree]) -> Found:
-    """Return the channels of a tree, in its order; their names may repeat."""
+def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
+    """Return the channels of a tree, in its order; their names may repeat.
+
+    Parameters
+    ----------
+    rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
+        the like of the tree, if there is one.
+    """
     walk = _Walk()
     walk.struct(dict(tree), "", ())
-    return Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
+    rate = rate or walk.rate
+    if not rate or not walk.clockless:
+        return Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
+    sizes = Counter(max(leaf.shape) for _, _, leaf, _ in walk.clockless.values())
+    samples = sizes.most_common(1)[0][0]
+    clock = Clock(
+        f"even {rate:g} Hz", Leaf(shape=(samples, 1), load=lambda: _even(samples, rate)), None, "s"
+    )
+    rest = _Walk()
+    for name, unit, leaf, columns in walk.clockless.values():
+        rest.leaf(leaf, name, unit, (clock,), columns)
+    said = (f"time is even at {rate:g} Hz of vectors without a time of their own",)
+    return Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
+
+
+def _even(samples: int, rate: float) -> Array:
+    return (np.arange(samples) / rate).reshape(-1, 1)
 
 
 def times_of(clock: Clock) -> Array:
@@ -107,13 +134,17 @@ def _line(values: Array, place: int, leaf: Leaf) -> Array:
     return values[:, place] if leaf.shape[0] >= leaf.shape[1] else values[place]
 
 
+Clockless = tuple[str, str, Leaf, tuple[list[str], list[str]] | None]
+
+
 class _Walk:
     """Collects what a tree holds."""
 
     def __init__(self) -> None:
         self.signals: list[Signal] = []
-        self.clockless: list[str] = []
+        self.clockless: dict[str, Clockless] = {}
         self.unread: list[str] = []
+        self.rate = 0.0
 
     def struct(self, node: dict[str, Tree], path: str, clocks: tuple[Clock, ...]) -> None:
         """Collect the channels of a struct; clocks: of the structs around it, the nearest first."""
@@ -163,6 +194,7 @@ class _Walk:
         """Collect a vector, or the columns of a matrix."""
         rows, width = leaf.shape
         if rows * width < 2:
+            self.told(name, leaf)
             return
         for clock in clocks:
             samples = _samples(clock)
@@ -180,7 +212,15 @@ class _Walk:
             lines = _lines(leaf, name, unit, along, own, columns)
             self.signals += [signal for signal in lines if signal.place != own.column]
         else:
-            self.clockless.append(name)
+            self.clockless[name] = (name, unit, leaf, columns)
+
+    def told(self, name: str, leaf: Leaf) -> None:
+        """Take a single number for the rate of samples, or the time between them, by its name."""
+        word = re.sub("[^a-z]", "", name.rpartition(".")[2].lower())
+        if word in RATES + STEPS and leaf.shape == (1, 1):
+            value = float(leaf.load()[0, 0])
+            rate = value if word in RATES or not value else 1.0 / value
+            self.rate = rate if LEAST_RATE <= rate <= MOST_RATE else self.rate
 
 
 def _lines(
@@ -255,7 +295,9 @@ def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     if min(leaf.shape) < 2 or min(leaf.shape) > MOST_COLUMNS or max(leaf.shape) < 3:
         return None
     clock = Clock(name, leaf, 0, "")
-    return clock if bool(np.all(np.diff(times_of(clock)) > 0.0)) else None
+    steps = np.diff(times_of(clock))
+    counts = bool(np.all(steps == 1.0))  # rows, not seconds
+    return clock if bool(np.all(steps > 0.0)) and not counts else None
 
 
 def _samples(clock: Clock) -> int:

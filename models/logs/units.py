@@ -5,114 +5,42 @@ A spelling may mean two things ("kN" is a force, "kn" a speed): the quantity tha
 
 import math
 import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
 
 from codegen.escape import shown
 from models.logs.log import RecordingError
 
 SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
-ACCELERATION, FORCE, TIME = "acceleration", "force", "time"
+ACCELERATION, FORCE, TIME, LENGTH = "acceleration", "force", "time", "length"
 TURNS = "rate of turns"  # of wheels; in rad/s it is called a rate as that of yaw
-SI = {SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "N", TIME: "s"}
+SI = {
+    SPEED: "m/s",
+    ANGLE: "rad",
+    RATE: "rad/s",
+    ACCELERATION: "m/s^2",
+    FORCE: "N",
+    TIME: "s",
+    LENGTH: "m",
+}
 
-REVOLUTION = 2.0 * math.pi
-DEGREE, POUND, FOOT, MILE = math.pi / 180.0, 4.4482216152605, 0.3048, 1609.344
-G = 9.80665  # standard acceleration of free fall, by which "g" and "kgf" are defined [m/s^2]
-PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0, "h": 1.0 / 3600.0}
-_TIMES = {  # by spelling
-    spelling: unit
-    for unit, words in {
-        "s": "sec secs second seconds",
-        "ms": "msec msecs millisecond milliseconds",
-        "us": "usec usecs microsecond microseconds",
-        "ns": "nsec nsecs nanosecond nanoseconds",
-        "min": "mins minute minutes",
-        "h": "hr hrs hour hours",
-    }.items()
-    for spelling in (unit, *words.split())
-}
+TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
-FACTORS = {
-    SPEED: {
-        "m/s": 1.0,
-        "mps": 1.0,
-        "km/h": 1.0 / 3.6,
-        "kmh": 1.0 / 3.6,
-        "kph": 1.0 / 3.6,
-        "kmph": 1.0 / 3.6,
-        "km/hr": 1.0 / 3.6,
-        "mph": MILE / 3600.0,
-        "mi/h": MILE / 3600.0,
-        "miles/h": MILE / 3600.0,
-        "kn": 1852.0 / 3600.0,
-        "kt": 1852.0 / 3600.0,
-        "kts": 1852.0 / 3600.0,
-        "knot": 1852.0 / 3600.0,
-        "knots": 1852.0 / 3600.0,
-        "mm/s": 1e-3,
-        "cm/s": 1e-2,
-        "ft/s": FOOT,
-        "fps": FOOT,
-    },
-    ANGLE: {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "degs": DEGREE, "grad": DEGREE},
-    RATE: {
-        "rad/s": 1.0,
-        "rads": 1.0,
-        "1/s": 1.0,
-        "mrad/s": 1e-3,
-        "deg/s": DEGREE,
-        "degs/s": DEGREE,
-        "grad/s": DEGREE,
-        "dps": DEGREE,
-        "mdeg/s": 1e-3 * DEGREE,
-        "deg/h": DEGREE / 3600.0,
-    },
-    ACCELERATION: {
-        "m/s2": 1.0,
-        "m/s/s": 1.0,
-        "mps2": 1.0,
-        "mm/s2": 1e-3,
-        "cm/s2": 1e-2,
-        "ft/s2": FOOT,
-        "g": G,
-        "gn": G,
-        "g0": G,
-        "mg": 1e-3 * G,
-    },
-    FORCE: {
-        "n": 1.0,
-        "newton": 1.0,
-        "kn": 1e3,
-        "dan": 10.0,
-        "lbf": POUND,
-        "lb": POUND,
-        "lbs": POUND,
-        "kgf": G,
-        "kp": G,
-    },
-    TURNS: {
-        "rpm": REVOLUTION / 60.0,
-        "1/min": REVOLUTION / 60.0,
-        "u/min": REVOLUTION / 60.0,
-        "rev/min": REVOLUTION / 60.0,
-        "rps": REVOLUTION,
-        "rev/s": REVOLUTION,
-        "u/s": REVOLUTION,
-        "hz": REVOLUTION,
-    },
-    TIME: {spelling: 1.0 / PER_SECOND[unit] for spelling, unit in _TIMES.items()},
+FACTORS: Mapping[str, Mapping[str, float]] = {
+    quantity: {spelling: factor for some, factor in rows for spelling in some.split()}
+    for quantity, rows in TABLES["factors"].items()
 }
-OTHERS = {  # what else loggers log, so that an error can say what a unit is of
-    "length": ("m", "mm", "cm", "km", "ft", "in", "mi"),
-    "torque": ("nm", "n*m", "lbft", "lb-ft", "ft-lb"),
-    "pressure": ("bar", "mbar", "kpa", "pa", "psi", "hpa"),
-    "temperature": ("c", "degc", "f", "degf", "k"),
-    "voltage": ("v", "mv", "volt"),
-    "current": ("a", "ma"),
-    "share": ("%", "percent", "ratio"),
-    "mass": ("kg", "t"),
-    "frequency": ("khz",),
-    "power": ("kw", "w", "hp"),
+OTHERS = {name: tuple(some.split()) for name, some in TABLES["others"].items()}
+NO_UNIT = ("", *OTHERS.pop("none"))
+PER_SECOND = {  # exact
+    unit: 1.0 / factor if factor > 1.0 else float(round(1.0 / factor))
+    for unit, factor in FACTORS[TIME].items()
 }
+_SPELLED = {word: unit for unit, some in TABLES["spellings"].items() for word in some.split()}
+_WORD = re.compile(
+    "(?<![a-z'])(?:" + "|".join(sorted(_SPELLED, key=len, reverse=True)) + ")(?![a-z'])"
+)
 # Where nothing tells a unit: beyond which number it is no SI unit, and which it is then. A hand
 # wheel goes further. No car turns faster than once in a second, or drives at 430 km/h.
 HAND_WHEEL = "angle of a hand wheel"
@@ -123,39 +51,14 @@ FARTHEST = {
     RATE: (2.0 * math.pi, "deg/s"),
 }
 SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire, so it is in g
-NO_UNIT = ("", "-", "none", "1", "unitless", "n/a", "si")
-_WORDS = (
-    ("²", "2"),
-    ("µ", "u"),
-    ("μ", "u"),
-    ("°", "deg"),
-    ("º", "deg"),
-    ("degrees", "deg"),
-    ("degree", "deg"),
-    ("radians", "rad"),
-    ("radian", "rad"),
-    ("kilometers", "km"),
-    ("kilometres", "km"),
-    ("meters", "m"),
-    ("metres", "m"),
-    ("|", "/"),  # as dSPACE writes it: km|h, where a name may have no slash
-    ("**", "^"),
-    ("·", "*"),
-    ("⋅", "*"),
-    ("^", ""),
-    (" per ", "/"),
-    ("/hour", "/h"),
-    ("/seconds", "/s"),
-    ("/second", "/s"),
-    ("/sec", "/s"),
-)
 
 
 def _plain(unit: str) -> str:
     """Return a spelling without brackets, blanks and exponents' signs, in small letters."""
-    text = unit.strip().strip("[](){}").strip().lower()
-    for old, new in _WORDS:
+    text = unit.strip().strip("[](){}").strip().lower().rstrip(".")
+    for old, new in TABLES["signs"].items():
         text = text.replace(old, new)
+    text = _WORD.sub(lambda found: _SPELLED[found[0]], text)
     text = re.sub(r"(?:[*. ]s|/s)-?([12])(?!\d)|(?<=[a-z])s-([12])$", _per_second, text)
     return text.replace(" ", "")
 
@@ -185,7 +88,8 @@ def is_known(unit: str) -> bool:
 
 def time_unit(unit: str) -> str:
     """Return the unit of time, one of `PER_SECOND`, that a spelling is; "" where it is none."""
-    return _TIMES.get(_plain(unit), "")
+    plain = _plain(unit)
+    return plain if plain in FACTORS[TIME] else ""
 
 
 def are_same(one: str, other: str) -> bool:
@@ -223,18 +127,13 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     ----------
     unit : as written; where it tells none, SI is meant.
     quantity : of the signal, one of `SI`.
-
-    Raises
-    ------
-    RecordingError
-        Where the unit is of something else, or not known.
     """
     plain = _plain(unit)
     if plain in NO_UNIT:
         return 1.0
     if plain in FACTORS[quantity]:
         return FACTORS[quantity][plain]
-    known = ", ".join(dict.fromkeys(_typical(quantity)))
+    known = ", ".join(TABLES["typical"][quantity].split())
     other = quantities(unit) or tuple(name for name, all_ in OTHERS.items() if plain in all_)
     if other:
         raise RecordingError(
@@ -245,18 +144,6 @@ def to_si(unit: str, quantity: str, what: str) -> float:
         f"{what} has the unit {shown(unit.strip())}, which is not known; name one of "
         f"{_named(quantity)}: {known}"
     )
-
-
-def _typical(quantity: str) -> tuple[str, ...]:
-    return {
-        SPEED: ("m/s", "km/h", "mph", "knots"),
-        ANGLE: ("rad", "deg", "mrad"),
-        RATE: ("rad/s", "deg/s"),
-        ACCELERATION: ("m/s^2", "g"),
-        FORCE: ("N", "kN", "lbf"),
-        TIME: ("s", "ms", "us", "ns"),
-        TURNS: ("rpm", "1/min", "Hz"),
-    }[quantity]
 
 
 def _named(quantity: str) -> str:

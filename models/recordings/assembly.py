@@ -9,7 +9,6 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from codegen.arrays import Array, filled
-from codegen.escape import shown
 from models.logs.clock import (
     SLOWEST,
     Raw,
@@ -23,12 +22,21 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
-from models.logs.signals import BETA, QUANTITIES, SPARED, WHEELS, Signal, quantity_of
-from models.logs.spelling import without_unit
-from models.logs.stamps import Stamps, risen
-from models.logs.units import TIME, is_told, to_si
-from models.recordings.choice import chosen_signals, column_of, has_wheels, listing
-from models.recordings.map import AXES, CUT, MEND, LogMap
+from models.logs.signals import (
+    BETA,
+    POSE,
+    QUANTITIES,
+    SPARED,
+    WHEELS,
+    Signal,
+    has_speed,
+    quantity_of,
+    signed,
+)
+from models.logs.units import is_told, to_si
+from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
+from models.recordings.map import AXES, CUT, LogMap
+from models.recordings.pose import with_pose
 from models.recordings.record import (
     LARGEST,
     MINIMUM_SAMPLES,
@@ -47,6 +55,9 @@ FIELDS = {
     "Fyf": "axle_force",
     "Fyr": "axle_force",
     BETA: "delta_f",
+    "x": "t",
+    "y": "t",
+    "heading": "delta_f",
     **dict.fromkeys(WHEELS, "v_x"),
 }
 
@@ -83,33 +94,38 @@ def recording_of(
     label = str(log.path) if run is None else f"{log.path}:{run}"
     headings = log.headings()
     reading = chosen_signals(log, headings, log_map, run)
-    wants_clock = _wants_clock(log, headings, log_map.clock)
     signals, learnt = reading.signals, ""
-    if "v_x" in signals:
+    if has_speed(signals):
         if has_wheels(signals):
             learnt = _scale_note(log, signals, log_map, run)
         signals = _without_wheels(signals)
     spared = ""
     try:
-        parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
+        parts = _channels(log, label, signals, log_map, run)
+        signals, parts, posed = with_pose(label, signals, parts)
         stretches = _stretches(label, signals, parts, log_map, dt)
     except RecordingError as error:
         needed = {
-            key: one for key, one in signals.items() if key not in SPARED or key in log_map.signals
+            key: one
+            for key, one in signals.items()
+            if key not in (*SPARED, *POSE) or key in log_map.signals
         }
-        if len(needed) == len(signals):
+        if len(needed) == len(signals) or missing_signals(needed):
             raise
-        signals, spared = needed, f"{', '.join(map(column_of, SPARED))} is left aside: {error}"
-        parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
+        left = ", ".join(column_of(key) for key in signals if key not in needed)
+        signals, spared = needed, f"{left} is left aside: {error}"
+        parts = _channels(log, label, signals, log_map, run)
+        signals, parts, posed = with_pose(label, signals, parts)
         stretches = _stretches(label, signals, parts, log_map, dt)
     rolls = ""
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
         stretches = stretches._replace(kept=kept)
-    mended = dict.fromkeys(note for raws in parts.values() for raw in raws for note in raw.mended)
-    notes = (*_notes(log), *reading.notes, *mended, *_hole_notes(parts))
+    own = "vx is taken from" if posed else "\0"  # which the pose tells
+    notes = (*_notes(log), *(note for note in reading.notes if not note.startswith(own)))
+    notes += _hole_notes(parts)
     notes += _gap_notes(stretches.kept)
-    notes += tuple(note for note in (learnt, rolls, spared) if note)
+    notes += tuple(note for note in (*posed, learnt, rolls, spared) if note)
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
         notes += (f"left out: {stretches.short} stretch{several} of less than {_shortest(dt):g} s",)
@@ -128,44 +144,22 @@ def _notes(log: LogFile) -> tuple[str, ...]:
     return (*said, *log.notes)
 
 
-def _wants_clock(log: LogFile, headings: Sequence[Heading], clock: str) -> bool:
-    """Return whether the time is another channel than the one that the format takes for it."""
-    names = [one.name for one in headings]
-    own = clock if log.clock is None else log.clock.name
-    if clock and clock not in names and clock not in (own, without_unit(own)):
-        raise RecordingError(
-            f"{log.path}: there is no column {shown(clock)} to read as t; {listing(names)}"
-        )
-    return clock in names
-
-
 def _channels(
     log: LogFile,
     label: str,
     signals: Mapping[str, Signal],
     log_map: LogMap,
     run: str | None,
-    *,
-    wants_clock: bool,
 ) -> dict[str, list[Raw]]:
-    """Return by signal its channels in SI, each on its own clock, or on that which a map names.
+    """Return by signal its channels in SI, each on its own clock.
 
     Turns of wheels become speeds, where there is no v_x that tells their radius.
     """
-    timed = log_map if wants_clock else None
-    names = list(dict.fromkeys(one for signal in signals.values() for one in signal.channel))
-    asked = names if timed is None else [*names, timed.clock]
-    by_name = dict(zip(asked, log.read(asked, run), strict=True))
-    mended: tuple[str, ...] = ()
-    if timed is not None:
-        clock = by_name[timed.clock]
-        unit = timed.clock_unit or clock.unit
-        t = clock.values * to_si(unit, TIME, f"{label}: t (channel {clock.name!r})")
-        stamps = Stamps(t, ())
-        if log_map.order == MEND:
-            stamps = risen(label, "t", t, clock.rows, clock.place, mend=True)
-        mended = stamps.notes
-        by_name = {name: _timed(label, by_name[name], clock, stamps) for name in names}
+    asked = [
+        (*signal.channel, *([signal.sign] if signal.sign else [])) for signal in signals.values()
+    ]
+    names = list(dict.fromkeys(one for some in asked for one in some))
+    by_name = dict(zip(names, log.read(names, run), strict=True))
     found: dict[str, list[Raw]] = {}
     for ours, signal in signals.items():
         found[ours] = []
@@ -176,13 +170,16 @@ def _channels(
             what = f"{label}: {column_of(ours)}"
             what += "" if name == column_of(ours) else f" (channel {name!r})"
             factor = to_si(unit, quantity_of(ours, unit), what)
-            if ours in WHEELS and "v_x" not in signals:
+            if ours in WHEELS and not has_speed(signals):
                 factor *= wheel_factor(what, ours, unit, log_map.wheels)
             _require_finite(label, column_of(ours), channel)
             values = scaled(channel.values, factor)
+            if signal.sign:
+                sign = by_name[signal.sign]
+                values = signed(values, channel.t, sign.t, sign.values)
             _require_of_a_car(label, ours, values, channel)
             empty = holes(logged).size if cut else 0
-            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty, mended))
+            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty))
     return found
 
 
@@ -196,23 +193,6 @@ def scaled(values: Array, factor: float) -> Array:
     if factor == 1.0:
         return values
     return filled(values.size, lambda part: values[part] * factor)
-
-
-def _timed(label: str, channel: Channel, clock: Channel, stamps: Stamps) -> Channel:
-    """Return a channel on the time that another one tells."""
-    if channel.values.size != clock.values.size:
-        raise RecordingError(
-            f"{label}: {clock.name!r} must have a sample for each of {channel.name!r} to be its "
-            f"time, it has {clock.values.size} of {channel.values.size}"
-        )
-    return Channel(
-        name=channel.name,
-        unit=channel.unit,
-        t=stamps.t,
-        values=stamps.of(channel.values),
-        place=channel.place,
-        rows=stamps.of(channel.rows),
-    )
 
 
 def _require_finite(label: str, name: str, channel: Channel) -> None:
@@ -393,8 +373,7 @@ def wheel_scales(
     """
     headings = log.headings()
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
-    wants_clock = _wants_clock(log, headings, log_map.clock)
-    parts = _channels(log, str(log.path), of_wheels, log_map, run, wants_clock=wants_clock)
+    parts = _channels(log, str(log.path), of_wheels, log_map, run)
     return learnt_scales(parts, of_wheels, wheel_units(headings, of_wheels))
 
 

@@ -5,6 +5,7 @@ where every signal that is needed is sure. What was proposed is said in the reco
 something is not sure, the error says what it may be, and the word that tells it.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -17,11 +18,13 @@ from models.logs.signals import (
     COLUMNS,
     INSTEAD,
     NEEDED,
+    POSE,
     QUANTITIES,
     SPARED,
     WHEELS,
     Signal,
     require_fitting,
+    signal_name,
     told_by,
 )
 from models.logs.spelling import without_unit
@@ -29,6 +32,9 @@ from models.logs.units import SI
 from models.recordings.map import LogMap
 
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
+
+
+OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
 
 
 class Reading(NamedTuple):
@@ -93,7 +99,7 @@ def as_listed(
     found = {}
     for name, signal in signals.items():
         channels = []
-        for channel in signal.channel:
+        for channel in signal.asked:
             likely = [channel] if channel in names else bare.get(channel, [])
             if not likely and name == "v_x" and has_wheels(signals):
                 break
@@ -104,7 +110,8 @@ def as_listed(
                 )
             channels += likely
         else:
-            found[name] = replace(signal, channel=tuple(channels))
+            sign = channels.pop() if signal.sign else ""
+            found[name] = replace(signal, channel=tuple(channels), sign=sign)
     return found
 
 
@@ -113,11 +120,15 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     sure = {name: one for name, one in proposal.signals().items() if name not in told}
     if has_wheels(told):
         sure.pop("v_x", None)
+    if "v_y" in told_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
+        sure = {name: one for name, one in sure.items() if name not in POSE}
     if "v_x" in told_by(told) or "v_x" in proposal.guesses:
         sure = {name: one for name, one in sure.items() if name not in WHEELS}
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
+    if not set(POSE) <= set(found):
+        found = {name: one for name, one in found.items() if name not in POSE}
     return {name: found[name] for name in QUANTITIES if name in found}
 
 
@@ -167,12 +178,31 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
             continue
         if f"{column} (2)" in names:
             raise RecordingError(f"{log.path}: column {column} appears more than once")
-        if column in names and name != BETA:
+        if column in names and name not in (BETA, *POSE):
             found[name] = Signal(channel=(column,))
+    if log.format in OF_STRUCTS and not found:
+        found = _in_struct(names)
     if not {"Fyf", "Fyr"} & set(names) and set(INVERSE) <= set(names):
         found |= {ours: Signal(channel=(name,)) for name, ours in INVERSE.items()}
     require_fitting(found, f"{log.path}: ")
     return found
+
+
+def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
+    """Return the signals whose standard names are fields of structs; of two that of the fuller."""
+    found: dict[str, list[str]] = {}
+    for one in names:
+        struct, dot, field = one.rpartition(".")
+        name = signal_name(field)
+        if dot and name and name not in (BETA, *POSE):
+            found.setdefault(name, []).append(struct)
+    count = Counter(struct for structs in found.values() for struct in structs)
+    result = {}
+    for name, structs in found.items():
+        first, *rest = sorted(structs, key=lambda struct: -count[struct])
+        if not rest or count[first] > count[rest[0]]:
+            result[name] = Signal(channel=(f"{first}.{column_of(name)}",))
+    return result
 
 
 def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str, Signal]:
@@ -203,6 +233,7 @@ def listing(names: Sequence[str]) -> str:
 def _taken_text(name: str, signal: Signal) -> str:
     channels = [without_unit(one) for one in signal.channel]
     unit = f" [{signal.unit}]" if signal.unit else ""
+    unit += " with its sign turned" if signal.factor < 0.0 else ""
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
 
 
@@ -283,4 +314,6 @@ def column_word(name: str, proposal: Proposal) -> str:
         return ""
     unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
     channels = " + ".join(without_unit(one) for one in guess.channel)
-    return f'"{column_of(name)}={channels} [{unit}]{ratio}"'
+    sign = f" sign({guess.sign})" if guess.sign else ""
+    ratio += f" *{guess.factor:g}" if guess.factor != 1.0 else ""
+    return f'"{column_of(name)}={channels}{sign} [{unit}]{ratio}"'

@@ -23,7 +23,8 @@ from typing import Any
 from codegen.escape import shown
 from models.files import resolved, write_atomically
 from models.logs.clock import LONGEST_GAP
-from models.logs.log import RecordingError
+from models.logs.door import open_log
+from models.logs.log import LogFile, RecordingError
 from models.logs.signals import (
     INSTEAD,
     NEEDED,
@@ -59,6 +60,7 @@ class LogMap:
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
     clock : channel that is the time, where it is not what the format takes for it; empty else.
     clock_unit : of that channel; empty takes that of the file, seconds where it tells none.
+    rate : of the samples [Hz], where no channel is a time; None where none is told.
     longest_gap : the log is cut where a channel has no sample for longer [s].
     holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
         has no sample there.
@@ -82,6 +84,7 @@ class LogMap:
     dbc: str = ""
     clock: str = ""
     clock_unit: str = ""
+    rate: float | None = None
     longest_gap: float = LONGEST_GAP
     holes: str = REFUSE
     order: str = REFUSE
@@ -97,6 +100,10 @@ class LogMap:
             raise RecordingError(
                 f"longest_gap must be positive and finite, it is {self.longest_gap}"
             )
+        if self.rate is not None and not 0.0 < self.rate < math.inf:
+            raise RecordingError(f"rate must be positive and finite, in Hz, it is {self.rate}")
+        if self.rate is not None and self.clock:
+            raise RecordingError("rate stands in for a time: give it or the channel of the clock")
         if self.holes not in (REFUSE, CUT):
             raise RecordingError(f"holes must be {REFUSE} or {CUT}, not {shown(self.holes)}")
         if self.order not in (REFUSE, MEND):
@@ -106,6 +113,17 @@ class LogMap:
         for name, signal in self.signals.items():
             if signal.unit:
                 to_si(signal.unit, quantity_of(name, signal.unit), f"signals.{name}")
+
+    def opened(self, path: str | PathLike[str]) -> LogFile:
+        """Open a log, its time as the map tells it."""
+        return open_log(
+            Path(path),
+            self.dbc or None,
+            mend=self.order == MEND,
+            clock=self.clock,
+            clock_unit=self.clock_unit,
+            rate=self.rate or 0.0,
+        )
 
     @property
     def is_complete(self) -> bool:
@@ -154,10 +172,9 @@ class LogMap:
         if "clock" in table:
             inner = table.table("clock")
             names = {"channel": "clock", "unit": "clock_unit", "holes": "holes", "order": "order"}
-            inner.only(*names, "longest_gap")
+            inner.only(*names, "longest_gap", "rate")
             given |= {ours: inner.text(key) for key, ours in names.items() if key in inner}
-            if "longest_gap" in inner:
-                given["longest_gap"] = inner.number("longest_gap")
+            given |= {key: inner.number(key) for key in ("longest_gap", "rate") if key in inner}
         if "filters" in table:
             inner = table.table("filters")
             inner.only("low_pass")
@@ -186,7 +203,7 @@ class LogMap:
         clock = {"channel": "clock", "unit": "clock_unit"}
         for table, keys in (
             ("file", {"axes": "axes", "run": "run", "dbc": "dbc"}),
-            ("clock", clock | {key: key for key in ("longest_gap", "holes", "order")}),
+            ("clock", clock | {key: key for key in ("rate", "longest_gap", "holes", "order")}),
             ("filters", {"low_pass": "low_pass"}),
         ):
             told = {key: getattr(self, ours) for key, ours in keys.items()}
@@ -234,8 +251,7 @@ def _signal(table: Table, name: str) -> Signal:
         given["channel"] = (table.text("channel"),)
     else:
         given["channel"] = table.texts("channel")
-    if "unit" in table:
-        given["unit"] = table.text("unit")
+    given |= {key: table.text(key) for key in ("unit", "sign") if key in table}
     for key in ("factor", "offset", "ratio"):
         if key in table:
             given[key] = table.number(key)
@@ -285,8 +301,9 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
 
     "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
     "delta_f=SteerFL + SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a
-    star, an offset in SI behind a minus, a ratio of the steering behind a slash. Of several
-    channels, with blanks about each plus, the mean is taken, of forces the sum.
+    star, an offset in SI behind a minus, a ratio of the steering behind a slash; sign(CHANNEL) of
+    an amount whose sign another channel has. Of several channels, with blanks about each plus, the
+    mean is taken, of forces the sum.
 
     Raises
     ------
@@ -304,17 +321,19 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
             raise RecordingError(f"{shown(name)} is no column of ours: {known}")
         if ours in found:
             raise RecordingError(f"--columns tells {name} twice")
-        found[ours] = _told(rest, pair)
+        found[ours] = told_channel(rest)
     require_fitting(found, "--columns: ")
     return found
 
 
 _CHANGE = re.compile(r"\s+(?P<sign>[/*-])\s*(?P<number>[+-]?[\d.]+(?:e[+-]?\d+)?)$", re.IGNORECASE)
+_SIGN = re.compile(r"\s*(?:\*\s*)?\bsign\((?P<channel>.+)\)(?:\s*\*)?\s*")
 _UNIT = re.compile(r"\s+\[(?P<unit>[^\[\]]*)\]$")
 
 
-def _told(text: str, pair: str) -> Signal:
+def told_channel(text: str) -> Signal:
     """Return what stands behind the name in one word of a command line."""
+    pair = text
     given: dict[str, Any] = {}
     keys = {"/": "ratio", "*": "factor", "-": "offset"}
     while found := _CHANGE.search(text):
@@ -327,6 +346,9 @@ def _told(text: str, pair: str) -> Signal:
             raise RecordingError(f"--columns: {shown(found['number'])} is no number") from None
     if found := _UNIT.search(text):
         given["unit"], text = found["unit"].strip(), text[: found.start()]
+    if found := _SIGN.search(text):
+        given["sign"] = found["channel"].strip()
+        text = text[: found.start()] + text[found.end() :]
     try:
         return Signal(channel=tuple(part.strip() for part in text.split(" + ")), **given)
     except RecordingError as error:

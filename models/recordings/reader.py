@@ -12,7 +12,7 @@ from models.logs.log import LogFile, RecordingError
 from models.logs.memory import ArrayLog
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
-from models.recordings.map import MEND, LogMap, told_signals
+from models.recordings.map import MEND, LogMap, told_channel, told_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
@@ -70,10 +70,17 @@ def read_recording(
     told = with_columns(map_of(log_map), columns)
     if not isinstance(source, str | PathLike):
         name = name or "recording"
-        arrays = ArrayLog(name, source, told.clock, mend=told.order == MEND)
+        arrays = ArrayLog(
+            name,
+            source,
+            told.clock,
+            told.clock_unit,
+            mend=told.order == MEND,
+            rate=told.rate or 0.0,
+        )
         return _judged(arrays, name, replace(told, clock=""), run=run, dt=dt, check=check)
     path = Path(source)
-    log = open_log(path, told.dbc or None, mend=told.order == MEND)
+    log = told.opened(path)
     return _judged(log, name or _stem(path), told, run=run, dt=dt, check=check)
 
 
@@ -146,7 +153,10 @@ def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
         )
     signals = {name: words for name, words in columns.items() if name != "t"}
     told = told.with_signals(told_signals([f"{a}={b}" for a, b in signals.items()]))
-    return replace(told, clock=columns["t"]) if "t" in columns else told
+    if "t" not in columns:
+        return told
+    clock = told_channel(columns["t"])
+    return replace(told, clock=" + ".join(clock.channel), clock_unit=clock.unit, rate=None)
 
 
 def _judged(

@@ -10,7 +10,7 @@ import pytest
 from identifier.frozen import vehicle_from, vehicle_numbers
 from models.bicycle import BicycleParameters
 from models.tires import MagicFormula
-from models.vehicle import GRAVITY, OF_CHASSIS, Chassis, Vehicle, VehicleError, sedan
+from models.vehicle import GRAVITY, OF_CHASSIS, Chassis, Vehicle, VehicleError, estimate, sedan
 
 SIX = """mass = 1500
 yaw_inertia = 2500.0
@@ -191,6 +191,11 @@ def test_what_a_file_leaves_out_is_estimated_and_said(tmp_path):
     assert "rear = 8.393e+04 N/rad (14 static axle loads per rad)" in car.estimates
     assert "stiffness_front" not in car.estimates
     assert Vehicle.from_toml(written(tmp_path, SIX)).estimates == ""
+
+
+@pytest.mark.parametrize(("l_f", "l_r", "share"), [(0.0805, 0.093, 0.5), (1.2, 1.5, 1.0)])
+def test_a_model_car_has_less_inertia_for_its_size(l_f, l_r, share):
+    assert estimate(3.0, l_f, l_r)["yaw_inertia"] == pytest.approx(share * 3.0 * l_f * l_r)
 
 
 def test_estimates_stay_estimates_in_files_and_models(tmp_path):

@@ -12,14 +12,13 @@ import numpy as np
 from codegen.escape import visible
 from models.files import write_atomically
 from models.logs.clock import holes
-from models.logs.door import open_log
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, told_by
 from models.logs.units import SI, is_told
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
-from models.recordings.map import CUT, MEND
+from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, told_map
@@ -56,18 +55,19 @@ def run(options: argparse.Namespace) -> int:
         if options.write.suffix.lower() != ".toml":
             raise ValueError(f"{options.write}: the name must end in .toml")
         require_free(options.write, force=options.force)
-    log = open_log(path, told.dbc or None, mend=told.order == MEND)
+    log = told.opened(path)
     chosen = _run_of(log, options.run_name or named or told.run)
     listed = log.listed()
     names = [one.name for one in listed]
     proposal = propose(log, log.headings(), chosen)
     by_map = choice.as_listed(log, told.signals, names)
-    signals = choice.likely_signals({**choice.standard_signals(log, names), **by_map}, proposal)
+    sure = {**choice.standard_signals(log, names), **by_map}
+    signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
     missing = choice.missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
-    tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
+    tell(channels_text(listed, seen, signals, proposal, frozenset(sure)))
     empty = holes_text(seen, signals)
     if empty:
         cut = "cut out, as is told" if told.holes == CUT else CUT_BY_MAP
@@ -179,6 +179,8 @@ def _meaning(
             guess = proposal.guesses.get(name)
             guessed = name not in known and guess is not None and guess.confidence < 1.0
             told = f" ({guess.confidence:.0%})" if guessed and guess is not None else ""
+            told += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
+            told += f", its sign in {visible(signal.sign)}" if signal.sign else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
             return f"{choice.column_of(name)}: {MEANINGS[name]}{told}{among}"
     for name, guess in proposal.guesses.items():

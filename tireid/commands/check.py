@@ -185,6 +185,7 @@ def _require_drive(options: argparse.Namespace) -> None:
     told = {
         "--columns": options.columns,
         "--dbc": options.dbc,
+        "--rate": options.rate is not None,
         "--cut-holes": options.cut_holes,
         "--mend-clock": options.mend_clock,
     }

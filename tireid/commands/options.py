@@ -221,7 +221,7 @@ def add_log_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns, --dbc, --cut-holes and --mend-clock: how a log is read."""
+    """Add --log, --columns, --dbc, --rate, --cut-holes and --mend-clock: how a log is read."""
     parser.add_argument(
         "--log",
         dest="log_map",
@@ -240,6 +240,12 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--dbc", metavar="FILE", help="DBC that tells the signals in the frames of a CAN log"
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="samples per second, where no column of the logs is a time",
     )
     parser.add_argument(
         "--cut-holes",
@@ -272,6 +278,8 @@ def told_map(options: argparse.Namespace) -> LogMap:
         told = replace(told, holes=CUT)
     if options.mend_clock:
         told = replace(told, order=MEND)
+    if options.rate is not None:
+        told = replace(told, rate=options.rate, clock="", clock_unit="")
     return told if options.dbc is None else replace(told, dbc=options.dbc)
 
 

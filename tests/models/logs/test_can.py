@@ -308,3 +308,102 @@ def test_a_fault_of_the_dbc_is_told_of_the_dbc(place, fault, selects, tmp_path):
     assert refusal(path, base) == f"{base}: frame F: signal V {fault}"
     if not selects:
         assert open_log(path, base).read(["F.W"])[0].values.size == 20
+
+
+GROUP = 'BO_ 2566916606 ESP: 4 Car\n SG_ YawRate : 0|16@1- (0.001,0) [-4|4] "rad/s" Car\n'
+J1939 = """BA_DEF_ "ProtocolType" STRING ;
+BA_DEF_DEF_ "ProtocolType" "";
+BA_ "ProtocolType" "J1939";
+"""
+
+
+def of_a_truck(folder, more="", sender=0xFE):
+    message = GROUP.replace("2566916606", str(0x98F00900 | sender))
+    return dbc(folder, f'VERSION ""\n\nBU_: Car\n\n{message}{more}')
+
+
+def frames(count, identifier, bus="can0"):
+    return [(10.0 + 0.01 * k, bus, identifier, struct.pack("<hh", k, 0)) for k in range(count)]
+
+
+@pytest.mark.parametrize("senders", [[0x18F0093E], [0x08F009FE], [0x18F0093E, 0x18F00917]])
+@pytest.mark.parametrize("told", ["", J1939])
+def test_frames_of_j1939_are_known_by_their_parameter_group(senders, told, tmp_path):
+    """0x18F009FE in the database: priority and sender differ in the log."""
+    base = of_a_truck(tmp_path, told)
+    path = tmp_path / "bus.log"
+    lines = [row for one in senders for row in frames(30, one)]
+    path.write_text("".join(f"({t:.6f}) {b} {i:08X}#{d.hex().upper()}\n" for t, b, i, d in lines))
+    log = open_log(path, base)
+    assert len(log.listed()) == len(senders)
+    if len(senders) == 2:
+        assert [one.name for one in log.listed()] == [
+            "bus can0 from 3E/ESP.YawRate",
+            "bus can0 from 17/ESP.YawRate",
+        ]
+    for one in log.read([one.name for one in log.listed()]):
+        np.testing.assert_allclose(one.values, 0.001 * np.arange(30))
+
+
+def test_a_parameter_group_with_a_receiver_is_known_whoever_receives():
+    from models.logs.frames import group_of
+
+    assert group_of(0x18EA0BFE) == group_of(0x0CEAFF21) == 0xEA00
+    assert group_of(0x18F0093E) == 0xF009 and group_of(0x19F0093E) == 0x1F009
+
+
+def test_a_long_identifier_of_no_j1939_is_not_taken_for_another(tmp_path):
+    base = of_a_truck(tmp_path, sender=0x01)
+    path = tmp_path / "bus.log"
+    path.write_text("".join(f"({t:.6f}) {b} 18F0093E#{d.hex()}\n" for t, b, _, d in frames(9, 0)))
+    with pytest.raises(RecordingError, match="9 unknown frames"):
+        open_log(path, base)
+
+
+TEXTS = {
+    "candump": lambda t, i, d: f" ({t:.6f})  can0  {i:08X}   [{len(d)}]  {d.hex(' ').upper()}",
+    "candump -x": lambda t, i, d: f" ({t:.6f})  can0  RX - -  {i:08X}   [{len(d)}]  {d.hex(' ')}",
+    "candump -tA": lambda t, i, d: (
+        f" (2025-04-04 18:10:{t:09.6f})  can0  {i:08X}   [{len(d)}]  {d.hex(' ')}"
+    ),
+    "SavvyCAN": lambda t, i, d: (
+        f"{t * 1e6:.0f},{i:08X},true,Rx,0,{len(d)},{','.join(d.hex(' ').upper().split())},,,,,"
+    ),
+    "cabana": lambda t, i, d: f"{t:.4f},{i:#x},0,0x{d.hex()}",
+    "cabana, decimal": lambda t, i, d: f"{t:.4f},{i},0,{d.hex()}",
+}
+HEADERS = {
+    "SavvyCAN": "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n",
+    "cabana": "time,addr,bus,data\n",
+    "cabana, decimal": "time,addr,bus,data\n",
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_frames_in_text_are_read_as_tools_print_them(kind, tmp_path):
+    base = of_a_truck(tmp_path)
+    path = tmp_path / ("bus.csv" if kind in HEADERS else "bus.log")
+    rows = [TEXTS[kind](t, i, d) for t, _, i, d in frames(30, 0x18F0093E)]
+    path.write_text(HEADERS.get(kind, "") + "\n".join([*rows, ""]))
+    assert "give the DBC" in refusal(path)
+    (channel,) = (log := open_log(path, base)).read(["ESP.YawRate"])
+    np.testing.assert_allclose(channel.values, 0.001 * np.arange(30))
+    np.testing.assert_allclose(channel.t - channel.t[0], 0.01 * np.arange(30), atol=1e-6)
+    assert log.format.startswith("CAN ")
+
+
+def test_a_line_without_time_and_a_row_that_is_no_frame_are_refused(tmp_path):
+    base = dbc(tmp_path)
+    path = tmp_path / "bus.log"
+    path.write_text("  can0  123   [2]  01 02\n" * 9)
+    assert "line 1 has no time in front" in refusal(path, base)
+    path.write_text("".join(f" ({0.01:.6f})  can0  123   [2]  01 02\n" for _ in range(9)) + "x\n")
+    assert "line 10" in refusal(path, base)
+    path.write_text("time,addr,bus,data\n0.1,0x1d2,0,0x1122\n0.2,0x1d2,0,zz\n")
+    assert "line 3 must hold a frame" in refusal(path, base)
+
+
+def test_a_table_with_an_id_and_no_frames_is_a_table(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t,id,data,r\n" + "".join(f"{k / 100},7,{k}.25,0.1\n" for k in range(30)))
+    assert open_log(path).format == "CSV"

@@ -423,3 +423,34 @@ def test_the_carriers_of_carmaker_are_road_wheels() -> None:
     )
     assert found.guesses["delta_f"].channel == ("Car.CFL.rz", "Car.CFR.rz")
     assert found.is_sure("delta_f") and "delta_r" not in found.guesses
+
+
+PUBLIC = {  # of files that people published
+    "v_x": ["vCar", "V_GPS", "v_CG", "vel_u", "wheel_based_speed"],
+    "r": ["AngRateDown", "imu_gz_rps", "GPS Gyro", "AVz", "r_imu", "Gyro_Yaw", "yawspeed"],
+    "delta_f": ["StrgWhlAng", "StrWhAng", "StrAngle", "StrgAngl", "SteWhlAngl", "RWA"],
+    "a_y": ["LtrlAcc", "accy_can", "lat_g", "LatAc"],
+    "a_x": ["InlineAcc", "LgtlAcc", "LINEALG"],
+}
+UNIT = {"v_x": "m/s", "r": "deg/s", "delta_f": "deg", "a_y": "m/s^2", "a_x": "m/s^2"}
+
+
+@pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in PUBLIC.items() for n in all_])
+def test_names_of_public_logs_are_proposed(signal: str, name: str) -> None:
+    unit = unit_in_name(name) or UNIT[signal]
+    found = proposed((name, unit, 20.0 * WAVE))
+    assert found.guesses[signal].channel == (name,)
+    assert found.is_sure(signal) or found.guesses[signal].hand
+    assert not any(found.is_sure(one) for one in RULES if one != signal)
+
+
+@pytest.mark.parametrize("name", ["EffMt_D2_R", "M_Mtr_D2_R", "Damper_R", "Batt_V", "p_Brk_R"])
+def test_a_letter_behind_a_name_is_a_side_and_no_signal(name: str) -> None:
+    assert not any(name_confidence(one, name) for one in RULES)
+    assert name_confidence("r", "log.r") > 0.0
+
+
+def test_a_wheel_of_carsim_turns() -> None:
+    found = proposed(*((f"AVy_{place}", "rpm", 600.0 + WAVE) for place in ("L1", "R1", "L2", "R2")))
+    assert all(found.is_sure(one) for one in ("wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"))
+    assert not found.is_sure("r") and not found.is_sure("v_y")

@@ -16,7 +16,8 @@ DOCS = Path(__file__).resolve().parents[3] / "docs"
 CALLED = {
     "wheel_fl": ["wheel_fl", "WheelSpeed_FL", "Wheel Speed FL", "WHL_SPD_FL", "ESP_VL_Radgeschw",
                  "nWheelFL", "Vhcl.FL.rotv", "Wheel Speed Front Left", "v_Rad_VL", "omega_fl",
-                 "WheelSpeedFrontLeft", "/vehicle/wheel_speeds/lf.speed"],
+                 "WheelSpeedFrontLeft", "/vehicle/wheel_speeds/lf.speed",
+                 "Speed_FL", "whlspdfl", "rpm_fl"],
     "wheel_fr": ["WHEEL_SPEED_FR", "ws_fr", "Raddrehzahl vorne rechts", "wheelVel_RF"],
     "wheel_rl": ["wheel_speed_rl", "omega_rl", "HL_Radgeschw", "WheelRPM_RL"],
     "wheel_rr": ["ws_rr", "vWheelRR", "Wheel_Spd_RearRight", "WSPEED RR"],

@@ -1,0 +1,284 @@
+"""Which axis of a sensor is which of the car's, by what is measured along it, not by its letter.
+
+Games have x to the right and z forward, a box may lie on its side, cameras look along z. Of three
+channels that are called alike but for x, y and z: the speed is forward; the mean of an acceleration
+is up; about up the yaw rate is measured, and v_x r is the lateral acceleration. The common sign of
+r and a_y is that of the steering, without one that of up. Where letters and signs are as ISO has
+them (x forward, z up) or numbers do not tell, nothing is said.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.log import Channel
+from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_told, quantities
+
+LETTERS = "xyz"
+STEP, WINDOW = 0.1, 0.3  # [s] between instants, and over which means are taken there
+MOST = 20_000  # instants
+SLOW = 3.0  # [m/s]: slower samples tell nothing
+CLEAR = 3.0  # times that the speed is larger than what is measured across it
+SURE, LIKELY = 0.7, 0.4  # correlations
+GRAVITY = FACTORS[ACCELERATION]["g"]
+NEAR = 0.25  # share of gravity by which a mean of it may be off
+TILT = 0.4  # share of it along another axis from which a box lies oblique
+STEMS = {  # what stands before a letter in one word, or beside it, by quantity
+    SPEED: "v vel velocity speed",
+    ACCELERATION: "a acc accel acceleration accelerometer g gforce",
+    RATE: "w gyro gyr gyroscope omega rot rotation rate angular angularvelocity av angrate ang",
+}
+
+
+class Triad(NamedTuple):
+    """Three channels: names by letter, of which quantity, and the words that they share."""
+
+    names: dict[str, str]
+    quantity: str
+    words: tuple[str, ...]
+
+
+class Axis(NamedTuple):
+    """What a channel is: of which signal, with which sign, and why."""
+
+    name: str
+    signal: str
+    factor: float
+    why: str
+
+
+class Found(NamedTuple):
+    """What numbers tell: channels whose letters mislead, and what they are where that is known.
+
+    oblique: of a box that lies so that no axis is one of the car's.
+    """
+
+    misled: frozenset[str]
+    axes: tuple[Axis, ...]
+    oblique: frozenset[str] = frozenset()
+
+
+def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list[Triad]:
+    """Return the channels that are called alike but for x, y and z.
+
+    Parameters
+    ----------
+    words : of each channel's name.
+    units : of each channel, "" where none is told.
+    """
+    found: dict[tuple[str, ...], dict[str, str]] = {}
+    quantity_of: dict[tuple[str, ...], str] = {}
+    for name, listed in words.items():
+        split = _letter(listed)
+        if split is None:
+            continue
+        letter, rest = split
+        stems = {word for word in rest if word != "?"}
+        likely = [one for one in (RATE, ACCELERATION, SPEED) if stems & set(STEMS[one].split())]
+        if is_told(units[name]):
+            told = quantities(units[name])
+            likely = [one for one in (RATE, ACCELERATION, SPEED) if one in told]
+        if likely:
+            found.setdefault(rest, {}).setdefault(letter, name)
+            quantity_of[rest] = likely[0]
+    return [
+        Triad(names, quantity_of[rest], rest)
+        for rest, names in found.items()
+        if len(names) == len(LETTERS)
+    ]
+
+
+def _letter(listed: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
+    """Return the letter of an axis in a name, and its words without; None where it has none."""
+    stems = {word for some in STEMS.values() for word in some.split()}
+    for k in range(len(listed) - 1, -1, -1):
+        word = listed[k]
+        if word in LETTERS or (word[-1] in LETTERS and word[:-1] in stems):
+            stem = (word[:-1], "?") if word[:-1] else ("?",)
+            return word[-1], (*listed[:k], *stem, *listed[k + 1 :])
+    return None
+
+
+class _Grid:
+    """Channels at the same instants, smoothed."""
+
+    def __init__(self, seen: Mapping[str, Channel], names: Sequence[str]) -> None:
+        there = [seen[name].t for name in names if name in seen and seen[name].t.size > 1]
+        begin = max((float(t[0]) for t in there), default=0.0)
+        end = min((float(t[-1]) for t in there), default=0.0)
+        count = int(max(min((end - begin) / STEP, MOST), 0.0))
+        self.t = begin + STEP * np.arange(count)
+        self._seen = seen
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a channel at the instants, (n,); means over `WINDOW`."""
+        channel = self._seen[name]
+        good = np.isfinite(channel.values)
+        t, values = channel.t[good], channel.values[good]
+        if t.size < 2:
+            return np.full(self.t.size, np.nan)
+        steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
+        total = np.concatenate([[0.0], np.cumsum(steps)])
+        ends = (np.clip(self.t + side * WINDOW / 2.0, t[0], t[-1]) for side in (-1.0, 1.0))
+        low, high = ends
+        mean = np.interp(high, t, total) - np.interp(low, t, total)
+        return np.asarray(mean / np.maximum(high - low, 1e-9))
+
+
+def _alike(one: Array, other: Array) -> float:
+    """Return the correlation of two signals, 0 where one never changes."""
+    good = np.isfinite(one) & np.isfinite(other)
+    if good.sum() < 10 or np.ptp(one[good]) == 0.0 or np.ptp(other[good]) == 0.0:
+        return 0.0
+    return float(np.corrcoef(one[good], other[good])[0, 1])
+
+
+def along_axes(
+    found: Sequence[Triad],
+    seen: Mapping[str, Channel],
+    speed: str,
+    yaw_rate: str,
+    lateral: str,
+    steering: str,
+) -> Found:
+    """Return what the channels of triads are by their numbers, where their letters mislead.
+
+    Parameters
+    ----------
+    found : the triads of a log.
+    seen : channels that were read.
+    speed, yaw_rate, lateral, steering : channels of the forward speed, r, a_y and δ by their names;
+        but for the speed in no triad; "" where there is none.
+    """
+    usable = [one for one in found if all(name in seen for name in one.names.values())]
+    asked = [name for one in usable for name in one.names.values()]
+    named = [one for one in (speed, yaw_rate, lateral, steering) if one]
+    grid = _Grid(seen, [*asked, *named])
+    if grid.t.size < 50:
+        return Found(frozenset(), ())
+    misled: set[str] = set()
+    oblique: set[str] = set()
+    axes: list[Axis] = []
+    across: list[str] = []
+    v = np.abs(grid[speed]) if speed and speed not in asked else None
+    for one in usable:
+        if one.quantity == SPEED and (forward := _forward(grid, one, v)):
+            misled |= set(one.names.values())
+            letter, sign = forward
+            axes.append(Axis(one.names[letter], "v_x", sign, f"{letter} goes as the speed"))
+            v = np.abs(grid[one.names[letter]]) if v is None else v
+            across = [name for key, name in one.names.items() if key != letter]
+    v = np.abs(grid[speed]) if v is None and speed else v
+    if v is None:
+        return Found(frozenset(misled), tuple(axes))
+    for one in usable:
+        if one.quantity == ACCELERATION:
+            rates = [other for other in usable if other.quantity == RATE]
+            up = _up({letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()})
+            own = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
+            gyro = next(iter(own or rates), None)
+            channels = {*one.names.values(), *(gyro.names.values() if gyro else ())}
+            if up[0] == "?":
+                oblique |= channels
+                continue
+            told = _of_a_box(grid, one, gyro, up, v, yaw_rate, steering)
+            misled |= channels if told is not None else set()
+            axes += told or []
+    known = {one.signal: one.factor * grid[one.name] for one in axes}
+    known |= {k: grid[one] for k, one in (("r", yaw_rate), ("a_y", lateral)) if one}
+    if across and {"r", "a_y"} <= set(known):
+        axes += _sideways(grid, across, v, known["r"], known["a_y"])
+    return Found(frozenset(misled), tuple(axes), frozenset(oblique))
+
+
+def _forward(grid: _Grid, triad: Triad, v: Array | None) -> tuple[str, float] | None:
+    """Return the axis of a velocity that is forward, and its sign; None of x, or if unclear."""
+    values = {letter: grid[name] for letter, name in triad.names.items()}
+    sizes = {letter: math.sqrt(float(np.nanmean(one**2))) for letter, one in values.items()}
+    best = max(sizes, key=lambda letter: sizes[letter])
+    second = sorted(sizes.values())[-2]
+    if best == "x" or sizes[best] < CLEAR * second or not sizes[best] > 0.0:
+        return None
+    if v is not None and _alike(np.abs(values[best]), v) < 0.0:
+        return None
+    return best, math.copysign(1.0, float(np.nanmean(values[best])))
+
+
+def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array) -> list[Axis]:
+    """Return which velocity is v_y: its change is what a_y has beside v_x r."""
+    turning, lateral = v * r, a_y
+    size = float(np.nanstd(turning))
+    slope = float(np.nanmean(turning * lateral) / max(float(np.nanmean(turning**2)), 1e-12))
+    if not size or not slope:
+        return []
+    missed = lateral / slope - turning  # in the units of v r, which may be no SI: signs are asked
+    alike = {name: _alike(np.gradient(grid[name], STEP), missed) for name in names}
+    best = max(alike, key=lambda name: abs(alike[name]))
+    if abs(alike[best]) < SURE:
+        return []
+    why = "its change is what ay has beside vx r"
+    return [Axis(best, "v_y", math.copysign(1.0, alike[best]), why)]
+
+
+def _up(means: Mapping[str, float]) -> tuple[str, float]:
+    """Return the axis that is up by the means of an acceleration in g or m/s², and its sign.
+
+    "" where gravity is not in it, "?" where the box lies oblique.
+    """
+    size = math.sqrt(sum(one * one for one in means.values()))
+    if not any(abs(size / one - 1.0) < NEAR for one in (1.0, GRAVITY)):
+        return "", 0.0
+    best = max(means, key=lambda letter: abs(means[letter]))
+    rest = math.sqrt(max(size * size - means[best] ** 2, 0.0))
+    return (best if rest < TILT * size else "?"), math.copysign(1.0, means[best])
+
+
+def _of_a_box(
+    grid: _Grid,
+    box: Triad,
+    gyro: Triad | None,
+    up: tuple[str, float],
+    v: Array,
+    yaw_rate: str,
+    steering: str,
+) -> list[Axis] | None:
+    """Return what the channels of a box are; None where they are what their letters say."""
+    moving = v > SLOW / 2.0 if np.nanmax(v) > SLOW else np.ones(v.size, dtype=bool)
+    values = {letter: grid[name] for letter, name in box.names.items()}
+    turns = {} if gyro is None else {letter: grid[name] for letter, name in gyro.names.items()}
+    if yaw_rate:
+        turns = {"": grid[yaw_rate]}
+    elif up[0]:
+        turns = {up[0]: turns[up[0]]} if turns else {}
+    pairs = {
+        (about, along): _alike((v * turn)[moving], one[moving])
+        for about, turn in turns.items()
+        for along, one in values.items()
+        if along not in (about, up[0])
+    }
+    about, along = max(pairs, key=lambda pair: abs(pairs[pair]), default=("", ""))
+    if abs(pairs.get((about, along), 0.0)) < SURE:
+        return None if up[0] in ("", "z") else []
+    as_lettered = along == "y" and "z" in (about or "z", up[0] or "z")
+    if as_lettered and (not up[1] or (up[1] > 0.0 and pairs[about, along] > 0.0)):
+        return None
+    r = turns[about]
+    sign = (up[1] or 1.0) if about else 1.0
+    steers = _alike((v * grid[steering])[moving], r[moving]) if about and steering else 0.0
+    if abs(steers) > LIKELY:
+        sign = math.copysign(1.0, steers)
+    axes = []
+    if about and gyro is not None:
+        axes.append(Axis(gyro.names[about], "r", sign, f"about {about}, which is up"))
+    side = sign * math.copysign(1.0, pairs[about, along])
+    axes.append(Axis(box.names[along], "a_y", side, f"along {along} it goes as vx r"))
+    vertical = about or up[0]
+    left = next(one for one in LETTERS if one not in (along, vertical))
+    change = _alike(np.gradient(v, STEP)[moving], values[left][moving])
+    if vertical and abs(change) > LIKELY:
+        why = f"along {left} it goes as the change of the speed"
+        axes.append(Axis(box.names[left], "a_x", math.copysign(1.0, change), why))
+    return axes

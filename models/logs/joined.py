@@ -1,0 +1,109 @@
+"""Logs in pieces: a folder with a file for each message, a table with a row for each value."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.grouped import GroupedLog, Samples, noted
+from models.logs.log import Listed, LogFile, RecordingError, some
+from models.logs.stamps import find_clock, in_seconds, typical_rate
+from models.logs.table import Kind, Table, TableLog, kind_of
+from models.schema import require_few
+
+# A table with a row for each value: what the columns of names and of values are called.
+NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
+VALUES = ("value", "val", "data", "values", "reading")
+
+
+def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:
+    """Return the logs of a folder as one, joined by their times.
+
+    Parameters
+    ----------
+    opened : its files, as logs or with why they are none.
+    """
+    logs = {one: log for one, log in opened.items() if not isinstance(log, RecordingError)}
+    if not logs:
+        why = next((f"; {one}" for one in opened.values()), "")
+        raise RecordingError(f"{path}: there is no such file, it is a folder without a log{why}")
+    kinds = {tuple(one.name for one in log.headings()) for log in logs.values()}
+    if len(logs) > 1 and len(kinds) == 1:
+        raise RecordingError(
+            f"{path}: is a folder of logs with the same channels, drives and no messages of one; "
+            f"name them: {some([one.name for one in logs])}"
+        )
+    zero = min((_start(log) for log in logs.values()), default=0.0)
+    found = [
+        (file.stem, one, (log, one.name, _start(log) - zero))
+        for file, log in logs.items()
+        for one in log.listed()
+    ]
+    bad = [one.name for one, log in opened.items() if isinstance(log, RecordingError)]
+    said = (f"joined by time: {some([one.name for one in logs])}", *noted("not read", bad))
+    return GroupedLog.of(
+        path, "a log a message", "a log", "row", found, said, _of_files, missing="channel"
+    )
+
+
+def _start(log: LogFile) -> float:
+    """Return when the times of a log count from [s]: those of the calendar from their first."""
+    return log.start if isinstance(log, TableLog) else 0.0
+
+
+def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
+    files: dict[int, list[tuple[str, Any]]] = {}
+    for listed, place in asked:
+        files.setdefault(id(place[0]), []).append((listed.name, place))
+    found = []
+    for some_ in files.values():
+        log, start = some_[0][1][0], some_[0][1][2]
+        channels = log.read([name for _, (_, name, _) in some_])
+        by_clock: dict[int, dict[str, Any]] = {}
+        for (name, _), channel in zip(some_, channels, strict=True):
+            by_clock.setdefault(id(channel.t), {})[name] = channel
+        for group in by_clock.values():
+            t = next(iter(group.values())).t + start
+            found.append(Samples(log.path.name, t, {k: one.values for k, one in group.items()}))
+    return found
+
+
+def long_log(table: Table) -> GroupedLog[Any] | None:
+    """Return the log in a table with a row for each value: time, name, value; None of any other."""
+    bare = ["".join(filter(str.isalpha, one.lower())) for one in table.names]
+    name = next((bare.index(one) for one in NAMES if one in bare), None)
+    value = next((bare.index(one) for one in VALUES if one in bare), None)
+    if name is None or value is None or table.numeric[name] or not table.numeric[value]:
+        return None
+    words = [one for one in table.first_rows(name) if one]
+    clock = find_clock(
+        [one if k not in (name, value) else "" for k, one in enumerate(table.names)],
+        table.units,
+        table.first_rows,
+    )
+    if clock is None or clock.column in (name, value) or len(set(words)) == len(words):
+        return None
+    told = table.first_rows(bare.index("unit")) if "unit" in bare else []
+    units = dict(zip(table.first_rows(name), told, strict=False))
+    kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
+    cells = table.cells(kinds)
+    require_few(RecordingError, str(table.path), len(cells.words[name].names), "columns", "names")
+    t = in_seconds(clock, cells.columns[clock.column])
+    found = []
+    for k, word in enumerate(cells.words[name].names):
+        rows = np.flatnonzero(cells.words[name].codes == k)
+        rate = typical_rate(t[rows])
+        listed = Listed(name=word, unit=units.get(word, ""), samples=rows.size, rate=rate)
+        found.append(("", listed, rows))
+    said = (f"a row for each value: {table.names[name]} names it; time is {clock.words}",)
+    read = partial(_of_rows, t, cells.columns[value])
+    return GroupedLog.of(
+        table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"
+    )
+
+
+def _of_rows(t: Array, values: Array, asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
+    return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in asked]

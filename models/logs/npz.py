@@ -1,0 +1,86 @@
+"""Arrays that NumPy saved, .npz of several or .npy of one, as a tree; nothing in them is run."""
+
+import math
+import zipfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+from codegen.arrays import Array
+from models.logs.grouped import require_room
+from models.logs.log import RecordingError
+from models.logs.tree import Leaf, Tree, Unread
+from models.schema import require_dense, require_few
+
+LONGEST_TEXTS = 1_000_000  # bytes of names of columns
+
+
+def read_tree(path: Path) -> dict[str, Tree]:
+    """Return the arrays of a file; numbers are read when they are asked for."""
+    if not zipfile.is_zipfile(path):
+        return _top(path, "", "data")
+    with zipfile.ZipFile(path) as file:
+        members = [one for one in file.infolist() if one.filename.endswith(".npy")]
+        require_few(RecordingError, str(path), len(members), "columns", "arrays")
+        for one in members:
+            require_dense(
+                RecordingError, str(path), one.file_size, one.compress_size, shown_name(one)
+            )
+        found: dict[str, Tree] = {}
+        for one in members:
+            found |= _top(path, one.filename, shown_name(one))
+    return found
+
+
+def shown_name(member: zipfile.ZipInfo) -> str:
+    """Return what an array of an archive is called."""
+    return member.filename.removesuffix(".npy")
+
+
+def _top(path: Path, member: str, name: str) -> dict[str, Tree]:
+    """Return an array by its name; of a lone one with fields these."""
+    tree = _tree(path, member)
+    return tree if isinstance(tree, dict) and name == "data" else {name: tree}
+
+
+def _tree(path: Path, member: str) -> Tree:
+    """Return what an array holds, by its header."""
+    with _opened(path, member) as file:
+        version = npy.read_magic(file)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, _, dtype = read(file)
+    size = math.prod(shape)
+    require_room(path, size, dtype.itemsize)
+    if dtype.names:
+        return {name: _leaf(path, member, shape, dtype[name], name) for name in dtype.names}
+    if dtype.kind in "US" and size * dtype.itemsize <= LONGEST_TEXTS:
+        words = [str(one) for one in np.atleast_1d(_load(path, member)).ravel().tolist()]
+        return list(words) if shape else words[0]
+    return _leaf(path, member, shape, dtype, "")
+
+
+def _leaf(path: Path, member: str, shape: tuple[int, ...], dtype: Any, field: str) -> Tree:
+    if dtype.kind not in "iufbmM" or len(shape) > 2:
+        return Unread("no numbers" if dtype.kind not in "iufbmM" else f"{len(shape)} dimensions")
+    rows, width = (*shape, 1, 1)[:2]
+    return Leaf(shape=(rows, width), load=partial(_numbers, path, member, field, (rows, width)))
+
+
+def _numbers(path: Path, member: str, field: str, shape: tuple[int, int]) -> Array:
+    found = _load(path, member)
+    found = found[field] if field else found
+    if found.dtype.kind in "mM":  # of the calendar, or a duration
+        found = found.astype(f"{found.dtype.kind}8[ns]").astype(np.int64) / 1e9
+    return np.asarray(found.reshape(shape), dtype=np.float64)
+
+
+def _load(path: Path, member: str) -> Any:
+    with _opened(path, member) as file:
+        return npy.read_array(file, allow_pickle=False)
+
+
+def _opened(path: Path, member: str) -> Any:
+    return zipfile.ZipFile(path).open(member) if member else path.open("rb")

@@ -1,0 +1,269 @@
+"""Velocities of a car from its pose: position and heading of motion capture, SLAM, /tf or odometry.
+
+x, y [m] and heading ψ [rad] are smoothed without phase, p minimizes Σ (z - p)² + λ Σ (Δ³p)² with λ
+by generalized cross-validation, and differentiated:
+v_x = ẋ cos ψ + ẏ sin ψ,  v_y = -ẋ sin ψ + ẏ cos ψ,  r = ψ̇.
+A heading may count clockwise, from north or in degrees: the direction of travel tells.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.clock import LONGEST_GAP, Raw, gaps, typical_step
+from models.logs.log import RecordingError
+from models.logs.signals import POSE, Signal
+
+NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
+SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
+FEWEST = 30  # samples of a piece that is differentiated
+MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
+ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
+ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
+TURN = math.pi / 2.0
+LATEST, LATE = 0.3, 0.01  # [s] that a gyro may be late against a pose, that is taken out of it
+ALIKE = 0.9  # correlation of the two yaw rates from which that is known
+STRENGTHS = np.geomspace(1e-3, 1e9, 49)  # λ [-]
+
+
+def with_pose(
+    label: str, signals: Mapping[str, Signal], parts: Mapping[str, list[Raw]]
+) -> tuple[dict[str, Signal], dict[str, list[Raw]], tuple[str, ...]]:
+    """Return signals and their channels with v_x, v_y and r of the pose in its place, and notes.
+
+    A gyro tells how late it, and what else a box has, is against the pose; that is taken out.
+
+    Parameters
+    ----------
+    parts : by signal its channels in SI.
+
+    Raises
+    ------
+    RecordingError
+        As `motion_of`; where the pose never leaves its heading, as one of wheels.
+    """
+    if not set(POSE) <= set(signals):
+        return dict(signals), dict(parts), ()
+    pose = {name: parts[name][0] for name in POSE}
+    if len(parts["heading"]) > 1:
+        pose["heading"] = _of_quaternion(label, parts["heading"])
+    motion = motion_of(label, pose)
+    sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
+    if sideways < NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
+        raise RecordingError(
+            f"{label}: the pose never leaves its heading, as one that is integrated from wheels: "
+            "vy is not in it; tell the pose of another sensor, or leave it out"
+        )
+    found = {name: raws for name, raws in parts.items() if name not in POSE}
+    said = [motion.said]
+    gyro = parts["r"][0] if "r" in parts else None
+    late = None if gyro is None else lateness(gyro, motion.r)
+    if gyro is not None and late is not None and abs(late) > LATE:
+        box = [name for name in ("r", "a_y", "a_x") if name in found]
+        for name in box:
+            found[name] = [_earlier(raw, late, motion.r.t) for raw in found[name]]
+        side = "late against" if late > 0.0 else "ahead of"
+        words = ", ".join(box)
+        said.append(
+            f"the gyro is {1e3 * abs(late):.0f} ms {side} the pose: {words} are moved by it"
+        )
+    slow = typical_step(motion.r.t) > SLOW
+    of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
+    of_pose |= {} if slow and gyro is not None else {"r": motion.r}
+    found |= {name: [raw] for name, raw in of_pose.items()}
+    kept = {name: one for name, one in signals.items() if name in found}
+    kept |= {name: Signal(channel=("pose",)) for name in of_pose}
+    return kept, found, tuple(said)
+
+
+def _earlier(raw: Raw, late: float, t: Array) -> Raw:
+    """Return a channel as much earlier, on the clock of the pose (n,) where it has no gap."""
+    moved = raw._replace(t=raw.t - late)
+    if gaps(moved.t, LONGEST_GAP).size or typical_step(raw.t) > SLOW:
+        return moved
+    inside = t[(t >= moved.t[0]) & (t <= moved.t[-1])]
+    rows = raw.rows[np.minimum(np.searchsorted(moved.t, inside), raw.rows.size - 1)]
+    return raw._replace(t=inside, values=np.interp(inside, moved.t, raw.values), rows=rows)
+
+
+def _of_quaternion(label: str, parts: Sequence[Raw]) -> Raw:
+    """Return the heading of x, y, z, w, or of z and w alone [rad]."""
+    if len(parts) not in (2, 4) or any(one.t.size != parts[0].t.size for one in parts):
+        raise RecordingError(
+            f"{label}: heading must be one channel, or x, y, z and w of a quaternion, it has "
+            f"{len(parts)}"
+        )
+    still = np.zeros(parts[0].t.size)
+    x, y, z, w = (still, still, *(one.values for one in parts))[-4:]
+    return parts[0]._replace(values=np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+
+class Motion(NamedTuple):
+    """What a pose tells: v_x, v_y [m/s] and r [rad/s] on its clock, and a sentence of it."""
+
+    v_x: Raw
+    v_y: Raw
+    r: Raw
+    said: str
+
+
+class Smooth(NamedTuple):
+    """Smoothed columns (n, k), and the standard deviation of what was taken out."""
+
+    values: Array
+    noise: float
+
+
+def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
+    """Return how a car moves by its pose.
+
+    Parameters
+    ----------
+    parts : by name of `POSE` on one clock or several, SI.
+
+    Raises
+    ------
+    RecordingError
+        Where there is no piece without a gap that is long enough, or the heading is none.
+    """
+    x = parts["x"]
+    t = x.t
+    z = np.column_stack([np.interp(t, parts[name].t, _unwrapped(name, parts)) for name in POSE])
+    cuts = [0, *gaps(t, LONGEST_GAP).tolist(), t.size]
+    pieces = []
+    for first, end in itertools.pairwise(cuts):
+        if end - first >= FEWEST:
+            pieces.append(_piece(t[first:end], z[first:end], x.rows[first:end]))
+    if not pieces:
+        raise RecordingError(
+            f"{label}: the pose must have at least {FEWEST} samples without a gap, it has {t.size}"
+        )
+    psi, turned = _heading(label, pieces)
+    columns: list[list[Array]] = [[], [], []]
+    for piece, angle in zip(pieces, psi, strict=True):
+        dx, dy = piece.rates[:, 0], piece.rates[:, 1]
+        columns[0].append(dx * np.cos(angle) + dy * np.sin(angle))
+        columns[1].append(-dx * np.sin(angle) + dy * np.cos(angle))
+        columns[2].append(np.gradient(angle, piece.step, edge_order=2))
+    rows = np.concatenate([piece.rows for piece in pieces])
+    clock = np.concatenate([piece.t for piece in pieces])
+    v_x, v_y, r = (Raw(clock, np.concatenate(one), x.place, rows) for one in columns)
+    noise = [float(np.median([piece.noise[k] for piece in pieces])) for k in (0, 1)]
+    said = (
+        f"vx, vy and a yaw rate are taken from the pose{turned}; its position scatters by "
+        f"{noise[0]:.2g} m, its heading by {math.degrees(noise[1]):.2g} deg"
+    )
+    return Motion(v_x, v_y, r, said)
+
+
+def _unwrapped(name: str, parts: Mapping[str, Raw]) -> Array:
+    values = parts[name].values
+    if name != "heading":
+        return values
+    far = float(np.abs(values).max(initial=0.0))
+    return np.unwrap(values, period=360.0 if far > 2.0 * math.pi + 0.1 else 2.0 * math.pi)
+
+
+class _Piece(NamedTuple):
+    """A piece without a gap: times and rows (n,), rates of x and y (n, 2), heading (n,), noise."""
+
+    t: Array
+    rows: NDArray[np.int64]
+    step: float
+    rates: Array
+    heading: Array
+    noise: tuple[float, float]
+
+
+def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
+    """Return a piece on an even clock, smoothed."""
+    step = float((t[-1] - t[0]) / (t.size - 1))
+    even = t[0] + step * np.arange(t.size)
+    even = t if np.abs(even - t).max() < 1e-6 * step else even
+    z = np.column_stack([np.interp(even, t, column) for column in z.T])
+    place, heading = smoothed(z[:, :2]), smoothed(z[:, 2:])
+    rates = np.gradient(place.values, step, axis=0, edge_order=2)
+    return _Piece(even, rows, step, rates, heading.values[:, 0], (place.noise, heading.noise))
+
+
+def smoothed(z: Array) -> Smooth:
+    """Return columns of one size, smoothed alike as strongly as they predict themselves best.
+
+    Parameters
+    ----------
+    z : (n, k), evenly sampled.
+    """
+    from scipy.fft import dct  # takes longer than to read a short log
+    from scipy.linalg import solveh_banded
+
+    n = len(z)
+    line = z[0] + np.outer(np.arange(n) / (n - 1.0), z[-1] - z[0])
+    power = np.sum(dct(z - line, axis=0, norm="ortho") ** 2, axis=1)
+    stiff = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** 3  # of Δ³, for cosines
+    left = 1.0 - 1.0 / (1.0 + np.outer(STRENGTHS, stiff))
+    misses = np.sum(left**2 * power, axis=1) / np.sum(left, axis=1) ** 2
+    best = int(np.argmin(misses))
+    third = np.array([-1.0, 3.0, -3.0, 1.0])
+    bands = np.zeros((4, n))
+    for lag in range(4):
+        products = third[: 4 - lag] * third[lag:]
+        for k, product in enumerate(products):
+            bands[3 - lag, k + lag : k + lag + n - 3] += product
+    bands *= STRENGTHS[best]
+    bands[3] += 1.0
+    values = np.asarray(solveh_banded(bands, z))
+    freedom = float(np.sum(left[best])) * z.shape[1]
+    noise = math.sqrt(float(np.sum((z - values) ** 2)) / max(freedom, 1.0))
+    return Smooth(values, noise)
+
+
+def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
+    """Return the headings, counted from x to y in rad, and what was done to them in words."""
+    speeds = [np.hypot(*piece.rates.T) for piece in pieces]
+    fast = MOVES * max(float(speed.max()) for speed in speeds)
+    moving = [(piece, speed > fast) for piece, speed in zip(pieces, speeds, strict=True)]
+    travel = np.concatenate([np.arctan2(p.rates[m, 1], p.rates[m, 0]) for p, m in moving])
+    heading = np.concatenate([p.heading[m] for p, m in moving])
+    ways = [(sign, unit) for unit in (1.0, math.pi / 180.0) for sign in (1.0, -1.0)]
+    means = [np.mean(np.exp(1j * (travel - sign * unit * heading))) for sign, unit in ways]
+    best = int(np.argmax(np.abs(means) > max(np.abs(means)) - 0.02))
+    (sign, unit), mean = ways[best], means[best]
+    if abs(mean) < ALONG_ALL:
+        raise RecordingError(
+            f"{label}: the heading must go along with the direction of travel of x and y, it does "
+            "not: another channel, or other axes?"
+        )
+    away = float(np.angle(mean))
+    whole = TURN * round(away / TURN)
+    shift = whole if abs(away - whole) < ALONG else away
+    said = ["its heading is clockwise"] if sign < 0 else []
+    said += ["its heading is in degrees"] if unit != 1.0 else []
+    said += [f"its heading lies {math.degrees(shift):.0f} deg off the travel"] if shift else []
+    words = f" ({', '.join(said)})" if said else ""
+    return [sign * unit * piece.heading + shift for piece in pieces], words
+
+
+def lateness(gyro: Raw, pose: Raw) -> float | None:
+    """Return by how much a gyro is late against the yaw rate of a pose [s]; None if not known."""
+    dt = max(typical_step(gyro.t), typical_step(pose.t)) / 2.0
+    begin, end = max(gyro.t[0], pose.t[0]) + LATEST, min(gyro.t[-1], pose.t[-1]) - LATEST
+    if end - begin < 10.0 * LATEST:
+        return None
+    grid = np.arange(begin, end, dt)
+    reference = np.interp(grid, pose.t, pose.values)
+    lags = dt * np.arange(-int(LATEST / dt), int(LATEST / dt) + 1)
+    if np.std(reference) == 0.0 or np.std(gyro.values) == 0.0:
+        return None
+    alike = np.array(
+        [np.corrcoef(reference, np.interp(grid + lag, gyro.t, gyro.values))[0, 1] for lag in lags]
+    )
+    k = int(np.argmax(alike))
+    if alike[k] < ALIKE or not 0 < k < lags.size - 1:
+        return None
+    low, peak, high = alike[k - 1 : k + 2]
+    return float(lags[k] + dt * 0.5 * (low - high) / (low - 2.0 * peak + high))

@@ -1,0 +1,251 @@
+"""A pose as a source of v_x, v_y and r: its noise, delay, axes and units, in tables and bags."""
+
+import re
+
+import numpy as np
+import pytest
+
+from models.logs.clock import Raw
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from models.logs.names import propose
+from models.recordings import LogMap, read_recording
+from models.recordings.map import told_signals
+from models.recordings.pose import lateness, motion_of, smoothed
+
+T = 0.01 * np.arange(3000)
+V_X = 2.0 + 0.5 * np.sin(0.5 * T)
+R = 1.5 * np.sin(1.7 * T) + 0.4 * np.sin(0.6 * T)
+V_Y = 0.08 * R - 0.05 * V_X * R
+DELTA = 0.17 * R / V_X
+
+
+def integral(values):
+    return np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(T))])
+
+
+PSI = integral(R)
+X = integral(V_X * np.cos(PSI) - V_Y * np.sin(PSI))
+Y = integral(V_X * np.sin(PSI) + V_Y * np.cos(PSI))
+
+
+def noisy(values, size, seed):
+    return values + size * np.random.default_rng(seed).normal(size=values.size)
+
+
+def raw(values, t=T):
+    return Raw(t, np.asarray(values, dtype=float), "row", np.arange(t.size))
+
+
+def posed(x=X, y=Y, psi=PSI, t=T):
+    return {"x": raw(x, t), "y": raw(y, t), "heading": raw(psi, t)}
+
+
+def misses(motion, t=T):
+    inner = slice(20, -20)
+    return {
+        name: float(np.sqrt(np.mean((raw.values - np.interp(raw.t, T, true))[inner] ** 2)))
+        for name, raw, true in (
+            ("v_x", motion.v_x, V_X),
+            ("v_y", motion.v_y, V_Y),
+            ("r", motion.r, R),
+        )
+    }
+
+
+def test_a_pose_without_noise_is_the_motion():
+    assert max(misses(motion_of("log", posed())).values()) < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_pose_with_noise_tells_the_motion_and_its_noise(seed):
+    x, y = noisy(X, 0.005, seed), noisy(Y, 0.005, seed + 50)
+    psi = noisy(PSI, np.radians(0.5), seed + 99)
+    motion = motion_of("log", posed(x, y, psi))
+    found = misses(motion)
+    assert found["v_y"] < 0.035 and found["v_x"] < 0.035 and found["r"] < 0.03
+    position, heading = re.findall(r"by ([\d.]+) (?:m|deg)", motion.said)
+    assert float(position) == pytest.approx(0.005, rel=0.05)
+    assert float(heading) == pytest.approx(0.5, rel=0.05)
+    plain = np.gradient(x, T) * -np.sin(psi) + np.gradient(y, T) * np.cos(psi)
+    assert found["v_y"] < 0.1 * np.std(plain - V_Y)
+
+
+def test_smoothing_is_as_strong_as_the_noise_asks():
+    wave = np.sin(0.1 * np.arange(800.0))[:, None]
+    weak, strong = (smoothed(noisy(wave[:, 0], size, 1)[:, None]) for size in (0.01, 0.3))
+    assert weak.noise == pytest.approx(0.01, rel=0.1) and strong.noise == pytest.approx(
+        0.3, rel=0.1
+    )
+    assert np.std(weak.values - wave) < 0.006 and np.std(strong.values - wave) < 0.12
+
+
+HEADINGS = {
+    "wrapped": lambda psi: np.angle(np.exp(1j * psi)),
+    "degrees": np.degrees,
+    "degrees, wrapped": lambda psi: np.degrees(psi) % 360.0,
+    "compass": lambda psi: (90.0 - np.degrees(psi)) % 360.0,
+    "mounted across": lambda psi: psi - np.pi / 2.0,
+}
+
+
+@pytest.mark.parametrize("kind", HEADINGS)
+def test_a_heading_is_understood_however_it_counts(kind):
+    found = misses(motion_of("log", posed(psi=HEADINGS[kind](PSI))))
+    assert max(found.values()) < 5e-3, found
+
+
+def test_a_heading_of_something_else_is_refused():
+    with pytest.raises(RecordingError, match="must go along with the direction of travel"):
+        motion_of("log", posed(psi=3.0 * np.sin(T)))
+
+
+def test_gaps_of_a_pose_are_not_bridged():
+    there = (T < 10.0) | (T > 11.0)
+    motion = motion_of("log", posed(X[there], Y[there], PSI[there], T[there]))
+    np.testing.assert_array_equal(motion.v_y.t, T[there])
+    assert np.diff(motion.v_y.t).max() > 0.9
+    with pytest.raises(RecordingError, match="at least 30 samples without a gap, it has 20"):
+        motion_of("log", posed(X[:20], Y[:20], PSI[:20], T[:20]))
+
+
+@pytest.mark.parametrize("late", [-0.04, 0.0, 0.013, 0.09])
+def test_how_late_a_gyro_is_is_found_to_a_millisecond(late):
+    gyro = raw(noisy(np.interp(T - late, T, 1.1 * R + 0.02), 0.05, 3))
+    assert lateness(gyro, raw(R)) == pytest.approx(late, abs=2e-3)
+    assert lateness(raw(noisy(0 * T, 0.1, 1)), raw(R)) is None
+
+
+COLUMNS = {
+    "x [m]": noisy(X, 0.003, 1), "y [m]": noisy(Y, 0.003, 2), "yaw [rad]": noisy(PSI, 0.004, 3),
+    "imu_gyro_z [rad/s]": np.interp(T - 0.08, T, R),
+    "imu_acc_y [m/s^2]": np.interp(T - 0.08, T, np.gradient(V_Y, T) + V_X * R),
+    "drive.steering_angle [rad]": DELTA, "encoder_speed [m/s]": V_X,
+}  # fmt: skip
+
+
+def table(path, columns):
+    rows = [",".join(["t [s]", *columns])]
+    rows += [",".join(f"{x:.6g}" for x in row) for row in np.column_stack([T, *columns.values()])]
+    path.write_text("\n".join([*rows, ""]))
+    return path
+
+
+def judge(found, scatter=0.03):
+    t = found.t
+    for values, true in ((found.v_x, V_X), (found.v_y, V_Y), (found.r, R), (found.delta_f, DELTA)):
+        size = scatter * (3.0 if true is R else 1.0)
+        assert np.sqrt(np.mean((values - np.interp(t, T, true))[30:-30] ** 2)) < size
+    a_y = np.interp(t, T, np.gradient(V_Y, T) + V_X * R)
+    assert np.sqrt(np.mean((found.a_y - a_y)[30:-30] ** 2)) < 0.15
+
+
+def test_columns_of_a_pose_are_a_source_of_v_y_and_tell_that_the_box_is_late(tmp_path):
+    path = table(tmp_path / "log.csv", COLUMNS)
+    found = read_recording(path)
+    judge(found)
+    said = "; ".join(found.notes)
+    assert "taken from the pose; its position scatters by 0.003 m" in said
+    assert "the gyro is 80 ms late against the pose: r, a_y are moved by it" in said
+    log = open_log(path)
+    proposal = propose(log, log.headings())
+    assert {"x", "y", "heading"} <= set(proposal.signals())
+
+
+def test_a_measured_v_y_comes_before_a_pose(tmp_path):
+    found = read_recording(table(tmp_path / "log.csv", {**COLUMNS, "vy [m/s]": V_Y}))
+    np.testing.assert_allclose(found.v_y, V_Y, atol=1e-5)
+    assert not any("pose" in note for note in found.notes)
+
+
+def test_a_pose_can_be_told_and_wants_all_three(tmp_path):
+    names = {"x [m]": "px", "y [m]": "py", "yaw [rad]": "rotation"}
+    path = table(tmp_path / "log.csv", {names.get(k, k): v for k, v in COLUMNS.items()})
+    told = LogMap(signals=told_signals(["x=px [m]", "y=py [m]", "heading=rotation [rad]"]))
+    judge(read_recording(path, log_map=told))
+    told.to_toml(tmp_path / "log.toml")
+    assert LogMap.from_toml(tmp_path / "log.toml") == told
+    with pytest.raises(
+        RecordingError, match="x, y and heading are a pose together: give all three"
+    ):
+        told_signals(["x=px", "y=py"])
+
+
+def test_a_pose_that_is_integrated_from_wheels_is_refused(tmp_path):
+    x, y = integral(V_X * np.cos(PSI)), integral(V_X * np.sin(PSI))
+    path = table(tmp_path / "log.csv", {**COLUMNS, "x [m]": x, "y [m]": y, "yaw [rad]": PSI})
+    told = LogMap(signals=told_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
+    with pytest.raises(RecordingError, match=r"never leaves its heading, as one .* from wheels"):
+        read_recording(path, log_map=told)
+
+
+def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_path):
+    columns = {**COLUMNS, "yaw [rad]": 3.0 * np.sin(T)}
+    found = read_recording(table(tmp_path / "log.csv", columns))
+    assert found.v_y is None and found.a_y is not None
+    assert any("x, y, heading is left aside" in note for note in found.notes)
+    told = LogMap(signals=told_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
+    with pytest.raises(RecordingError, match="must go along with the direction of travel"):
+        read_recording(tmp_path / "log.csv", log_map=told)
+
+
+def test_of_two_trackers_none_is_taken_and_of_odometry_and_a_tracker_this(tmp_path):
+    def named(*prefixes):
+        columns = {k: v for k, v in COLUMNS.items() if k[0] not in "xy"}
+        for one in prefixes:
+            columns |= {f"{one}_x [m]": X, f"{one}_y [m]": Y, f"{one}_yaw [rad]": PSI}
+        log = open_log(table(tmp_path / "log.csv", columns))
+        return propose(log, log.headings())
+
+    assert named("odom", "mocap").signals()["x"].channel == ("mocap_x [m]",)
+    assert "x" not in named("mocap", "slam").signals()
+
+
+@pytest.mark.parametrize("kind", ["PoseStamped", "Odometry", "TFMessage"])
+def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
+    pytest.importorskip("rosbags")
+    from tests.models.logs.test_bag import header, store_of, write
+
+    store = store_of()
+    kinds = store.types
+    make = {name.rpartition("/")[2]: kinds[name] for name in kinds}
+    vector, none = make["Vector3"], np.zeros(36)
+    box, command, tracked = [], [], []
+    for k, t in enumerate(T[:2000]):
+        ns = 10**18 + round(1e9 * t)
+        psi = COLUMNS["yaw [rad]"][k]
+        turn = make["Quaternion"](0.0, 0.0, np.sin(psi / 2.0), np.cos(psi / 2.0))
+        at = make["Pose"](make["Point"](COLUMNS["x [m]"][k], COLUMNS["y [m]"][k], 0.1), turn)
+        if kind == "Odometry":
+            still = make["Twist"](vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+            message = make["Odometry"](
+                header(store, ns, "map"), "base_link", make["PoseWithCovariance"](at, none),
+                make["TwistWithCovariance"](still, none),
+            )  # fmt: skip
+        elif kind == "TFMessage":
+            moved = make["Transform"](vector(at.position.x, at.position.y, 0.1), turn)
+            still = make["Transform"](vector(0.1, 0.0, 0.0), make["Quaternion"](0.0, 0.0, 0.0, 1.0))
+            message = make["TFMessage"]([
+                make["TransformStamped"](header(store, ns, "map"), "base_link", moved),
+                make["TransformStamped"](header(store, ns, "base_link"), "laser", still),
+            ])  # fmt: skip
+        else:
+            message = make["PoseStamped"](header(store, ns, "map"), at)
+        tracked.append((ns, message))
+        rate, push = COLUMNS["imu_gyro_z [rad/s]"][k], COLUMNS["imu_acc_y [m/s^2]"][k]
+        nine = np.zeros(9)
+        box.append((ns, make["Imu"](
+            header(store, ns), make["Quaternion"](0.0, 0.0, 0.0, 1.0), nine,
+            vector(0.0, 0.0, rate), nine, vector(0.1, push, 9.81), nine,
+        )))  # fmt: skip
+        drive = make["AckermannDrive"](DELTA[k], 0.0, V_X[k], 0.0, 0.0)
+        command.append((ns, make["AckermannDriveStamped"](header(store, ns), drive)))
+    package = {"PoseStamped": "geometry_msgs", "Odometry": "nav_msgs", "TFMessage": "tf2_msgs"}
+    topics = {
+        "/tf" if kind == "TFMessage" else "/vicon/car": (f"{package[kind]}/msg/{kind}", tracked),
+        "/imu": ("sensor_msgs/msg/Imu", box),
+        "/ackermann_cmd": ("ackermann_msgs/msg/AckermannDriveStamped", command),
+    }
+    found = read_recording(write(tmp_path / "bag", store, topics))
+    assert any("80 ms late" in note for note in found.notes), found.notes
+    judge(found)
