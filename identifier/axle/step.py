@@ -364,11 +364,10 @@ LESSON = ("h", "e", "counts", "gains", "told", "watched")
 def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
 
-    h : regressors (2, q).   e : y - h'w (2,).   counts : share of e that counts, after clipping.
-    gains : K (2, q), 0 where nothing is learnt; of lag and offsets also while the watch rests.
-    told : standard deviation that y is told to have (2,), without what the slow mean of squared
-    errors adds.
-    watched : whether kept weights come back, and by how much they follow the learnt ones.
+    Its outputs are the regressors h (2, q); e = y - h'w (2,); which share of e counts, after
+    clipping; the gains K (2, q), 0 where nothing is learnt, of lag and offsets also while the watch
+    rests; the standard deviation that y is given (2,), without what the slow mean of squared errors
+    adds; and whether kept weights come back, and by how much they follow the learnt ones.
     """
     n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)

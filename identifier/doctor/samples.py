@@ -350,7 +350,7 @@ def _runs_on(name: str, noisy: bool, recording: Recording, first: int, length: i
     if np.mean(np.abs(recording.v_x[here])) < 0.3 * float(np.percentile(np.abs(recording.v_x), 95)):
         return False
     others = [getattr(recording, one) for one in ("v_y", "r", "delta_f", "v_x") if one != name]
-    alive = sum(bool(np.ptp(one[here]) > 0.0) for one in others)
+    alive = sum(bool(np.ptp(one[here]) > 0.0) for one in others if one is not None)
     usual = _swing(_turning(name, recording))
     return (noisy and alive >= 2) or _moves(name, recording, first, length, usual)
 

@@ -167,8 +167,10 @@ def _check_turns(w: Means) -> str | None:
     r_delta = pair(turn, steered, w.grips)
     if felt is None:
         return _check_two(r_delta)
-    rest = felt - w.r * (float(felt @ w.r) / max(float(w.r @ w.r), 1e-300))
-    if float(rest @ rest) < COPY**2 * float(felt @ felt):
+    factor = float(felt @ w.r) / max(float(w.r @ w.r), 1e-300)
+    rest = felt - w.r * factor
+    alike = 0.5 < factor / float(np.mean(w.v_x)) < 2.0
+    if float(rest @ rest) < COPY**2 * float(felt @ felt) and not alike:
         return (
             "ay must be an acceleration, it is r times a number: a copy of the yaw rate? "
             "leave it out"

@@ -478,7 +478,7 @@ def test_an_a_y_without_v_x_r_is_not_turned() -> None:
 
 def test_an_a_y_that_is_the_yaw_rate_is_named() -> None:
     made = replace(drive(peak=1.0), axle_force=None)
-    for factor in (1.0, 9.81, -1.0):
+    for factor in (1.0, 57.3, -1.0):
         assert "a copy of the yaw rate? leave it out" in refusal(replace(made, a_y=factor * made.r))
 
 
