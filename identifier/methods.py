@@ -40,7 +40,7 @@ Factory = Callable[[Vehicle, int], Method]
 REGRESSIONS = ("kreisselmeier", "kreisselmeier_newton", "rls", "concurrent")
 DEFAULT = "fit"  # on logs
 LIVE = "axle"  # the default in a car, sample by sample
-WITHOUT_V_Y = "inertial"  # the default where a log has no lateral velocity
+WITHOUT_V_Y = "inertial"  # the default in a car without a lateral velocity
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
 

@@ -1,4 +1,7 @@
-"""Tires from one log or several: blocks of ten minutes, their information added up."""
+"""Tires from one log or several: blocks of ten minutes, their information added up.
+
+Logs with a v_y are estimated by the balance (`solve`), those without by `latent`.
+"""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -9,7 +12,9 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import FASTEST, Drive
+from identifier.estimate.latent import Learnt, learn_latent
 from identifier.estimate.model import FittedModel, Segment
+from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
@@ -41,7 +46,7 @@ def fit(
     *,
     progress: Callable[[float], None] | None = None,
 ) -> Fit:
-    """Estimate the tires of a car from logs with a v_y, with the same sensors.
+    """Estimate the tires of a car from logs, with the same sensors.
 
     Parameters
     ----------
@@ -53,12 +58,21 @@ def fit(
     ------
     ValueError
         Where no sample is fast enough to count.
+    RecordingError
+        Where a log has neither v_y nor a_y.
     """
     beliefs = Priors.of(vehicle) if priors is None else priors
     total = sum(one.duration for one in recordings)
-    done, reach, found = 0.0, Reach(), None
+    done, reach, found, parted = 0.0, Reach(), None, 0.0
     segments: list[Segment] = []
-    for drives in _blocks(recordings, vehicle):
+
+    def told(seconds: float) -> None:
+        nonlocal done
+        done += seconds
+        if progress is not None:
+            progress(min(done / max(total, 1e-9), 1.0))
+
+    for drives in _blocks([one for one in recordings if one.logged_v_y is not None], vehicle):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
@@ -67,12 +81,16 @@ def fit(
         found, roads = with_roads(drives, vehicle, beliefs, found)
         segments += _segments(drives, roads)
         reach = reach.and_of(drives, found, vehicle)
-        information = np.zeros_like(beliefs.information)
-        information[np.ix_(found.index, found.index)] = found.information
-        beliefs = replace(beliefs, mean=found.p, information=information, typed=())
-        done += sum(len(one.signals) * one.dt for one in drives)
-        if progress is not None:
-            progress(min(done / max(total, 1e-9), 1.0))
+        beliefs = _after(beliefs, found)
+        told(sum(len(one.signals) * one.dt for one in drives))
+    for nodes in _blocks_of_nodes([one for one in recordings if one.logged_v_y is None], vehicle):
+        if not nodes.counts.any():
+            continue
+        learnt = learn_latent(nodes, vehicle, beliefs)
+        found, parted = learnt.posterior, max(parted, learnt.parted)
+        reach = reach.and_of_states(learnt)
+        beliefs = _after(beliefs, found)
+        told(len(nodes.t) * nodes.dt)
     if found is None:
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
@@ -85,8 +103,18 @@ def fit(
         a_x=reach.a_x,
         missed=np.full(2, MISSED),
         segments=tuple(segments),
+        parted=parted,
     )
     return Fit(model, found)
+
+
+def _after(beliefs: Priors, found: Posterior) -> Priors:
+    """Return what is believed after a block; what it does not tell stays as it was."""
+    information, moves = beliefs.information.copy(), beliefs.moves.copy()
+    information[found.index], information[:, found.index] = 0.0, 0.0
+    information[np.ix_(found.index, found.index)] = found.information
+    moves[found.index] = True
+    return replace(beliefs, mean=found.p, information=information, moves=moves, typed=())
 
 
 def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
@@ -126,6 +154,29 @@ class Reach(NamedTuple):
                 low, high = np.quantile(one.signals[on, column], [0.005, 0.995])
                 both[:] = min(both[0], low), max(both[1], high)
         return Reach(slip, speeds, a_x)
+
+    def and_of_states(self, learnt: Learnt) -> "Reach":
+        """Return what a drive without v_y reached, too, by its estimated states."""
+        nodes, on = learnt.nodes, learnt.nodes.counts
+        size, given = np.abs(learnt.z[on, 2:4]), nodes.given[on]
+        k = min(max(round(REACHED / nodes.dt), 1), len(size))
+        low, high = np.quantile(given[:, [0, 3]], [0.005, 0.995], axis=0)
+        speeds, a_x = (
+            np.array([min(have[0], low[i]), max(have[1], high[i])])
+            for i, have in enumerate((self.speeds, self.a_x))
+        )
+        return Reach(
+            np.maximum(self.slip, np.partition(size, len(size) - k, axis=0)[-k]), speeds, a_x
+        )
+
+
+def _blocks_of_nodes(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[Nodes]:
+    """Yield nodes of at most `BLOCK`."""
+    for recording in recordings:
+        count = -(-len(recording) // max(round(BLOCK / recording.dt), 1))
+        edges = np.linspace(0, len(recording), count + 1).astype(int)
+        for begin, end in itertools.pairwise(edges):
+            yield Nodes.of(recording, vehicle, slice(int(begin), int(end)))
 
 
 def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[Drive]]:

@@ -17,6 +17,7 @@ from identifier.axle.model import AxleModel
 from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
+from identifier.estimate.latent import TRUST, Told, tell_v_y
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers, simulate
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
@@ -76,6 +77,8 @@ class FittedModel(TireModel):
     missed : share of the force by which drives of a car differ from one model, (2,).
     force_missed : share of the measured force that it misses of the drives that taught, (2,); None
         where nobody looked.
+    parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
+        part, rms [rad].
     """
 
     kind = "fit"
@@ -89,6 +92,7 @@ class FittedModel(TireModel):
     missed: Array
     segments: tuple[Segment, ...] = ()
     force_missed: Array | None = None
+    parted: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(NAMES)
@@ -274,6 +278,16 @@ class FittedModel(TireModel):
         """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self._over(recording)[1]
 
+    def told_v_y(self, recording: Recording) -> Told:
+        """Return the v_y of a drive whose sensors show none, smoothed on these tires.
+
+        Raises
+        ------
+        RecordingError
+            Where there is no a_y either.
+        """
+        return tell_v_y(recording, self.vehicle, self.p, self.covariance)
+
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
         for stretch in recording.stretches:
@@ -324,6 +338,15 @@ class FittedModel(TireModel):
                     "steering_gain",
                     f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
                     "says: check the steering ratio; the curves allow for it",
+                )
+            )
+        if self.parted > TRUST.parted:
+            listed.append(
+                (
+                    "not_observable",
+                    "side slip is not observable without v_y: soft and stiff tires explain the "
+                    f"drive alike, {np.degrees(self.parted):.2g} deg apart; the stiffness of the "
+                    "rear axle decides it",
                 )
             )
         return tuple(listed)
@@ -735,6 +758,7 @@ class FittedModel(TireModel):
             "missed": self.missed.tolist(),
             "segments": [one._asdict() for one in self.segments],
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
+            **({"parted_rad": self.parted} if self.parted else {}),
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
@@ -763,8 +787,10 @@ class FittedModel(TireModel):
             Segment(*(one.number(name) for name in Segment._fields))
             for one in (table.tables("segments") if "segments" in table else [])
         )
+        parted = table.number("parted_rad") if "parted_rad" in table else 0.0
         try:
-            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, segments=segments, **found)
+            car = vehicle_from(data["vehicle"])
+            return cls(vehicle=car, p=p, segments=segments, parted=parted, **found)
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
