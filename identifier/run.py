@@ -337,7 +337,7 @@ def _told(recording: Recording, model: TireModel) -> tuple[Recording, Mapping[st
     names = ("v_y", "v_y_sd", "side_slip_observable")
     outputs = {
         name: np.asarray(values, dtype=np.float64)[:, None]
-        for name, values in zip(names, told, strict=True)
+        for name, values in zip(names, told[:3], strict=True)
     }
     return replace(recording, v_y=told.v_y, estimated=("v_y",)), outputs
 

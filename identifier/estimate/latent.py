@@ -1,15 +1,16 @@
 """The estimate where no sensor shows v_y well: full information, v_y a state at every node.
 
 Minimized over the states z_k of all nodes and the parameters p (`motion.nodes`):
-Σ |moves(z_k, z_k+1, p)|²/Q + Σ ρ(|y_k - shows(z_k, p)|²/R) + Σ |begins(z, p)|²/P + T prior(p),
+Σ |moves(z_k, z_k+1, p)|²/Q + Σ ρ(|y_k - shows(z_k, p)|²/R) + Σ |begins(z, p)|²/P + prior(p),
 ρ Huber's. Gauss-Newton: its matrix [A B; Bᵀ C], A of the states banded, C of the parameters, is
 solved by banded Cholesky and Schur's complement S = C - Bᵀ A⁻¹ B.
-What a model misses does not average out over a log as noise does: beliefs count T times, and the
-covariance of the parameters is T S⁻¹, that of the beliefs where a log says nothing. R is learnt
-from what is left of r and a_y, as a density at low frequency.
+A late a_y looks like a soft rear axle, and so does another yaw inertia: both are believed firmly.
+R is learnt from what is left of r and a_y, as a density at low frequency. Covariances grow with
+what is left of all of it, which is more on a real car than on a simulated one.
 """
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -31,12 +32,13 @@ from models.vehicle import GRAVITY, Vehicle
 
 N, P = len(STATES), len(NAMES)
 OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
-FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.003, "a_y_lever": 0.01}  # sd; lever in L
+FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.0007, "a_y_lever": 0.01}  # sd; lever in L
 ROLL = 0.06  # by which a_y is larger in a car whose body rolls
-GYRO, INERTIA = 0.002, 0.03  # sd of the bias of r of a sedan [rad/s], and of ln I_z
+GYRO, INERTIA = 0.002, 0.007  # sd of the bias of r of a sedan [rad/s], and of ln I_z
 AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
 BLOCK, BESIDE = 600.0, 5.0  # [s] that are smoothed at once, and what is so beside them
 STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
+FIRM, FEW = 50.0, 8  # times that beliefs count at first, and for how many iterations
 MOST_SLIP, MOST_LAGGED = 0.7, 0.8  # |v_y/v_x|, and lagged slip [rad]
 LOOKED = 0.25  # [s] over which what is left of a sensor is alike
 SHORTEST = 50  # nodes from which noise is learnt
@@ -58,11 +60,10 @@ class Trust:
     a_y_share : the same of a_y over it [-].
     r_noise, a_y_noise, v_y_noise : noise before it is learnt, in the same units.
     clip : standard deviations from which a residual counts less.
-    beliefs : T [-].
     parted : side slip by which two starts may part [rad].
     observable : largest standard deviation of side slip that is observed [rad].
-    usual : mean of the squared residuals of a node, over their weights, on the random cars that T
-        was chosen on [-]; where more is left, covariances grow likewise.
+    usual : mean of the squared residuals of a node, over their weights, from which covariances are
+        those of the likelihood [-]; where more is left, they grow likewise.
     """
 
     error: float = 0.01
@@ -82,7 +83,6 @@ class Trust:
     a_y_noise: float = 0.2
     v_y_noise: float = 0.05
     clip: float = 3.0
-    beliefs: float = 6.0
     parted: float = 0.0035
     observable: float = 0.01
     usual: float = 0.25
@@ -92,11 +92,14 @@ TRUST = Trust()
 
 
 class Told(NamedTuple):
-    """v_y at each sample and its standard deviation [m/s], and whether it is known, (n,)."""
+    """v_y at each sample and its standard deviation [m/s], whether it is known, and what the
+    accelerometer shows beside forces of tires [weights], (n,).
+    """
 
     v_y: Array
     sd: Array
     observable: NDArray[np.bool_]
+    beside: Array
 
 
 class Around(NamedTuple):
@@ -179,7 +182,7 @@ class Latent:
         self.nodes, self.vehicle, self.trust = nodes, vehicle, trust
         self.index = np.flatnonzero(priors.moves) if columns is None else columns
         self.free = np.flatnonzero(priors.moves[self.index])
-        self.priors = replace(priors, information=trust.beliefs * priors.information)
+        self.priors = priors
         self._slopes = node_scan(tuple(LATENT_NAMES[k] for k in self.index))
         self._plain = node_scan()
         self._car = car_numbers(vehicle)
@@ -317,6 +320,13 @@ class Latent:
             p[k] += stiffer if self.priors.moves[k] else 0.0
         return z, p
 
+    def settled(self, stiffer: float = 0.0) -> tuple[Array, Array]:
+        """Return states and parameters near an optimum, where parameters do not run away."""
+        firm = copy(self)
+        firm.priors = replace(self.priors, information=FIRM * self.priors.information)
+        z, p, _, _ = firm.descend(*self.begin(stiffer), self._noise, FEW)
+        return z, p
+
     def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float, int]:
         """Return states, parameters, cost and the number of iterations at an optimum."""
         damping, v_x, count, cost = 1e-4, self.nodes.given[:, 0], 0, np.inf
@@ -376,7 +386,7 @@ class Latent:
         for k in range(n - 2, -1, -1):
             K = inv[k] @ at.O[k].T
             own[k] = V = inv[k] + K @ V @ K.T
-        return own, self.trust.beliefs * inverse, slopes, shows
+        return own, inverse, slopes, shows
 
     def noise(self, z: Array, p: Array, own: Array, shows: Array, R: Array) -> Array:
         """Return R (3,) by what is left of each sensor: its density at low frequency."""
@@ -448,15 +458,15 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
     v_y : whether the nodes have a measured v_y.
     """
     problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, v_y))
-    first = problem.smoothed(*problem.begin(STARTS[0]))
-    z, p, cost, _ = problem.descend(*problem.begin(STARTS[1]), first.R)
+    first = problem.smoothed(*problem.settled(STARTS[0]))
+    z, p, cost, _ = problem.descend(*problem.settled(STARTS[1]), first.R)
     best, other = first, (z, p, cost)
     if cost < first.cost:
         best, other = problem.smoothed(z, p, first.R, 0), (first.z, first.p, first.cost)
     on, v_x = nodes.counts, nodes.given[:, 0]
     apart = ((best.z - other[0])[:, 0] / v_x)[on]
     parted = float(np.sqrt(np.mean(apart**2))) if on.any() else 0.0
-    share = 1.0 / (1.0 + np.exp(min((other[2] - best.cost) / TRUST.beliefs, 50.0)))
+    share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
     index = problem.index[problem.index < P]
     moved = problem.index < P
     away = (other[1] - best.p)[index]
@@ -511,20 +521,25 @@ def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
         vehicle.bicycle.l_r * recording.r,
         TRUST.side_slip * np.maximum(recording.v_x, vehicle.lowest_speed),
         np.zeros(len(recording), dtype=bool),
+        np.zeros(len(recording)),
     )
     for outer, inner in _blocks(recording):
         nodes = Nodes.of(recording, vehicle, outer)
         if not nodes.counts.any():
             continue
         problem = Latent(nodes, vehicle, held, columns)
-        found = problem.smoothed(*problem.begin(), rounds=1)
+        found = problem.smoothed(*problem.settled(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]
         index = columns[known]
         doubt = covariance[np.ix_(index, index)]
         variance = found.own[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
         variance += np.einsum("ni,ij,nj->n", free, found.P, free)
-        _fill(told, recording, inner, nodes, found.z[:, 0], np.sqrt(variance))
+        bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
+        beside = bias + roll / GRAVITY * nodes.given[:, 5]
+        _fill(told, recording, inner, nodes, found.z[:, 0], np.sqrt(variance), beside)
+    for values in told:
+        values.setflags(write=False)
     return told
 
 
@@ -538,7 +553,13 @@ def _blocks(recording: Recording) -> Iterator[tuple[slice, slice]]:
 
 
 def _fill(
-    told: Told, recording: Recording, inner: slice, nodes: Nodes, v_y: Array, sd: Array
+    told: Told,
+    recording: Recording,
+    inner: slice,
+    nodes: Nodes,
+    v_y: Array,
+    sd: Array,
+    beside: Array,
 ) -> None:
     """Put v_y between nodes into its samples, run by run of nodes."""
     firsts = np.flatnonzero(nodes.begins)
@@ -554,6 +575,7 @@ def _fill(
         at = np.clip(recording.t[some], t[0], t[-1])
         told.v_y[some] = CubicSpline(t, v_y[run])(at)
         told.sd[some] = np.interp(at, t, sd[run])
+        told.beside[some] = np.interp(at, t, beside[run])
         told.observable[some] = told.sd[some] < TRUST.observable * recording.v_x[some]
 
 
