@@ -38,7 +38,7 @@ GYRO, INERTIA = 0.002, 0.007  # sd of the bias of r of a sedan [rad/s], and of l
 AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
 BLOCK, BESIDE = 600.0, 5.0  # [s] that are smoothed at once, and what is so beside them
 STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
-FIRM, FEW = 50.0, 8  # times that beliefs count at first, and for how many iterations
+FIRM, FEW = 50.0, 8  # times that beliefs count at first, and iterations of all but the last
 MOST_SLIP, MOST_LAGGED = 0.7, 0.8  # |v_y/v_x|, and lagged slip [rad]
 LOOKED = 0.25  # [s] over which what is left of a sensor is alike
 SHORTEST = 50  # nodes from which noise is learnt
@@ -146,11 +146,11 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Prior
         k = INDEX[name]
         if not moves[k]:
             information[k, k], moves[k] = sd**-2, True
-    sd = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
-    whole = np.zeros((P + len(sd),) * 2)
+    felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
+    whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
-    whole[range(P, len(whole)), range(P, len(whole))] = sd**-2
-    far = np.full(len(sd), np.inf)
+    whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
+    far = np.full(len(felt), np.inf)
     return replace(
         beliefs,
         mean=np.concatenate([beliefs.mean, [0.0, ROLL, 0.0, 0.0]]),
@@ -327,13 +327,15 @@ class Latent:
         z, p, _, _ = firm.descend(*self.begin(stiffer), self._noise, FEW)
         return z, p
 
-    def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float, int]:
+    def descend(
+        self, z: Array, p: Array, R: Array, most: int = 25
+    ) -> tuple[Array, Array, float, int]:
         """Return states, parameters, cost and the number of iterations at an optimum."""
-        damping, v_x, count, cost = 1e-4, self.nodes.given[:, 0], 0, np.inf
+        damping, v_x, total, cost = 1e-4, self.nodes.given[:, 0], 0, np.inf
         index = self.index[self.free]
         sd = np.diag(self.priors.information)[index] ** -0.5
         low, high = self.priors.low[index], self.priors.high[index]
-        for count in range(1, most + 1):
+        for total in range(1, most + 1):  # noqa: B007
             weights = self.weights(z, p, R)
             cost = self.cost(z, p, weights)
             at, _ = self.around(z, p, weights)
@@ -362,7 +364,7 @@ class Latent:
             damping = max(damping / 6.0, 1e-9)
             if (moved < 3e-4 and turned < 0.05) or gained < 0.02:
                 break
-        return z, p, cost, count
+        return z, p, cost, total
 
     def spread(self, z: Array, p: Array, R: Array) -> tuple[Array, Array, Array, Array]:
         """Return covariance of states alone (n, 8, 8), of parameters that move, dz/dp of v_y
@@ -373,7 +375,7 @@ class Latent:
         S = at.C - at.B.reshape(len(X), -1).T @ X
         slopes, free = -X.reshape(len(z), N, -1)[:, 0], self.free
         held = np.setdiff1d(np.arange(len(self.index)), free)
-        inverse = np.linalg.inv(S[np.ix_(free, free)])
+        inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
         if held.size:  # what moves makes up for a part of what is held
             slopes[:, held] -= slopes[:, free] @ inverse @ S[np.ix_(free, held)]
         n = len(z)
@@ -413,9 +415,7 @@ class Latent:
             found[i] = max(density - known, 1e-10)
         return found
 
-    def smoothed(
-        self, z: Array, p: Array, R: Array | None = None, rounds: int = 2
-    ) -> Smoothed:
+    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> Smoothed:
         """Return the optimum from a start, its noise learnt in some rounds.
 
         Parameters
@@ -424,7 +424,7 @@ class Latent:
         """
         R, total = self._noise if R is None else R, 0
         for _ in range(rounds):
-            z, p, _, count = self.descend(z, p, R)
+            z, p, _, count = self.descend(z, p, R, FEW)
             own, _, _, shows = self.spread(z, p, R)
             R, total = self.noise(z, p, own, shows, R), total + count
         z, p, cost, count = self.descend(z, p, R)
@@ -528,7 +528,7 @@ def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
         if not nodes.counts.any():
             continue
         problem = Latent(nodes, vehicle, held, columns)
-        found = problem.smoothed(*problem.settled(), rounds=1)
+        found = problem.smoothed(*problem.begin(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]
         index = columns[known]

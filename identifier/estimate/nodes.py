@@ -25,7 +25,7 @@ from identifier.estimate.priors import SEDAN
 from identifier.motion.model import DAMPING
 from models.recordings import Recording
 from models.recordings.record import ALL
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 BETWEEN = 0.06  # sqrt(L/g) from a node to the next
 ROLLS, JERKS = 5.0, 3.0  # Hz of a sedan, below which a_y rolls the body and is differentiated
@@ -150,7 +150,7 @@ def _piece(
     total = np.where(fresh, v_y.reshape(-1, every), 0.0).sum(axis=1)
     count = fresh.sum(axis=1)
     told = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    counts = on.reshape(-1, every).all(axis=1)
+    counts: NDArray[np.bool_] = np.asarray(on.reshape(-1, every).all(axis=1))
     goes = np.append(counts[:-1] & counts[1:], False)
     return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y), told]), counts, goes
 

@@ -19,7 +19,6 @@ from codegen import Scan
 from identifier.axle.car import named_port
 from identifier.axle.slip import SHORTEST
 from identifier.motion.model import (
-    DAMPING,
     LEAST_GRIP,
     LEAST_SLOPE,
     QUICK,
@@ -90,7 +89,8 @@ def node_scan(columns: Columns = ()) -> Scan:
         out = {
             **{"now": J.T @ wJ, "next": K.T @ wK, "both": K.T @ wJ},
             **{"border": J.T @ wP, "border_next": K.T @ wP},
-            **{"slope": wJ.T @ missed, "slope_next": wK.T @ missed, "shows_z": ca.jacobian(shows, z)},
+            **{"slope": wJ.T @ missed, "slope_next": wK.T @ missed},
+            "shows_z": ca.jacobian(shows, z),
             **{"sums_next": sums + P.T @ wP, "slopes_next": slopes + wP.T @ missed},
         }  # fmt: skip
     step = ca.Function(
