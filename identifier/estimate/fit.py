@@ -12,7 +12,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import FASTEST, Drive
-from identifier.estimate.latent import Learnt, learn_latent
+from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior
@@ -63,7 +63,7 @@ def fit(
     """
     beliefs = Priors.of(vehicle) if priors is None else priors
     total = sum(one.duration for one in recordings)
-    done, reach, found, parted = 0.0, Reach(), None, 0.0
+    done, reach, found, parted, late = 0.0, Reach(), None, 0.0, 0.0
     segments: list[Segment] = []
 
     def told(seconds: float) -> None:
@@ -83,14 +83,16 @@ def fit(
         reach = reach.and_of(drives, found, vehicle)
         beliefs = _after(beliefs, found)
         told(sum(len(one.signals) * one.dt for one in drives))
-    for nodes in _blocks_of_nodes([one for one in recordings if one.logged_v_y is None], vehicle):
-        if not nodes.counts.any():
-            continue
-        learnt = learn_latent(nodes, vehicle, beliefs)
-        found, parted = learnt.posterior, max(parted, learnt.parted)
-        reach = reach.and_of_states(learnt)
-        beliefs = _after(beliefs, found)
-        told(len(nodes.t) * nodes.dt)
+    for blind in (one for one in recordings if one.logged_v_y is None):
+        late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+        for nodes in _blocks_of_nodes(blind, vehicle, late):
+            if not nodes.counts.any():
+                continue
+            learnt = learn_latent(nodes, vehicle, beliefs)
+            found, parted = learnt.posterior, max(parted, learnt.parted)
+            reach = reach.and_of_states(learnt)
+            beliefs = _after(beliefs, found)
+            told(len(nodes.t) * nodes.dt)
     if found is None:
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
@@ -104,6 +106,7 @@ def fit(
         missed=np.full(2, MISSED),
         segments=tuple(segments),
         parted=parted,
+        a_y_late=late,
     )
     return Fit(model, found)
 
@@ -170,13 +173,12 @@ class Reach(NamedTuple):
         )
 
 
-def _blocks_of_nodes(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[Nodes]:
-    """Yield nodes of at most `BLOCK`."""
-    for recording in recordings:
-        count = -(-len(recording) // max(round(BLOCK / recording.dt), 1))
-        edges = np.linspace(0, len(recording), count + 1).astype(int)
-        for begin, end in itertools.pairwise(edges):
-            yield Nodes.of(recording, vehicle, slice(int(begin), int(end)))
+def _blocks_of_nodes(recording: Recording, vehicle: Vehicle, late: float) -> Iterator[Nodes]:
+    """Yield nodes of at most `BLOCK`, of a log whose a_y is late [s]."""
+    count = -(-len(recording) // max(round(BLOCK / recording.dt), 1))
+    edges = np.linspace(0, len(recording), count + 1).astype(int)
+    for begin, end in itertools.pairwise(edges):
+        yield Nodes.of(recording, vehicle, slice(int(begin), int(end)), a_y_late=late)
 
 
 def _blocks(recordings: Sequence[Recording], vehicle: Vehicle) -> Iterator[list[Drive]]:

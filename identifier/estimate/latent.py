@@ -21,7 +21,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.estimate.nodes import Nodes, low_passed
+from identifier.estimate.nodes import JERKS, Nodes, low_passed
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
@@ -37,6 +37,9 @@ ROLL = 0.06  # by which a_y is larger in a car whose body rolls
 GYRO, INERTIA = 0.002, 0.007  # sd of the bias of r of a sedan [rad/s], and of ln I_z
 AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
 BLOCK, BESIDE = 600.0, 5.0  # [s] that are smoothed at once, and what is so beside them
+ASKED = 60.0  # [s] that are asked for a late a_y
+DELAYS, GAINED = 0.04, 8.0  # [s] between delays that are tried, of a sedan; nats that one gains,
+# more where more is left (`Trust.usual`)
 STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
 FIRM, FEW = 50.0, 8  # times that beliefs count at first, and iterations of all but the last
 MOST_SLIP, MOST_LAGGED = 0.7, 0.8  # |v_y/v_x|, and lagged slip [rad]
@@ -191,7 +194,7 @@ class Latent:
         self._times = np.array([trust.error_time * s, trust.bank_time * s])
         per = np.array([1.0 / s, 1.0, s])
         self._floor = per * (trust.r, trust.a_y, trust.v_y)
-        self._noise = (per * (trust.r_noise, trust.a_y_noise, trust.v_y_noise)) ** 2
+        self.R = (per * (trust.r_noise, trust.a_y_noise, trust.v_y_noise)) ** 2
         dt, (T_e, T_p) = nodes.dt, self._times
         self._kept = np.exp(-dt / T_e)
         self._sd = np.array(
@@ -324,7 +327,7 @@ class Latent:
         """Return states and parameters near an optimum, where parameters do not run away."""
         firm = copy(self)
         firm.priors = replace(self.priors, information=FIRM * self.priors.information)
-        z, p, _, _ = firm.descend(*self.begin(stiffer), self._noise, FEW)
+        z, p, _, _ = firm.descend(*self.begin(stiffer), self.R, FEW)
         return z, p
 
     def descend(
@@ -422,7 +425,7 @@ class Latent:
         ----------
         R : to begin with (3,); None takes that of good sensors.
         """
-        R, total = self._noise if R is None else R, 0
+        R, total = self.R if R is None else R, 0
         for _ in range(rounds):
             z, p, _, count = self.descend(z, p, R, FEW)
             own, _, _, shows = self.spread(z, p, R)
@@ -494,6 +497,52 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
     )
 
 
+def lateness(
+    recording: Recording, vehicle: Vehicle, priors: Priors, columns: NDArray[np.intp] | None = None
+) -> float:
+    """Return by how much a_y is later than the yaw rate [s], where that is no small matter.
+
+    It is the delay with which the minute of hardest cornering is explained best, by whole samples,
+    since interpolation averages noise, and refined by a parabola. 0 where none gains enough.
+
+    Parameters
+    ----------
+    priors, columns : as of `Latent`.
+    """
+    n = min(round(ASKED / recording.dt), len(recording))
+    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
+    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
+    scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
+    smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
+    piece, part = replace(recording, a_y=smooth), slice(first, first + n)
+    found: dict[int, float] = {}
+    count = 1
+
+    def cost(samples: int) -> float:
+        nonlocal count
+        if samples not in found:
+            nodes = Nodes.of(piece, vehicle, part, a_y_late=samples * dt)
+            problem, count = Latent(nodes, vehicle, priors, columns), max(nodes.counts.sum(), 1)
+            _, _, found[samples], _ = problem.descend(*problem.settled(), problem.R, FEW)
+        return found[samples]
+
+    h = max(round(DELAYS * scale / dt), 1)
+    while True:  # a coarse grid, and one between
+        near = min(found, key=cost) if found else 0
+        for k in range(-1, 5) if not found else (-1, 1):
+            cost(near + k * h)
+        near = min(found, key=cost)
+        if h == 1 or len(found) > 6:
+            break
+        h = max(h // 2, 1)
+    if cost(0) - cost(near) < GAINED * max(1.0, 2.0 * cost(near) / count / TRUST.usual):
+        return 0.0
+    before, at, after = (cost(near + k * h) for k in (-1, 0, 1))
+    bend = before - 2.0 * at + after
+    off = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return dt * (near + h * float(np.clip(off, -0.5, 0.5)))
+
+
 def _believed(beliefs: Priors) -> Array:
     """Return the covariance of what is believed, (p, p): of what a log does not tell."""
     covariance = np.zeros_like(beliefs.information)
@@ -523,8 +572,9 @@ def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
         np.zeros(len(recording), dtype=bool),
         np.zeros(len(recording)),
     )
+    late = lateness(recording, vehicle, held, columns)
     for outer, inner in _blocks(recording):
-        nodes = Nodes.of(recording, vehicle, outer)
+        nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
         if not nodes.counts.any():
             continue
         problem = Latent(nodes, vehicle, held, columns)

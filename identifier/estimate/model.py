@@ -80,6 +80,7 @@ class FittedModel(TireModel):
         where nobody looked.
     parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
         part, rms [rad].
+    a_y_late : of such drives, by which a_y was later than the yaw rate [s].
     """
 
     kind = "fit"
@@ -94,6 +95,7 @@ class FittedModel(TireModel):
     segments: tuple[Segment, ...] = ()
     force_missed: Array | None = None
     parted: float = 0.0
+    a_y_late: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(NAMES)
@@ -344,6 +346,14 @@ class FittedModel(TireModel):
                     "steering_gain",
                     f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
                     "says: check the steering ratio; the curves allow for it",
+                )
+            )
+        if self.a_y_late:
+            listed.append(
+                (
+                    "a_y_late",
+                    f"a_y is {1e3 * self.a_y_late:.0f} ms late against the yaw rate, as behind a "
+                    "filter: it is read so much earlier; log it without the filter",
                 )
             )
         if self.parted > TRUST.parted:
@@ -765,6 +775,7 @@ class FittedModel(TireModel):
             "segments": [one._asdict() for one in self.segments],
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
             **({"parted_rad": self.parted} if self.parted else {}),
+            **({"a_y_late_s": self.a_y_late} if self.a_y_late else {}),
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
@@ -793,10 +804,12 @@ class FittedModel(TireModel):
             Segment(*(one.number(name) for name in Segment._fields))
             for one in (table.tables("segments") if "segments" in table else [])
         )
-        parted = table.number("parted_rad") if "parted_rad" in table else 0.0
+        parted, late = (
+            table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
+        )
         try:
             car = vehicle_from(data["vehicle"])
-            return cls(vehicle=car, p=p, segments=segments, parted=parted, **found)
+            return cls(vehicle=car, p=p, segments=segments, parted=parted, a_y_late=late, **found)
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
