@@ -27,7 +27,7 @@ from models.recordings import Recording
 from models.recordings.record import ALL
 from models.vehicle import Vehicle
 
-BETWEEN = 0.06  # sqrt(L/g) from a node to the next
+BETWEEN, LEAST = 0.06, 0.02  # sqrt(L/g) from a node to the next, and [s] that it is at least
 ROLLS, JERKS = 5.0, 3.0  # Hz of a sedan, below which a_y rolls the body and is differentiated
 FEWEST = 3  # nodes of a stretch
 
@@ -75,7 +75,8 @@ class Nodes:
         RecordingError
             Where there is no a_y.
         """
-        every = max(1, round(BETWEEN * vehicle.froude_time / recording.dt))
+        between = max(BETWEEN * vehicle.froude_time, LEAST)
+        every = max(1, round(between / recording.dt))
         begin, end, _ = part.indices(len(recording))
         a_y = recording.needed("a_y")
         nothing = np.full(len(recording), np.nan)
