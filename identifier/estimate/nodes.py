@@ -44,7 +44,6 @@ class Nodes:
     measured : r [rad/s], a_y [m/s²] and v_y [m/s], nan where there is none, (n, 3).
     counts : where the car drives fast enough, (n,).
     goes : whether the motion goes on to the next node, (n,).
-    begins : whether it begins at the node, (n,).
     """
 
     t: Array
