@@ -400,7 +400,7 @@ def random_drive(
             continue
         wanted = _speed_over_time(begin, speed)
         if pull:
-            wanted = _changing(wanted, car, speed, most, maneuver, rng)
+            wanted = changing_speed(wanted, car, speed, most, maneuver, rng)
         try:
             run = plant.simulate(
                 maneuver,
@@ -458,7 +458,7 @@ SLOWER, FASTER = -0.3, 0.15  # of the wanted speed, to which a driver brakes and
 HELD = (1.0, 4.0)  # sqrt(L/g) for which he holds it then
 
 
-def _changing(
+def changing_speed(
     wanted: Callable[[Array], Array],
     car: RandomCar,
     speed: float,

@@ -29,6 +29,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "beginnings": [],
     "inertial": [],
     "without_v_y": [],
+    "latent": [],
     "noisy_runs": [],
     "several_rates": [],
     "fault_table": ["{out}"],

@@ -124,6 +124,11 @@ class Method(ABC):
         return True
 
     @property
+    def tells_v_y(self) -> bool:
+        """Whether it tells the lateral velocity of a recording without one."""
+        return not self.needs_v_y
+
+    @property
     def needs_a_y(self) -> bool:
         """Whether it learns nothing from a recording without an accelerometer."""
         return False

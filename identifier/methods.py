@@ -36,7 +36,7 @@ from models.vehicle import Vehicle
 Factory = Callable[[Vehicle, int], Method]
 DEFAULT = "fit"  # on logs
 LIVE = "axle"  # the default in a car, sample by sample
-WITHOUT_V_Y = "inertial"  # the default where a log has no lateral velocity
+WITHOUT_V_Y = "inertial"  # the default in a car without a lateral velocity
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
 

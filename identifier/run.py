@@ -189,8 +189,15 @@ class History:
         if self.online:
             raise ValueError("an online run is beside another drive as of identify")
         model = self.freeze(t)
+        recording, outputs = _told(recording.as_logged(), model)
         force = model.axle_force(recording)
-        return replace(self, recording=recording, axle_force=force, models={len(recording): model})
+        return replace(
+            self,
+            recording=recording,
+            axle_force=force,
+            outputs=outputs,
+            models={len(recording): model},
+        )
 
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
         """Return the run over each of the recordings that the drive was joined of."""
@@ -237,8 +244,9 @@ def check_recording(recording: Recording, design: Method) -> None:
         raise ValueError(
             f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
         )
-    for name in ("v_y", "a_y"):
-        if getattr(design, f"needs_{name}") and getattr(recording, name) is None:
+    needed = {"v_y": not design.tells_v_y, "a_y": design.needs_a_y}
+    for name in (name for name, one in needed.items() if one):
+        if getattr(recording, name) is None:
             raise RecordingError(
                 f"{recording.name}: there is no {name.replace('_', '')}, from which "
                 f"{type(design).__name__} learns"
@@ -273,13 +281,14 @@ def identify(
     check_recording(recording, design)
     if design.whole:
         model = design.fitted(recording, vehicle, start, progress=progress)
+        recording, outputs = _told(recording, model)
         return History(
             vehicle=vehicle,
             design=design,
             recording=recording,
             axle_force=model.axle_force(recording),
             state={},
-            outputs={},
+            outputs=outputs,
             start=start,
             models={len(recording): model},
         )
@@ -318,6 +327,19 @@ def identify(
         outputs=Recalled(run, "outputs"),
         start=start,
     )
+
+
+def _told(recording: Recording, model: TireModel) -> tuple[Recording, Mapping[str, Array]]:
+    """Return a recording with the v_y that a model tells where there is none, and how well."""
+    told = model.told_v_y(recording) if recording.v_y is None else None
+    if told is None:
+        return recording, {}
+    names = ("v_y", "v_y_sd", "side_slip_observable")
+    outputs = {
+        name: np.asarray(values, dtype=np.float64)[:, None]
+        for name, values in zip(names, told[:3], strict=True)
+    }
+    return replace(recording, v_y=told.v_y, estimated=("v_y",)), outputs
 
 
 def learn(

@@ -30,6 +30,7 @@ from models.vehicle import Vehicle
 if TYPE_CHECKING:  # what some models answer with
     from identifier.axle.band import BandCalibration, SpreadByRange
     from identifier.axle.guarantee import Guarantee
+    from identifier.estimate.latent import Told
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -148,6 +149,11 @@ class TireModel(ABC):
         recording : its signals are the input; its forces are not looked at.
         """
         return self.setup(recording.dt).output(recording, "axle_force")
+
+    def told_v_y(self, recording: Recording) -> "Told | None":
+        """Return the v_y of a drive whose sensors show none; None of tires that cannot tell it."""
+        del recording
+        return None
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:

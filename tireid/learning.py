@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 from identifier.doctor import diagnose
 from identifier.estimate.method import FitMethod
@@ -47,8 +48,7 @@ def identify(
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
     method : the identifier, or its name as of `methods`; None takes `FitMethod.for_vehicle` at the
-        recording's interval, or `InertialIdentifier.for_vehicle`, which estimates v_y, where the
-        recording has none.
+        recording's interval, which estimates v_y where the recording has none.
     start : model to go on learning from; None begins afresh.
     check : whether what this vehicle cannot have driven is refused, and the doctor asked.
     progress : called now and then with the share that is done, 0 to 1.
@@ -72,8 +72,7 @@ def identify(
         method = make_method(method, vehicle)
     if method is not None:
         require_kind(Method, METHOD, method=method)
-    usual = InertialIdentifier if recording.logged_v_y is None else FitMethod
-    design = usual.for_vehicle(vehicle, dt=recording.dt) if method is None else method
+    design = FitMethod.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
         check_against_vehicle(recording, vehicle)
         for finding in diagnose(recording, vehicle).findings:
@@ -95,7 +94,7 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
     Parameters
     ----------
     recording : another drive; samples below the model's minimum speed do not count. Where it has
-        no v_y, the inertial identifier estimates it, beginning with `tire`.
+        no v_y, `tire` tells it, or the inertial identifier, beginning with `tire`.
     tire : what was learnt.
     since : samples before this time [s] do not count; None counts all.
 
@@ -112,9 +111,22 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
 
 
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
-    """Return a drive with its v_y, or with that which the inertial identifier estimates."""
+    """Return a drive with its v_y, or with that which the tires or a filter tell.
+
+    Parameters
+    ----------
+    tire : where it tells no v_y, the inertial identifier does, beginning with it where it can.
+
+    Raises
+    ------
+    RecordingError
+        Where there is no a_y to estimate from.
+    """
     if recording.v_y is not None:
         return recording
+    told = tire.told_v_y(recording)
+    if told is not None:
+        return replace(recording, v_y=told.v_y, estimated=("v_y",))
     design = InertialIdentifier.for_vehicle(tire.vehicle, dt=recording.dt)
     start = tire if design.resumes(tire) else None
     return run_over(recording, tire.vehicle, design, start).recording

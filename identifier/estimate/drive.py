@@ -147,7 +147,7 @@ def _piece(
     a_x = box(gradient(box(v_x, n3 / 2), dt), n3) - box(v_y * r, n3)
     if recording.a_x is not None:
         felt = box(thinned(recording.a_x[piece], every), count)
-        if _slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, ALONG) is not None:
+        if slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, ALONG) is not None:
             a_x = felt
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
     bank = np.zeros_like(v_x)
@@ -198,7 +198,7 @@ def box(signal: Array, count: float) -> Array:
     return mean
 
 
-def _slope_on(
+def slope_on(
     motion: Array, felt: Array, on: NDArray[np.bool_], dt: float, within: tuple[float, float]
 ) -> float | None:
     """Return the slope of what an accelerometer feels on the motion, of what is fast in both.
@@ -223,7 +223,7 @@ def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], d
     """
     n1 = BANK_MEAN / dt
     motion = gradient(box(v_y, LONGITUDINAL / dt / 3), dt) + v_x * r
-    gain = _slope_on(motion, a_y, on, dt, ACROSS)
+    gain = slope_on(motion, a_y, on, dt, ACROSS)
     if gain is None:
         return np.zeros_like(v_x)
     slow, felt = box(motion, n1), box(a_y, n1)

@@ -1,7 +1,11 @@
-"""Tires from one log or several: blocks of ten minutes, their information added up."""
+"""Tires from one log or several: blocks of ten minutes, their information added up.
+
+Logs with a v_y are estimated by the balance (`solve`), those without by `latent`.
+"""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +13,9 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.estimate.drive import FASTEST, Drive
 from identifier.estimate.information import Information
+from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel, Segment
+from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
@@ -44,7 +50,7 @@ def fit(
     coarse: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Fit:
-    """Estimate the tires of a car from logs with a v_y, with the same sensors.
+    """Estimate the tires of a car from logs, with the same sensors.
 
     Parameters
     ----------
@@ -58,15 +64,25 @@ def fit(
     ------
     ValueError
         Where no sample is fast enough to count.
+    RecordingError
+        Where a log has neither v_y nor a_y.
     """
     before = Priors.of(vehicle) if priors is None else priors
     told, sd = Information.nothing(), Priors.of(vehicle).sd
     parts: list[tuple[float, Information]] = []
     total = sum(one.duration for one in recordings)
-    done, reach, found = 0.0, Reach(), None
+    done, reach, found, parted, late = 0.0, Reach(), None, 0.0, 0.0
     segments: list[Segment] = []
     coarse = coarse or total > LONG
-    for drives in _blocks(recordings, vehicle, block, coarse=coarse):
+
+    def went_on(seconds: float) -> None:
+        nonlocal done
+        done += seconds
+        if progress is not None:
+            progress(min(done / max(total, 1e-9), 1.0))
+
+    sighted = [one for one in recordings if one.logged_v_y is not None]
+    for drives in _blocks(sighted, vehicle, block, coarse=coarse):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
@@ -82,9 +98,18 @@ def fit(
         )
         told += part
         parts.append((drives[0].begin, part))
-        done += sum(len(one.signals) * one.dt for one in drives)
-        if progress is not None:
-            progress(min(done / max(total, 1e-9), 1.0))
+        went_on(sum(len(one.signals) * one.dt for one in drives))
+    beliefs = before if found is None else _after(before, found)
+    for blind in (one for one in recordings if one.logged_v_y is None):
+        late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+        for nodes in _blocks_of_nodes(blind, vehicle, late):
+            if not nodes.counts.any():
+                continue
+            learnt = learn_latent(nodes, vehicle, beliefs)
+            found, parted = learnt.posterior, max(parted, learnt.parted)
+            reach = reach.with_(Reach.of_states(learnt))
+            beliefs = _after(beliefs, found)
+            went_on(len(nodes.t) * nodes.dt)
     if found is None:
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
@@ -97,8 +122,21 @@ def fit(
         a_x=reach.a_x,
         unexplained=reach.unexplained,
         segments=tuple(segments),
+        parted=parted,
+        a_y_late=late,
     )
     return Fit(model, found, parts)
+
+
+def _after(beliefs: Priors, found: Posterior) -> Priors:
+    """Return what is believed after a block; what it does not tell stays as it was."""
+    information, moves = beliefs.information.copy(), beliefs.moves.copy()
+    index = np.flatnonzero(np.diag(found.covariance) > 0.0)
+    information[index], information[:, index] = 0.0, 0.0
+    where = np.ix_(index, index)
+    information[where] = np.linalg.inv(found.covariance[where])
+    moves[index] = True
+    return replace(beliefs, mean=found.p, information=information, moves=moves, typed=(), told=None)
 
 
 def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
@@ -181,6 +219,26 @@ class Reach(NamedTuple):
                 low, high = np.quantile(one.signals[on, column], [0.005, 0.995])
                 both[:] = min(both[0], low), max(both[1], high)
         return cls(slip, speeds, a_x, alike, pairs)
+
+    @classmethod
+    def of_states(cls, learnt: Learnt) -> "Reach":
+        """Return what a drive without v_y reached, by its estimated states."""
+        nodes, on = learnt.nodes, learnt.nodes.counts
+        size, given = np.abs(learnt.z[on, 2:4]), nodes.given[on]
+        k = min(max(round(REACHED / nodes.dt), 1), len(size))
+        speeds, a_x = np.quantile(given[:, [0, 3]], [0.005, 0.995], axis=0).T
+        turning = np.abs(given[:, 0] * learnt.z[on, 1]) / GRAVITY
+        alike = np.sum((learnt.z[on, 4:6] / error_size(turning)[:, None]) ** 2, axis=0)
+        slip = np.partition(size, len(size) - k, axis=0)[-k]
+        return cls(slip, speeds, a_x, alike, float(len(size)))
+
+
+def _blocks_of_nodes(recording: Recording, vehicle: Vehicle, late: float) -> Iterator[Nodes]:
+    """Yield nodes of at most `BLOCK`, of a log whose a_y is late [s]."""
+    count = -(-len(recording) // max(round(BLOCK / recording.dt), 1))
+    edges = np.linspace(0, len(recording), count + 1).astype(int)
+    for begin, end in itertools.pairwise(edges):
+        yield Nodes.of(recording, vehicle, slice(int(begin), int(end)), a_y_late=late)
 
 
 def _blocks(

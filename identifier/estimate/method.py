@@ -57,6 +57,11 @@ class FitMethod(Method):
         return PORTS
 
     @property
+    def tells_v_y(self) -> bool:
+        """Whether it tells the lateral velocity of a recording without one: it does."""
+        return True
+
+    @property
     def whole(self) -> bool:
         """Whether it learns from a whole log at once."""
         return True
@@ -79,6 +84,8 @@ class FitMethod(Method):
         ------
         ValueError
             Where it is told to go on from a model of another method, or no sample is fast enough.
+        RecordingError
+            Where there is neither v_y nor a_y.
         """
         if start is not None and not isinstance(start, FittedModel):
             raise ValueError(

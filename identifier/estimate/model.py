@@ -1,6 +1,7 @@
 """The tires that an estimate found, frozen: curve, lag, sway, load, ellipse and sensors."""
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from identifier.axle.model import AxleModel
 from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
+from identifier.estimate.latent import TRUST, Told, tell_v_y
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import ERROR_SIZE, car_numbers, simulate
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
@@ -89,6 +91,9 @@ class FittedModel(TireModel):
     unexplained : size of what the drives miss for longer than noise, over `ERROR_SIZE`, (2,).
     force_missed : share of the measured force that it misses of the drives that taught, (2,); None
         where nobody looked.
+    parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
+        part, rms [rad].
+    a_y_late : of such drives, by which a_y was later than the yaw rate [s].
     """
 
     kind = "fit"
@@ -102,6 +107,8 @@ class FittedModel(TireModel):
     unexplained: Array
     segments: tuple[Segment, ...] = ()
     force_missed: Array | None = None
+    parted: float = 0.0
+    a_y_late: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(NAMES)
@@ -287,6 +294,21 @@ class FittedModel(TireModel):
         """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self._over(recording)[1]
 
+    def told_v_y(self, recording: Recording) -> Told:
+        """Return the v_y of a drive whose sensors show none, smoothed on these tires.
+
+        Raises
+        ------
+        RecordingError
+            Where there is no a_y either.
+        """
+        for r, p, told in _TOLD:
+            if r is recording.r and p is self.p:
+                return told
+        told = tell_v_y(recording, self.vehicle, self.p, self.covariance)
+        _TOLD.append((recording.r, self.p, told))
+        return told
+
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
         for stretch in recording.stretches:
@@ -337,6 +359,23 @@ class FittedModel(TireModel):
                     "steering_gain",
                     f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
                     "says: check the steering ratio; the curves allow for it",
+                )
+            )
+        if self.a_y_late:
+            listed.append(
+                (
+                    "a_y_late",
+                    f"a_y is {1e3 * self.a_y_late:.0f} ms late against the yaw rate, as behind a "
+                    "filter: it is read so much earlier; log it without the filter",
+                )
+            )
+        if self.parted > TRUST.parted:
+            listed.append(
+                (
+                    "not_observable",
+                    "side slip is not observable without v_y: soft and stiff tires explain the "
+                    f"drive alike, {np.degrees(self.parted):.2g} deg apart; the stiffness of the "
+                    "rear axle decides it",
                 )
             )
         return tuple(listed)
@@ -773,6 +812,8 @@ class FittedModel(TireModel):
             "unexplained": self.unexplained.tolist(),
             "segments": [one._asdict() for one in self.segments],
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
+            **({"parted_rad": self.parted} if self.parted else {}),
+            **({"a_y_late_s": self.a_y_late} if self.a_y_late else {}),
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
@@ -801,14 +842,20 @@ class FittedModel(TireModel):
             Segment(*(one.number(name) for name in Segment._fields))
             for one in (table.tables("segments") if "segments" in table else [])
         )
+        parted, late = (
+            table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
+        )
         try:
-            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, segments=segments, **found)
+            car = vehicle_from(data["vehicle"])
+            return cls(vehicle=car, p=p, segments=segments, parted=parted, a_y_late=late, **found)
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
             raise FrozenModelError(f"{source}: {error}") from error
 
 
+# A run, its verdict and its report ask about the same drive: the last few answers are kept.
+_TOLD: deque[tuple[Array, Array, Told]] = deque(maxlen=4)
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 
 

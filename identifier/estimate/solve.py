@@ -209,7 +209,7 @@ class Problem:
         """
         S2 = self.scale(e)
         scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
-        return self.misfit(e, S2, T) + _beliefs(self.priors, p) + scales
+        return self.misfit(e, S2, T) + beliefs_cost(self.priors, p) + scales
 
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
         """Return Σ w/T ρ(e) [nats].
@@ -375,18 +375,18 @@ def descend(
     for count in range(1, iterations + 1):
         S2 = problem.scale(now.e)
         T = np.sqrt(T * problem.memory(now.e)) if count > 1 and memory is None else T
-        cost = problem.misfit(now.e, S2, T) + _beliefs(priors, p)
+        cost = problem.misfit(now.e, S2, T) + beliefs_cost(priors, p)
         H, gradient = normal(problem, now, S2, T)
         of_beliefs, curvature = around_beliefs(priors, p)
         H = H + curvature[np.ix_(index, index)]
         gradient = gradient + of_beliefs[index]
         better = None
         for _ in range(8):
-            step = _bounded(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
+            step = bounded_step(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
             trial = p.copy()
             trial[index] = np.clip(p[index] + step, low, high)
             then = problem.residuals(trial)
-            reached = problem.misfit(then.e, S2, T) + _beliefs(priors, trial)
+            reached = problem.misfit(then.e, S2, T) + beliefs_cost(priors, trial)
             if reached < cost:
                 better = trial, then, cost - reached
                 break
@@ -445,14 +445,14 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     """
     index, p = np.flatnonzero(priors.moves), begin.copy()
     low, high = priors.low[index], priors.high[index]
-    cost, damping = _beliefs(priors, p), 1e-6
+    cost, damping = beliefs_cost(priors, p), 1e-6
     for _ in range(SETTLING):
         gradient, curvature = around_beliefs(priors, p)
         H = curvature[np.ix_(index, index)]
-        step = _bounded(H + damping * np.diag(np.diag(H)), gradient[index], p[index], low, high)
+        step = bounded_step(H + damping * np.diag(np.diag(H)), gradient[index], p[index], low, high)
         trial = p.copy()
         trial[index] = np.clip(p[index] + step, low, high)
-        reached = _beliefs(priors, trial)
+        reached = beliefs_cost(priors, trial)
         if not reached < cost:
             damping = max(6.0 * damping, 1e-3)
             continue
@@ -465,14 +465,14 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     return p, covariance
 
 
-def _beliefs(priors: Priors, p: Array) -> float:
+def beliefs_cost(priors: Priors, p: Array) -> float:
     """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
     soft, _ = softness(p)
     return priors.cost(p) + 0.5 * float(soft @ soft)
 
 
 def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
-    """Return gradient (p,) and positive curvature (p, p) of `_beliefs`."""
+    """Return gradient (p,) and positive curvature (p, p) of `beliefs_cost`."""
     gradient, curvature = priors.around(p)
     soft, slopes = softness(p)
     return gradient + soft @ slopes, curvature + slopes.T @ slopes
@@ -513,7 +513,7 @@ def normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array,
     return weighted.T @ J, weighted.T @ at.e.ravel()
 
 
-def _bounded(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:
+def bounded_step(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:
     """Return the step of a quadratic model; parameters at a bound that it would leave stay."""
     free = np.ones(p.size, dtype=bool)
     step = np.zeros(p.size)

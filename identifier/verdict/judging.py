@@ -35,7 +35,7 @@ from identifier.verdict.verdict import (
 )
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import GRAVITY
 
 SECANT = 0.01  # rad, to which the slope of a curve is taken: play makes none at zero
 ROADS = 3  # segments of another friction that are listed one by one
@@ -145,7 +145,7 @@ def judge_prediction(
     asked = _asked(model, recording, own=False)
     if asked is None:
         return _too_short(model)
-    road = _road(asked.recording, model.vehicle)
+    road = _road(asked.recording, model)
     friction = road_friction(model, recording, road) if another_road else None
     verdict = _verdict(asked, [*_findings(asked), *_roads(friction)], recording)
     return replace(verdict, friction=friction)
@@ -156,7 +156,7 @@ def _asked(
 ) -> Asked | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
-    found = evidence(model, part.recording, _road(part.recording, model.vehicle))
+    found = evidence(model, part.recording, _road(part.recording, model))
     if own and found is not None:
         other = model.road_differs(recording.t[part.samples])
         found = found.where(~other[found.windows.starts])
@@ -170,11 +170,17 @@ def _asked(
     return Asked(model, part, judged, own, left_out)
 
 
-def _road(recording: Recording, vehicle: Vehicle) -> Array | None:
-    """Return what a banked road pushes to the left, by the accelerometer (n,) [weights]."""
-    if recording.a_y is None or recording.logged_v_y is None:
+def _road(recording: Recording, model: TireModel) -> Array | None:
+    """Return what a banked road pushes to the left, by the accelerometer (n,) [weights].
+
+    Where no v_y was logged, what the accelerometer shows beside forces; None where nobody tells.
+    """
+    if recording.a_y is None:
         return None
-    bank: Array = Drive.of(recording, vehicle, replay=True).signals[:, 6] / GRAVITY
+    if recording.logged_v_y is None:
+        told = model.told_v_y(recording.as_logged())
+        return None if told is None else told.beside
+    bank: Array = Drive.of(recording, model.vehicle, replay=True).signals[:, 6] / GRAVITY
     return bank
 
 

@@ -32,7 +32,7 @@ JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share
 ALL = slice(None)
 OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
 MISSING = {
-    "v_y": "so slip angles are not known; tireid identify --method inertial estimates it",
+    "v_y": "so slip angles are not known; tireid identify estimates it from ay",
     "a_y": "which is needed where vy is not measured",
 }
 

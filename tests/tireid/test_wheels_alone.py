@@ -139,7 +139,7 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     captured = capsys.readouterr()
     assert "there is no column 'Ground Speed [km/h]': vx is made of the wheels" in captured.err
     assert "vx is made of wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
-    assert "a log has no lateral velocity: inertial learns" in captured.err
+    assert "a log has no lateral velocity: fit learns" in captured.err
     assert json.loads((out / "summary.json").read_text())
 
 

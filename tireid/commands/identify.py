@@ -265,10 +265,11 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
     reach = f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)"
+    told = side_slip_text(learnt)
+    reach = f"{told}\n{reach}" if told else reach
     if not learnt.online:
         return reach
-    told = side_slip_text(learnt)
-    return (f"{told}\n" if told else "") + (
+    return (
         f"{reach}\ncertificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets "
         "and covariance stay in their boxes by construction (summary.json lists them)"
     )

@@ -205,7 +205,7 @@ def chosen_method(
             raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
         design = read_design(options.design)
         return Chosen(design.law, design)
-    usual = WITHOUT_V_Y if without_v_y else LIVE if online else DEFAULT
+    usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
     name = options.method or (REFERENCE if options.paper else usual)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")

@@ -1,0 +1,634 @@
+"""The estimate where no sensor shows v_y well: full information, v_y a state at every node.
+
+Minimized over the states z_k of all nodes and the parameters p (`motion.nodes`):
+Σ |moves(z_k, z_k+1, p)|²/Q + Σ ρ(|y_k - shows(z_k, p)|²/R) + Σ |begins(z, p)|²/P + prior(p),
+ρ Huber's. Gauss-Newton: its matrix [A B; Bᵀ C], A of the states banded, C of the parameters, is
+solved by banded Cholesky and Schur's complement S = C - Bᵀ A⁻¹ B.
+A late a_y looks like a soft rear axle, and so does another yaw inertia: both are believed firmly.
+R is learnt from what is left of r and a_y, as a density at low frequency. Covariances grow with
+what is left of all of it, which is more on a real car than on a simulated one.
+"""
+
+from collections.abc import Iterator
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from codegen import Scan
+from codegen.arrays import Array
+from identifier.estimate.nodes import JERKS, Nodes, low_passed
+from identifier.estimate.posterior import Posterior
+from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
+from identifier.motion.nodes import LATENT_NAMES, MEASURED, STATES, node_scan
+from identifier.motion.parameters import INDEX, NAMES
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+N, P = len(STATES), len(NAMES)
+OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
+FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.0007, "a_y_lever": 0.01}  # sd; lever in L
+ROLL = 0.06  # by which a_y is larger in a car whose body rolls
+GYRO, INERTIA = 0.002, 0.007  # sd of the bias of r of a sedan [rad/s], and of ln I_z
+AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
+BLOCK, BESIDE = 600.0, 5.0  # [s] that are smoothed at once, and what is so beside them
+ASKED = 60.0  # [s] that are asked for a late a_y
+DELAYS, GAINED = 0.04, 8.0  # [s] between delays that are tried, of a sedan; nats that one gains,
+# more where more is left (`Trust.usual`)
+STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
+FIRM, FEW = 50.0, 8  # times that beliefs count at first, and iterations of all but the last
+MOST_SLIP, MOST_LAGGED = 0.7, 0.8  # |v_y/v_x|, and lagged slip [rad]
+LOOKED = 0.25  # [s] over which what is left of a sensor is alike
+SHORTEST = 50  # nodes from which noise is learnt
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trust:
+    """How far curves, road and sensors are trusted; times and sensors as of a sedan.
+
+    Parameters
+    ----------
+    error, relative : what curves miss of a force [static axle loads], [-].
+    error_time : for which it stays alike [s].
+    bank, bank_time : sine of the bank of a road [-], and for which it lasts [s].
+    push, turn : what no tire pushes: v_y [sqrt(g L)/sqrt(s)], r [(g/L)^(3/4)].
+    lag : of lagged slip, from node to node [rad].
+    side_slip : at the first node [rad].
+    r, a_y, v_y : what no noise explains of sensors [rad/s], [m/s²], [m/s].
+    a_y_share : the same of a_y over it [-].
+    r_noise, a_y_noise, v_y_noise : noise before it is learnt, in the same units.
+    clip : standard deviations from which a residual counts less.
+    parted : side slip by which two starts may part [rad].
+    observable : largest standard deviation of side slip that is observed [rad].
+    usual : mean of the squared residuals of a node, over their weights, from which covariances are
+        those of the likelihood [-]; where more is left, they grow likewise.
+    """
+
+    error: float = 0.01
+    relative: float = 0.08
+    error_time: float = 0.06
+    bank: float = 0.04
+    bank_time: float = 3.0
+    push: float = 0.005
+    turn: float = 0.02
+    lag: float = 2e-4
+    side_slip: float = 0.1
+    r: float = 0.003
+    a_y: float = 0.2
+    v_y: float = 0.01
+    a_y_share: float = 0.04
+    r_noise: float = 0.003
+    a_y_noise: float = 0.2
+    v_y_noise: float = 0.05
+    clip: float = 3.0
+    parted: float = 0.0035
+    observable: float = 0.01
+    usual: float = 0.25
+
+
+TRUST = Trust()
+
+
+class Told(NamedTuple):
+    """v_y at each sample and its standard deviation [m/s], whether it is known, and what the
+    accelerometer shows beside forces of tires [weights], (n,).
+    """
+
+    v_y: Array
+    sd: Array
+    observable: NDArray[np.bool_]
+    beside: Array
+
+
+class Around(NamedTuple):
+    """Gauss-Newton's matrix and gradient: of states, of neighbors, border, of parameters."""
+
+    A: Array
+    O: Array  # noqa: E741
+    B: Array
+    C: Array
+    g: Array
+    g_p: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Smoothed:
+    """States (n, 8) and all parameters (p + 4,) at an optimum, its cost J [nats], R (3,), and
+    covariances: of the states alone (n, 8, 8), of the parameters that move (m, m); dz/dp of v_y
+    (n, m).
+    """
+
+    z: Array
+    p: Array
+    cost: float
+    R: Array
+    own: Array
+    P: Array
+    slopes: Array
+    iterations: int
+
+
+def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Priors:
+    """Return beliefs with those of the accelerometer behind, and of yaw rate and inertia.
+
+    Parameters
+    ----------
+    beliefs : of the car, of one of these, or of a log that came before.
+    v_y : whether a sensor shows v_y, whose errors are looked for.
+    """
+    scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
+    information, moves = beliefs.information.copy(), beliefs.moves.copy()
+    fixed = [INDEX[name] for name in ("ln_sway", *(() if v_y else OF_V_Y))]
+    information[fixed], information[:, fixed], moves[fixed] = 0.0, 0.0, False
+    for name, sd in (("r_bias", GYRO / scale), ("ln_inertia", INERTIA)):
+        k = INDEX[name]
+        if not moves[k]:
+            information[k, k], moves[k] = sd**-2, True
+    felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
+    whole = np.zeros((P + len(felt),) * 2)
+    whole[:P, :P] = information
+    whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
+    far = np.full(len(felt), np.inf)
+    return replace(
+        beliefs,
+        mean=np.concatenate([beliefs.mean, [0.0, ROLL, 0.0, 0.0]]),
+        low=np.concatenate([beliefs.low, -far]),
+        high=np.concatenate([beliefs.high, far]),
+        information=whole,
+        moves=np.concatenate([moves, far > 0.0]),
+    )
+
+
+class Latent:
+    """The problem of a drive: its cost, and how it is minimized.
+
+    Parameters
+    ----------
+    priors : of `latent_priors`; what is to be held does not move.
+    columns : which parameters slopes are taken over, (m,): those that move, and others whose doubt
+        is to be told.
+    """
+
+    def __init__(
+        self,
+        nodes: Nodes,
+        vehicle: Vehicle,
+        priors: Priors,
+        columns: NDArray[np.intp] | None = None,
+        trust: Trust = TRUST,
+    ) -> None:
+        self.nodes, self.vehicle, self.trust = nodes, vehicle, trust
+        self.index = np.flatnonzero(priors.moves) if columns is None else columns
+        self.free = np.flatnonzero(priors.moves[self.index])
+        self.priors = priors
+        self._slopes = node_scan(tuple(LATENT_NAMES[k] for k in self.index))
+        self._plain = node_scan()
+        self._car = car_numbers(vehicle)
+        s, L = float(np.sqrt(vehicle.wheelbase / SEDAN)), vehicle.wheelbase
+        self.scale = s
+        self._times = np.array([trust.error_time * s, trust.bank_time * s])
+        per = np.array([1.0 / s, 1.0, s])
+        self._floor = per * (trust.r, trust.a_y, trust.v_y)
+        self.R = (per * (trust.r_noise, trust.a_y_noise, trust.v_y_noise)) ** 2
+        dt, (T_e, T_p) = nodes.dt, self._times
+        self._kept = np.exp(-dt / T_e)
+        self._sd = np.array(
+            [
+                trust.push * vehicle.froude_speed * np.sqrt(dt / s),
+                trust.turn * (GRAVITY / L) ** 0.75 * np.sqrt(dt),
+                *(trust.lag, trust.lag, 1.0, 1.0, 1e-4),
+                2.0 * trust.bank * np.sqrt(dt / T_p**3),
+            ]
+        )
+
+    # The model over the nodes.
+
+    def _run(self, scan: Scan, z: Array, p: Array, more: dict[str, Array]) -> dict[str, Array]:
+        given = self.nodes.given
+        with np.errstate(all="ignore"):
+            return scan(
+                len(z),
+                {
+                    **{"z": z, "z_next": _next(z), "given": given, "given_next": _next(given)},
+                    **{"parameters": p[:P], "accelerometer": p[P:], "car": self._car},
+                    **{"times": self._times, "dt": np.array(self.nodes.dt), **more},
+                },
+            )
+
+    def weights(self, z: Array, p: Array, R: Array) -> dict[str, Array]:
+        """Return the weights of what is missed, by port of `node_scan`."""
+        nodes, t = self.nodes, self.trust
+        out = self._run(self._plain, z, p, {})
+        phi = np.abs(out["force"])
+        sd = np.tile(self._sd, (len(z), 1))
+        between = (phi + _next(phi)) / 2
+        sd[:, 4:6] = (t.error + t.relative * between) * np.sqrt(1.0 - self._kept**2)
+        variance = np.tile(R + self._floor**2, (len(z), 1))
+        variance[:, 1] += (t.a_y_share * nodes.given[:, 5]) ** 2
+        off = np.abs(nodes.measured - out["shows"]) / np.sqrt(variance)
+        counts = nodes.counts[:, None] & np.isfinite(nodes.measured)
+        first = np.column_stack(
+            [
+                t.side_slip * nodes.given[:, 0],
+                np.full(len(z), np.inf),
+                np.full((len(z), 2), 0.01),
+                t.error + t.relative * phi,
+                np.full(len(z), t.bank),
+                np.full(len(z), t.bank / self._times[1]),
+            ]
+        )
+        return {
+            "of_moves": np.where(nodes.goes[:, None], sd**-2, 0.0),
+            "of_shows": np.where(counts, np.minimum(1.0, t.clip / np.maximum(off, 1e-9)), 0.0)
+            / variance,
+            "of_begins": np.where(nodes.begins[:, None], first**-2, 0.0),
+        }
+
+    def cost(self, z: Array, p: Array, weights: dict[str, Array]) -> float:
+        """Return J with weights that are held [nats]."""
+        total = self.misfit(z, p, weights) + beliefs_cost(self.priors, p)
+        return float(np.nan_to_num(total, nan=np.inf))
+
+    def misfit(self, z: Array, p: Array, weights: dict[str, Array]) -> float:
+        """Return J without what is believed [nats]."""
+        out = self._run(self._plain, z, p, {})
+        out["shows"] = np.nan_to_num(out["shows"] - self.nodes.measured)
+        parts = (("moves", "of_moves"), ("shows", "of_shows"), ("begins", "of_begins"))
+        return 0.5 * sum(float(np.sum(weights[w] * out[name] ** 2)) for name, w in parts)
+
+    def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[Around, Array]:
+        """Return matrix and gradient at a point, and the slopes of what sensors show (n, 3, 8)."""
+        m = len(self.index)
+        measured = np.nan_to_num(self.nodes.measured)
+        more = {"measured": measured, **weights, "sums": np.zeros((m, m)), "slopes": np.zeros(m)}
+        out = self._run(self._slopes, z, p, more)
+        A, B, g = out["now"], out["border"], out["slope"]
+        A[1:] += out["next"][:-1]
+        B[1:] += out["border_next"][:-1]
+        g[1:] += out["slope_next"][:-1]
+        A[~self.nodes.counts] = np.eye(N)
+        gradient, curvature = around_beliefs(self.priors, p)
+        C = out["sums_final"] + curvature[np.ix_(self.index, self.index)]
+        g_p = out["slopes_final"].ravel() + gradient[self.index]
+        return Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
+
+    def _eliminated(self, at: Around, damping: float) -> tuple[Array, Array]:
+        """Return A⁻¹ g (8n,) and A⁻¹ B (8n, m)."""
+        n = len(at.A)
+        banded = np.zeros((2 * N, n * N))
+        for i in range(N):
+            for j in range(N):
+                if i >= j:
+                    banded[i - j, j::N] = at.A[:, i, j] * (1.0 + damping * (i == j))
+                banded[N + i - j, j : (n - 1) * N : N] = at.O[:, i, j]
+        factor = cholesky_banded(banded, lower=True, check_finite=False, overwrite_ab=True)
+        right = np.hstack([at.g.reshape(-1, 1), at.B.reshape(n * N, -1)])
+        X = cho_solve_banded((factor, True), right, overwrite_b=True, check_finite=False)
+        return X[:, 0], X[:, 1:]
+
+    def _step(self, at: Around, p: Array, damping: float) -> tuple[Array, Array]:
+        """Return the steps of states (n, 8) and of parameters that move."""
+        x, X = self._eliminated(at, damping)
+        free, index = self.free, self.index[self.free]
+        B = at.B.reshape(len(X), -1)[:, free]
+        S = at.C[np.ix_(free, free)] - B.T @ X[:, free]
+        S += damping * np.diag(np.diag(at.C)[free])
+        low, high = self.priors.low[index], self.priors.high[index]
+        dp = bounded_step((S + S.T) / 2, at.g_p[free] - B.T @ x, p[index], low, high)
+        return -(x + X[:, free] @ dp).reshape(-1, N), dp
+
+    # The optimum.
+
+    def begin(self, stiffer: float = 0.0) -> tuple[Array, Array]:
+        """Return states whose rear axle does not slip, and the parameters that are believed.
+
+        Parameters
+        ----------
+        stiffer : by which ln C of both axles is larger.
+        """
+        v_x, delta = self.nodes.given[:, 0], self.nodes.given[:, 1]
+        r = low_passed(self.nodes.measured[:, 0], 3.0 / self.scale, self.nodes.dt)
+        l_f, l_r = self.vehicle.bicycle.l_f, self.vehicle.bicycle.l_r
+        z, p = np.zeros((len(v_x), N)), self.priors.mean.copy()
+        z[:, 0], z[:, 1] = l_r * r, r
+        z[:, 2] = np.clip(delta - np.arctan((l_f + l_r) * r / v_x), -0.2, 0.2)
+        z[~self.nodes.counts, 2:] = 0.0
+        for axle in "fr":
+            k = INDEX[f"ln_stiffness_{axle}"]
+            p[k] += stiffer if self.priors.moves[k] else 0.0
+        return z, p
+
+    def settled(self, stiffer: float = 0.0) -> tuple[Array, Array]:
+        """Return states and parameters near an optimum, where parameters do not run away."""
+        firm = copy(self)
+        firm.priors = replace(self.priors, information=FIRM * self.priors.information)
+        z, p, _, _ = firm.descend(*self.begin(stiffer), self.R, FEW)
+        return z, p
+
+    def descend(
+        self, z: Array, p: Array, R: Array, most: int = 25
+    ) -> tuple[Array, Array, float, int]:
+        """Return states, parameters, cost and the number of iterations at an optimum."""
+        damping, v_x, total, cost = 1e-4, self.nodes.given[:, 0], 0, np.inf
+        index = self.index[self.free]
+        sd = np.diag(self.priors.information)[index] ** -0.5
+        low, high = self.priors.low[index], self.priors.high[index]
+        for total in range(1, most + 1):  # noqa: B007
+            weights = self.weights(z, p, R)
+            cost = self.cost(z, p, weights)
+            at, _ = self.around(z, p, weights)
+            better = None
+            for _ in range(8):
+                try:
+                    dz, dp = self._step(at, p, damping)
+                except np.linalg.LinAlgError:
+                    damping = max(8.0 * damping, 1e-6)
+                    continue
+                z_then, p_then = z + dz, p.copy()
+                z_then[:, 0] = np.clip(z_then[:, 0], -MOST_SLIP * v_x, MOST_SLIP * v_x)
+                z_then[:, 2:4] = np.clip(z_then[:, 2:4], -MOST_LAGGED, MOST_LAGGED)
+                p_then[index] = np.clip(p[index] + dp, low, high)
+                reached = self.cost(z_then, p_then, weights)
+                if reached < cost:
+                    better = z_then, p_then, reached
+                    break
+                damping = max(8.0 * damping, 1e-6)
+            if better is None:
+                break
+            moved = float(np.abs((better[0] - z)[:, 0] / v_x).max())
+            turned = float(np.abs((better[1] - p)[index] / sd).max(initial=0.0))
+            gained = cost - better[2]
+            z, p, cost = better
+            damping = max(damping / 6.0, 1e-9)
+            if (moved < 3e-4 and turned < 0.05) or gained < 0.02:
+                break
+        return z, p, cost, total
+
+    def spread(self, z: Array, p: Array, R: Array) -> tuple[Array, Array, Array, Array]:
+        """Return covariance of states alone (n, 8, 8), of parameters that move, dz/dp of v_y
+        (n, m), and the slopes of what sensors show.
+        """
+        at, shows = self.around(z, p, self.weights(z, p, R))
+        _, X = self._eliminated(at, 0.0)
+        S = at.C - at.B.reshape(len(X), -1).T @ X
+        slopes, free = -X.reshape(len(z), N, -1)[:, 0], self.free
+        held = np.setdiff1d(np.arange(len(self.index)), free)
+        inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
+        if held.size:  # what moves makes up for a part of what is held
+            slopes[:, held] -= slopes[:, free] @ inverse @ S[np.ix_(free, held)]
+        n = len(z)
+        M = at.A.copy()
+        for k in range(n - 1):
+            M[k + 1] -= at.O[k] @ np.linalg.solve(M[k], at.O[k].T)
+        inv = np.linalg.inv(M)
+        own = np.empty_like(inv)
+        own[-1] = V = inv[-1]
+        for k in range(n - 2, -1, -1):
+            K = inv[k] @ at.O[k].T
+            own[k] = V = inv[k] + K @ V @ K.T
+        return own, inverse, slopes, shows
+
+    def noise(self, z: Array, p: Array, own: Array, shows: Array, R: Array) -> Array:
+        """Return R (3,) by what is left of each sensor: its density at low frequency."""
+        missed = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
+        doubt = np.einsum("nij,njk,nik->ni", shows, own, shows)
+        found = R.copy()
+        lags = max(2, int(LOOKED * self.scale / self.nodes.dt))
+        for i in range(len(MEASURED)):
+            on = self.nodes.counts & np.isfinite(missed[:, i])
+            e = missed[on, i]
+            if e.size < SHORTEST:
+                continue
+            most = 4.0 * float(np.median(np.abs(e))) / 0.6745
+            e = np.clip(e, -most, most)
+            power = max(float(np.mean(e**2)), 1e-18)
+            alike = [
+                2.0 * (1.0 - k / (lags + 1)) * float(np.mean(e[k:] * e[:-k])) / power
+                for k in range(1, lags + 1)
+            ]
+            density = (power + float(np.mean(doubt[on, i]))) * max(1.0, 1.0 + sum(alike))
+            known = self._floor[i] ** 2
+            if i == 1:
+                known += float(np.mean((self.trust.a_y_share * self.nodes.given[on, 5]) ** 2))
+            found[i] = max(density - known, 1e-10)
+        return found
+
+    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> Smoothed:
+        """Return the optimum from a start, its noise learnt in some rounds.
+
+        Parameters
+        ----------
+        R : to begin with (3,); None takes that of good sensors.
+        """
+        R, total = self.R if R is None else R, 0
+        for _ in range(rounds):
+            z, p, _, count = self.descend(z, p, R, FEW)
+            own, _, _, shows = self.spread(z, p, R)
+            R, total = self.noise(z, p, own, shows, R), total + count
+        z, p, cost, count = self.descend(z, p, R)
+        own, P, slopes, _ = self.spread(z, p, R)
+        left = 2.0 * self.misfit(z, p, self.weights(z, p, R)) / max(self.nodes.counts.sum(), 1)
+        wider = max(1.0, left / self.trust.usual)
+        return Smoothed(z, p, cost, R, wider * own, wider * P, slopes, total + count)
+
+
+class Learnt(NamedTuple):
+    """What a drive without a good v_y taught: the posterior, where it is, and its states.
+
+    parted : side slip by which the starts parted, rms [rad].
+    """
+
+    posterior: Posterior
+    nodes: Nodes
+    z: Array
+    parted: float
+
+
+def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool = False) -> Learnt:
+    """Return what the nodes of a drive teach.
+
+    It begins with soft and with stiff tires. Where they end elsewhere, the covariance has the
+    distance between both, by how probable they are.
+
+    Parameters
+    ----------
+    beliefs : of the car, or what other drives of it left.
+    v_y : whether the nodes have a measured v_y.
+    """
+    problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, v_y))
+    first = problem.smoothed(*problem.settled(STARTS[0]))
+    z, p, cost, _ = problem.descend(*problem.settled(STARTS[1]), first.R)
+    best, other = first, (z, p, cost)
+    if cost < first.cost:
+        best, other = problem.smoothed(z, p, first.R, 0), (first.z, first.p, first.cost)
+    on, v_x = nodes.counts, nodes.given[:, 0]
+    apart = ((best.z - other[0])[:, 0] / v_x)[on]
+    parted = float(np.sqrt(np.mean(apart**2))) if on.any() else 0.0
+    share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
+    index = problem.index[problem.index < P]
+    moved = problem.index < P
+    away = (other[1] - best.p)[index]
+    covariance = _believed(beliefs)
+    covariance[np.ix_(index, index)] = best.P[np.ix_(moved, moved)] + share * (
+        1.0 - share
+    ) * np.outer(away, away)
+    return Learnt(
+        Posterior(
+            vehicle=vehicle,
+            p=best.p[:P],
+            covariance=covariance,
+            slope=np.zeros(P),
+            curvature=np.zeros((P, P)),
+            seconds=float(np.count_nonzero(nodes.counts)) * nodes.dt,
+            roads=np.zeros(0),
+            road_sd=np.zeros(0),
+            scale=np.ones(2),
+            memory=np.full(2, TRUST.error_time),
+            cost=best.cost,
+            iterations=best.iterations,
+        ),
+        nodes,
+        best.z,
+        parted,
+    )
+
+
+def lateness(
+    recording: Recording, vehicle: Vehicle, priors: Priors, columns: NDArray[np.intp] | None = None
+) -> float:
+    """Return by how much a_y is later than the yaw rate [s], where that is no small matter.
+
+    It is the delay with which the minute of hardest cornering is explained best, by whole samples,
+    since interpolation averages noise, and refined by a parabola. 0 where none gains enough.
+
+    Parameters
+    ----------
+    priors, columns : as of `Latent`.
+    """
+    n = min(round(ASKED / recording.dt), len(recording))
+    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
+    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
+    scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
+    smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
+    piece, part = replace(recording, a_y=smooth), slice(first, first + n)
+    found: dict[int, float] = {}
+    count = 1
+
+    def cost(samples: int) -> float:
+        nonlocal count
+        if samples not in found:
+            nodes = Nodes.of(piece, vehicle, part, a_y_late=samples * dt)
+            problem, count = Latent(nodes, vehicle, priors, columns), max(nodes.counts.sum(), 1)
+            _, _, found[samples], _ = problem.descend(*problem.settled(), problem.R, FEW)
+        return found[samples]
+
+    h = max(round(DELAYS * scale / dt), 1)
+    while True:  # a coarse grid, and one between
+        near = min(found, key=cost) if found else 0
+        for k in range(-1, 5) if not found else (-1, 1):
+            cost(near + k * h)
+        near = min(found, key=cost)
+        if h == 1 or len(found) > 6:
+            break
+        h = max(h // 2, 1)
+    if cost(0) - cost(near) < GAINED * max(1.0, 2.0 * cost(near) / count / TRUST.usual):
+        return 0.0
+    before, at, after = (cost(near + k * h) for k in (-1, 0, 1))
+    bend = before - 2.0 * at + after
+    off = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return dt * (near + h * float(np.clip(off, -0.5, 0.5)))
+
+
+def _believed(beliefs: Priors) -> Array:
+    """Return the covariance of what is believed, (p, p): of what a log does not tell."""
+    covariance = np.zeros_like(beliefs.information)
+    some = np.ix_(beliefs.moves, beliefs.moves)
+    covariance[some] = np.linalg.inv(beliefs.information[some])
+    return covariance
+
+
+def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) -> Told:
+    """Return the v_y of a drive on tires that are known, and how well.
+
+    Parameters
+    ----------
+    p, covariance : of the tires, as `motion.parameters` lists them (p,), (p, p).
+    """
+    believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=p))
+    columns = np.flatnonzero(believed.moves)
+    again = np.array([LATENT_NAMES.index(name) for name in AGAIN])
+    moves = np.zeros_like(believed.moves)
+    moves[again] = True
+    information = np.zeros_like(believed.information)
+    information[again, again] = believed.information[again, again]
+    held = replace(believed, moves=moves, information=information)
+    told = Told(
+        vehicle.bicycle.l_r * recording.r,
+        TRUST.side_slip * np.maximum(recording.v_x, vehicle.lowest_speed),
+        np.zeros(len(recording), dtype=bool),
+        np.zeros(len(recording)),
+    )
+    late = lateness(recording, vehicle, held, columns)
+    for outer, inner in _blocks(recording):
+        nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
+        if not nodes.counts.any():
+            continue
+        problem = Latent(nodes, vehicle, held, columns)
+        found = problem.smoothed(*problem.begin(), rounds=1)
+        known = np.flatnonzero(~moves[columns])
+        tires, free = found.slopes[:, known], found.slopes[:, problem.free]
+        index = columns[known]
+        doubt = covariance[np.ix_(index, index)]
+        variance = found.own[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
+        variance += np.einsum("ni,ij,nj->n", free, found.P, free)
+        bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
+        beside = bias + roll / GRAVITY * nodes.given[:, 5]
+        _fill(told, recording, inner, nodes, found.z[:, 0], np.sqrt(variance), beside)
+    for values in told:
+        values.setflags(write=False)
+    return told
+
+
+def _blocks(recording: Recording) -> Iterator[tuple[slice, slice]]:
+    """Yield parts of at most `BLOCK`, with what is beside them, and alone."""
+    n = max(round(BLOCK / recording.dt), 1)
+    beside = round(BESIDE / recording.dt)
+    for begin in range(0, len(recording), n):
+        end = min(begin + n, len(recording))
+        yield slice(max(begin - beside, 0), min(end + beside, len(recording))), slice(begin, end)
+
+
+def _fill(
+    told: Told,
+    recording: Recording,
+    inner: slice,
+    nodes: Nodes,
+    v_y: Array,
+    sd: Array,
+    beside: Array,
+) -> None:
+    """Put v_y between nodes into its samples, run by run of nodes."""
+    firsts = np.flatnonzero(nodes.begins)
+    lasts = np.flatnonzero(nodes.counts & ~nodes.goes)
+    half = 0.5 * nodes.dt
+    for first, last in zip(firsts, lasts, strict=True):
+        if last - first < 3:
+            continue
+        run = slice(first, last + 1)
+        t = nodes.t[run]
+        a, b = np.searchsorted(recording.t, [t[0] - half, t[-1] + half])
+        some = slice(max(int(a), inner.start), min(int(b), inner.stop))
+        at = np.clip(recording.t[some], t[0], t[-1])
+        told.v_y[some] = CubicSpline(t, v_y[run])(at)
+        told.sd[some] = np.interp(at, t, sd[run])
+        told.beside[some] = np.interp(at, t, beside[run])
+        told.observable[some] = told.sd[some] < TRUST.observable * recording.v_x[some]
+
+
+def _next(values: Array) -> Array:
+    return np.concatenate([values[1:], values[-1:]])

@@ -1,0 +1,176 @@
+"""A drive as the latent estimate reads it: nodes of 25 to 50 Hz, means of the samples around.
+
+Nothing is smoothed beyond that but what enters as a small correction: roll, sway and the rate of
+a_y.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
+
+from codegen.arrays import Array
+from identifier.estimate.drive import (
+    ALONG,
+    LONGITUDINAL,
+    MOST_A_X,
+    SLOW,
+    SMOOTHED,
+    box,
+    gradient,
+    slope_on,
+)
+from identifier.estimate.priors import SEDAN
+from identifier.motion.model import DAMPING
+from models.recordings import Recording
+from models.recordings.record import ALL
+from models.vehicle import Vehicle
+
+BETWEEN, LEAST = 0.06, 0.02  # sqrt(L/g) from a node to the next, and [s] that it is at least
+ROLLS, JERKS = 5.0, 3.0  # Hz of a sedan, below which a_y rolls the body and is differentiated
+FEWEST = 3  # nodes of a stretch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Nodes:
+    """Signals at n nodes.
+
+    Parameters
+    ----------
+    t : time in the recording's own clock [s], (n,).
+    dt : from a node to the next [s].
+    given : columns as `motion.nodes.GIVEN`, (n, 8).
+    measured : r [rad/s], a_y [m/s²] and v_y [m/s], nan where there is none, (n, 3).
+    counts : where the car drives fast enough, (n,).
+    goes : whether the motion goes on to the next node, (n,).
+    """
+
+    t: Array
+    dt: float
+    given: Array
+    measured: Array
+    counts: NDArray[np.bool_]
+    goes: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        recording: Recording,
+        vehicle: Vehicle,
+        part: slice = ALL,
+        v_y: Array | None = None,
+        a_y_late: float = 0.0,
+    ) -> "Nodes":
+        """Return the nodes of a recording.
+
+        Parameters
+        ----------
+        v_y : as it was measured, on time; nan where it was not [m/s], (n,).
+        a_y_late : by which a_y is late [s].
+
+        Raises
+        ------
+        RecordingError
+            Where there is no a_y.
+        """
+        between = max(BETWEEN * vehicle.froude_time, LEAST)
+        every = max(1, round(between / recording.dt))
+        begin, end, _ = part.indices(len(recording))
+        a_y = recording.needed("a_y")
+        nothing = np.full(len(recording), np.nan)
+        pieces = []
+        for one in recording.stretches:
+            first, last = max(one.start, begin), min(one.stop, end)
+            count = (last - first) // every
+            if count >= FEWEST:
+                some = slice(first, first + count * every)
+                felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
+                told = (nothing if v_y is None else v_y)[some]
+                pieces.append(_piece(recording, some, vehicle, every, felt, told))
+        if not pieces:
+            raise ValueError(f"{recording.name}: too short to learn from without v_y")
+        t, given, measured, counts, goes = (
+            np.concatenate(parts) for parts in zip(*pieces, strict=True)
+        )
+        return cls(
+            t=t, dt=recording.dt * every, given=given, measured=measured, counts=counts, goes=goes
+        )
+
+    @property
+    def begins(self) -> NDArray[np.bool_]:
+        """At which nodes nothing is known of the one before, (n,)."""
+        first: NDArray[np.bool_] = self.counts & ~np.concatenate([[False], self.goes[:-1]])
+        return first
+
+
+def _earlier(signal: Array, samples: float) -> Array:
+    if samples == 0.0:
+        return signal
+    at = np.arange(len(signal))
+    moved: Array = np.interp(at + samples, at, signal)
+    return moved
+
+
+def _piece(
+    recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array, v_y: Array
+) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return t, given, measured, counts and goes of a stretch."""
+    dt, scale = recording.dt, float(np.sqrt(vehicle.wheelbase / SEDAN))
+    slowest = SLOW * vehicle.froude_speed
+
+    def mean(signal: Array) -> Array:
+        found: Array = signal.reshape(-1, every).mean(axis=1)
+        return found
+
+    v_x, r = recording.v_x[some], recording.r[some]
+    on, n3 = v_x > slowest, LONGITUDINAL / dt
+    a_x = box(gradient(box(np.maximum(v_x, slowest), n3 / 2), dt), n3)
+    turning = 1.0  # a_x = v_x' - v_y r
+    if recording.a_x is not None:
+        felt = box(recording.a_x[some], round(SMOOTHED * scale / dt) | 1)
+        motion = gradient(box(v_x, n3 / 3), dt) - vehicle.l_r * r**2
+        if slope_on(motion, felt, on, dt, ALONG) is not None:
+            a_x, turning = felt, 0.0
+    a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
+    omega = min(5.0 / vehicle.froude_time, 60.0)
+    rho, rate = _rolled(low_passed(a_y, ROLLS / scale, dt), omega, dt)
+    jerk = gradient(low_passed(a_y, JERKS / scale, dt), dt)
+    speed = mean(v_x)
+    signals = (recording.delta_f[some], recording.delta_r[some], a_x)
+    given = np.column_stack(
+        [
+            np.maximum(speed, slowest),
+            *(mean(one) for one in signals),
+            np.full(speed.size, turning),
+            *(mean(one) for one in (rho, rate, jerk)),
+        ]
+    )
+    fresh = np.isfinite(v_y).reshape(-1, every)
+    total = np.where(fresh, v_y.reshape(-1, every), 0.0).sum(axis=1)
+    count = fresh.sum(axis=1)
+    told = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    counts: NDArray[np.bool_] = np.asarray(on.reshape(-1, every).all(axis=1))
+    goes = np.append(counts[:-1] & counts[1:], False)
+    return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y), told]), counts, goes
+
+
+def low_passed(signal: Array, hertz: float, dt: float) -> Array:
+    """Return a signal through a zero-phase low pass of second order, (n,)."""
+    share = 2.0 * dt * hertz  # of the highest frequency that samples show
+    if share >= 0.9 or len(signal) < 20:
+        return np.array(signal, dtype=np.float64)
+    found: Array = filtfilt(*butter(2, share), signal)
+    return found
+
+
+def _rolled(a: Array, omega: float, dt: float) -> tuple[Array, Array]:
+    """Return ρ and ρ' of a body that sways under lateral accelerations, (n,), implicit in ρ'."""
+    rho, rate, stiff = float(a[0]), 0.0, dt * omega**2
+    eased = 1.0 + 2.0 * DAMPING * omega * dt + dt * stiff
+    found = np.empty((len(a), 2))
+    for k, one in enumerate(a.tolist()):
+        rate = (rate + stiff * (one - rho)) / eased
+        rho += dt * rate
+        found[k] = rho, rate
+    return found[:, 0], found[:, 1]

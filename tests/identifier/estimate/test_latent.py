@@ -1,0 +1,191 @@
+"""The estimate without v_y, by other roads: finite differences, dense algebra, planted truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter
+
+import tireid as ti
+from identifier.estimate.fit import fit
+from identifier.estimate.latent import (
+    TRUST,
+    Latent,
+    lateness,
+    latent_priors,
+)
+from identifier.estimate.model import FittedModel
+from identifier.estimate.nodes import Nodes
+from identifier.estimate.priors import Priors
+from identifier.motion.nodes import LATENT_NAMES
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.recordings import RecordingError
+from models.recordings.record import joined
+
+CAR = ti.sedan()
+
+
+def driven(seed, duration=20.0):
+    maneuver = RandomSteer(
+        amplitude=np.radians(4.0),
+        frequency=0.5,
+        seed=seed,
+        onset=1.0,
+        rate_limit=1.0,
+        duration=duration - 0.01,
+    )
+    return Plant(CAR).simulate(maneuver, speed=20.0, name=f"drive{seed}").recording()
+
+
+def blind(exact, seed=1):
+    rng, n = np.random.default_rng(seed), len(exact)
+    return replace(
+        exact,
+        v_y=None,
+        r=exact.r + 0.002 * rng.normal(size=n),
+        a_y=exact.a_y + 0.05 + 0.1 * rng.normal(size=n),
+        axle_force=None,
+    )
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return driven(3)
+
+
+@pytest.fixture(scope="module")
+def problem(exact):
+    nodes = Nodes.of(blind(exact).between(0.0, 3.0), CAR)
+    return Latent(nodes, CAR, latent_priors(CAR, Priors.of(CAR)))
+
+
+@pytest.fixture(scope="module")
+def place(problem):
+    """States and parameters beside the optimum, and weights there."""
+    rng = np.random.default_rng(2)
+    z, p = problem.begin()
+    z = z + np.array([0.05, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 0.005]) * rng.normal(size=z.shape)
+    p[problem.index] += 0.1 * rng.normal(size=problem.index.size) * 0.05
+    return z, p, problem.weights(z, p, problem.R)
+
+
+def test_the_gradient_is_that_of_the_cost(problem, place):
+    z, p, weights = place
+    at, _ = problem.around(z, p, weights)
+    rng = np.random.default_rng(5)
+    for _ in range(4):
+        dz, dp = 1e-6 * rng.normal(size=z.shape), np.zeros_like(p)
+        dp[problem.index] = 1e-7 * rng.normal(size=problem.index.size)
+        ahead = problem.cost(z + dz, p + dp, weights)
+        behind = problem.cost(z - dz, p - dp, weights)
+        told = 2.0 * (np.sum(at.g * dz) + at.g_p @ dp[problem.index])
+        assert ahead - behind == pytest.approx(told, rel=1e-3, abs=1e-6)
+
+
+def test_the_step_is_that_of_the_dense_matrix(problem, place):
+    z, p, weights = place
+    at, _ = problem.around(z, p, weights)
+    n, m = z.size, problem.index.size
+    H = np.zeros((n + m, n + m))
+    for k in range(len(z)):
+        here = slice(8 * k, 8 * k + 8)
+        H[here, here] = at.A[k]
+        if k + 1 < len(z):
+            H[8 * k + 8 : 8 * k + 16, here] = at.O[k]
+            H[here, 8 * k + 8 : 8 * k + 16] = at.O[k].T
+    H[:n, n:] = at.B.reshape(n, m)
+    H[n:, :n] = H[:n, n:].T
+    H[n:, n:] = at.C
+    scale = np.sqrt(np.diag(H))
+    g = np.concatenate([at.g.ravel(), at.g_p])
+    step = -np.linalg.solve(H / np.outer(scale, scale), g / scale) / scale
+    dz, dp = problem._step(at, p, 0.0)
+    bounded = (p + np.bincount(problem.index, step[n:], p.size) < problem.priors.low).any()
+    if not bounded:
+        np.testing.assert_allclose(dp, step[n:], rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(dz.ravel(), step[:n], rtol=1e-3, atol=1e-6)
+    own, P, slopes, _ = problem.spread(z, p, problem.R)
+    inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
+    whole = own[:, 0, 0] + np.einsum("ni,ij,nj->n", slopes, P, slopes)
+    np.testing.assert_allclose(whole, np.diag(inverse)[: z.size : 8], rtol=1e-3)
+
+
+def test_parameters_that_are_held_leave_their_doubt(problem, place):
+    """Held parameters with the covariance of the free ones tell the same doubt of v_y."""
+    z, p, _ = place
+    own, P, slopes, _ = problem.spread(z, p, problem.R)
+    free = np.einsum("ni,ij,nj->n", slopes, P, slopes)
+    moves = np.zeros_like(problem.priors.moves)
+    again = [LATENT_NAMES.index(name) for name in ("r_bias", "a_y_bias")]
+    moves[again] = True
+    held = Latent(problem.nodes, CAR, replace(problem.priors, moves=moves), columns=problem.index)
+    own_held, P_held, slopes_held, _ = held.spread(z, p, problem.R)
+    np.testing.assert_allclose(own_held, own, rtol=1e-6)
+    known = np.flatnonzero(~moves[problem.index])
+    told = np.einsum(
+        "ni,ij,nj->n", slopes_held[:, known], P[np.ix_(known, known)], slopes_held[:, known]
+    ) + np.einsum("ni,ij,nj->n", slopes_held[:, held.free], P_held, slopes_held[:, held.free])
+    np.testing.assert_allclose(told, free, rtol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def learnt(exact):
+    return fit([blind(exact)], CAR).model
+
+
+def test_a_told_stiffness_changes_nothing(exact, learnt):
+    softer = replace(
+        CAR, cornering_stiffness_front=40e3, cornering_stiffness_rear=40e3, chassis=CAR.chassis
+    )
+    np.testing.assert_array_equal(fit([blind(exact)], softer).model.p, learnt.p)
+
+
+def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
+    other = driven(9)
+    told = learnt.told_v_y(blind(other, seed=4))
+    away = np.degrees((told.v_y - other.v_y) / other.v_x)
+    assert np.sqrt(np.mean(away**2)) < 0.12
+    assert np.mean(np.abs(told.v_y - other.v_y) < 2.0 * told.sd) > 0.9
+    assert told.observable.mean() > 0.9
+
+
+def test_what_the_accelerometer_shows_beside_tires_is_found(learnt, exact):
+    told = learnt.told_v_y(blind(exact))
+    assert told.beside.mean() == pytest.approx(0.05 / 9.81, abs=0.004)
+
+
+@pytest.mark.parametrize(("hertz", "late"), [(None, 0.0), (5.0, 0.045), (2.0, 0.112)])
+def test_an_accelerometer_behind_a_causal_filter_is_late(exact, hertz, late):
+    log = blind(exact)
+    if hertz is not None:
+        log = replace(log, a_y=lfilter(*butter(2, 2.0 * hertz * log.dt), log.a_y))
+    found = lateness(log, CAR, latent_priors(CAR, Priors.of(CAR)))
+    assert found == pytest.approx(late, abs=0.02)
+
+
+def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
+    doubtful = replace(learnt, parted=2.0 * TRUST.parted, a_y_late=0.1)
+    doubtful.save(tmp_path / "weights.json")
+    again = FittedModel.load(tmp_path / "weights.json")
+    assert isinstance(again, FittedModel)
+    assert again.notes == doubtful.notes
+    assert {"not_observable", "a_y_late"} <= {code for code, _ in again.notes}
+    assert not {"not_observable", "a_y_late"} & {code for code, _ in learnt.notes}
+
+
+def test_nothing_goes_from_one_stretch_to_the_next(exact):
+    log = blind(exact)
+    both = joined([log.between(0.0, 8.0), log.between(12.0, 19.9)])
+    nodes = Nodes.of(both, CAR)
+    assert nodes.begins.sum() == 2
+    assert not nodes.goes[np.flatnonzero(nodes.begins)[1] - 1]
+    told = fit([both], CAR).model.told_v_y(both)
+    parts = [exact.between(0.0, 8.0).v_y, exact.between(12.0, 19.9).v_y]
+    away = told.v_y - np.concatenate(parts)
+    assert np.degrees(np.sqrt(np.mean(away**2)) / 20.0) < 0.15
+
+
+def test_a_log_with_neither_sensor_is_refused(exact):
+    with pytest.raises(RecordingError, match="there is no ay"):
+        fit([replace(blind(exact), a_y=None)], CAR)
