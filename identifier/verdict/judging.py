@@ -52,6 +52,7 @@ class Rules:
     doubt : standard deviation of the curve over the prior's, where the force is [-].
     stiffness : that tires have, over the static load [1/rad].
     beyond : share of the samples beyond the known slip, from which it is noted [-].
+    side_slip : standard deviation of an estimated one, median [rad].
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
@@ -60,6 +61,7 @@ class Rules:
     doubt: float = 0.5
     stiffness: tuple[float, float] = (2.0, 100.0)
     beyond: float = 0.01
+    side_slip: float = 0.01
     rolling: tuple[float, float] = (0.85, 1.25)
 
 
@@ -185,7 +187,17 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
 
 
 def _findings(asked: Asked) -> list[Objection]:
-    rules = (_v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning)
+    rules = (
+        _v_y_stuck,
+        _no_force,
+        _missed,
+        _left_out,
+        _unsure,
+        _no_tire,
+        _beyond,
+        _turning,
+        _unobserved,
+    )
     return [finding for rule in rules for finding in rule(asked)]
 
 
@@ -314,6 +326,26 @@ def _turning(asked: Asked) -> Iterator[Objection]:
             None,
             f"the recorded a_y is {slope:.2g} times what v_x, r and the estimated v_y give "
             f"({least:g} to {most:g} are usual): check the scales of v_x, r and a_y, and delays",
+            True,
+        )
+
+
+def _unobserved(asked: Asked) -> Iterator[Objection]:
+    """Refuse where the side slip that the model is judged at is hardly known."""
+    recording = asked.recording
+    if recording.logged_v_y is not None or recording.a_y is None:
+        return
+    told = asked.model.told_v_y(recording.as_logged())
+    if told is None:
+        return
+    at = asked.found.windows.starts
+    sd = float(np.median(told.sd[at] / recording.v_x[at]))
+    if not sd <= RULES.side_slip:
+        yield Objection(
+            "side_slip_unknown",
+            None,
+            f"side slip is estimated to ± {np.degrees(sd):.2g} deg (limit "
+            f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom",
             True,
         )
 

@@ -13,11 +13,13 @@ from identifier.estimate.latent import (
     Latent,
     lateness,
     latent_priors,
+    learn_latent,
 )
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import Priors
 from identifier.motion.nodes import LATENT_NAMES
+from identifier.verdict import judge_prediction
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings import RecordingError
@@ -189,3 +191,26 @@ def test_nothing_goes_from_one_stretch_to_the_next(exact):
 def test_a_log_with_neither_sensor_is_refused(exact):
     with pytest.raises(RecordingError, match="there is no ay"):
         fit([replace(blind(exact), a_y=None)], CAR)
+
+
+@pytest.mark.parametrize(("worse", "parted"), [(0.0, True), (100.0, False)])
+def test_starts_part_only_where_both_explain_the_drive(problem, monkeypatch, worse, parted):
+    """An end that explains the drive far worse says nothing of what is observable."""
+    z, p = problem.begin()
+    best = problem.smoothed(z, p, rounds=0)
+    moved = z.copy()
+    moved[:, 0] += 0.5
+    monkeypatch.setattr(Latent, "settled", lambda self, stiffer=0.0: (z, p))
+    monkeypatch.setattr(Latent, "smoothed", lambda self, *given: best)
+    monkeypatch.setattr(Latent, "descend", lambda *given: (moved, p, best.cost + worse, 1))
+    found = learn_latent(problem.nodes, CAR, Priors.of(CAR))
+    assert (found.parted > TRUST.parted) == parted
+
+
+@pytest.mark.parametrize(("wider", "refused"), [(1.0, False), (400.0, True)])
+def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused):
+    doubtful = replace(learnt, covariance=wider * learnt.covariance)
+    log = blind(driven(9), seed=4)
+    shown = replace(log, v_y=doubtful.told_v_y(log).v_y, estimated=("v_y",))
+    codes = [one.code for one in judge_prediction(doubtful, shown).findings]
+    assert ("side_slip_unknown" in codes) == refused
