@@ -209,7 +209,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     Over windows of 0.2 s one after the other; None without a v_y, or with less than 2 s.
     """
     v_y, dt = recording.logged_v_y, recording.dt
-    width = max(round(WINDOW / dt), 1)
+    width = round(max(WINDOW / dt, 1.0))
     n = len(recording) // width
     if v_y is None or n * width * dt < 2.0:
         return None
