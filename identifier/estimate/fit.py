@@ -13,7 +13,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.estimate.drive import FASTEST, Drive
 from identifier.estimate.information import Information
-from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
+from identifier.estimate.latent import Learnt, hardest, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel, Segment
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior
@@ -24,6 +24,7 @@ from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
 BLOCK = 600.0  # [s] that are estimated at once
+BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
 ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
 LONG, COARSE = 3600.0, 2.0  # [s] of logs from which samples are averaged to intervals so longer
 REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
@@ -102,14 +103,13 @@ def fit(
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
         late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-        for nodes in _blocks_of_nodes(blind, vehicle, late):
-            if not nodes.counts.any():
-                continue
+        nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=late)
+        if nodes.counts.any():
             learnt = learn_latent(nodes, vehicle, beliefs)
             found, parted = learnt.posterior, max(parted, learnt.parted)
             reach = reach.with_(Reach.of_states(learnt))
             beliefs = _after(beliefs, found)
-            went_on(len(nodes.t) * nodes.dt)
+        went_on(blind.duration)
     if found is None:
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
@@ -231,14 +231,6 @@ class Reach(NamedTuple):
         alike = np.sum((learnt.z[on, 4:6] / error_size(turning)[:, None]) ** 2, axis=0)
         slip = np.partition(size, len(size) - k, axis=0)[-k]
         return cls(slip, speeds, a_x, alike, float(len(size)))
-
-
-def _blocks_of_nodes(recording: Recording, vehicle: Vehicle, late: float) -> Iterator[Nodes]:
-    """Yield nodes of at most `BLOCK`, of a log whose a_y is late [s]."""
-    count = -(-len(recording) // max(round(BLOCK / recording.dt), 1))
-    edges = np.linspace(0, len(recording), count + 1).astype(int)
-    for begin, end in itertools.pairwise(edges):
-        yield Nodes.of(recording, vehicle, slice(int(begin), int(end)), a_y_late=late)
 
 
 def _blocks(

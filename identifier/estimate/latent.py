@@ -16,8 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from codegen import Scan
 from codegen.arrays import Array
@@ -287,6 +285,8 @@ class Latent:
                 if i >= j:
                     banded[i - j, j::N] = at.A[:, i, j] * (1.0 + damping * (i == j))
                 banded[N + i - j, j : (n - 1) * N : N] = at.O[:, i, j]
+        from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
+
         factor = cholesky_banded(banded, lower=True, check_finite=False, overwrite_ab=True)
         right = np.hstack([at.g.reshape(-1, 1), at.B.reshape(n * N, -1)])
         X = cho_solve_banded((factor, True), right, overwrite_b=True, check_finite=False)
@@ -500,6 +500,19 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
     )
 
 
+def hardest(recording: Recording, seconds: float) -> slice:
+    """Return which samples are the time of hardest cornering, of all that are not longer.
+
+    Parameters
+    ----------
+    seconds : how long it is at most [s].
+    """
+    n = min(round(seconds / recording.dt), len(recording))
+    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
+    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
+    return slice(first, first + n)
+
+
 def lateness(
     recording: Recording, vehicle: Vehicle, priors: Priors, columns: NDArray[np.intp] | None = None
 ) -> float:
@@ -512,12 +525,10 @@ def lateness(
     ----------
     priors, columns : as of `Latent`.
     """
-    n = min(round(ASKED / recording.dt), len(recording))
-    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
-    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
+    part = hardest(recording, ASKED)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
     smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
-    piece, part = replace(recording, a_y=smooth), slice(first, first + n)
+    piece = replace(recording, a_y=smooth)
     found: dict[int, float] = {}
     count = 1
 
@@ -615,6 +626,8 @@ def _fill(
     beside: Array,
 ) -> None:
     """Put v_y between nodes into its samples, run by run of nodes."""
+    from scipy.interpolate import CubicSpline  # takes long to import
+
     firsts = np.flatnonzero(nodes.begins)
     lasts = np.flatnonzero(nodes.counts & ~nodes.goes)
     half = 0.5 * nodes.dt

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
 from codegen.arrays import Array
 from identifier.estimate.drive import (
@@ -160,6 +159,8 @@ def low_passed(signal: Array, hertz: float, dt: float) -> Array:
     share = 2.0 * dt * hertz  # of the highest frequency that samples show
     if share >= 0.9 or len(signal) < 20:
         return np.array(signal, dtype=np.float64)
+    from scipy.signal import butter, filtfilt  # takes long to import
+
     found: Array = filtfilt(*butter(2, share), signal)
     return found
 

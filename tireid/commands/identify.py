@@ -10,6 +10,7 @@ from codegen.escape import visible
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
+from identifier.methods import DEFAULT, usual
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -124,7 +125,8 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True)
+        beside = beside or usual(joined(logs)) != DEFAULT
+        law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True, online=beside)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):
         check_recording(one, design)

@@ -11,6 +11,7 @@ from identifier.estimate.fit import fit
 from identifier.estimate.latent import (
     TRUST,
     Latent,
+    hardest,
     lateness,
     latent_priors,
     learn_latent,
@@ -18,11 +19,12 @@ from identifier.estimate.latent import (
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import Priors
+from identifier.methods import usual
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
 from models.maneuvers import RandomSteer
 from models.plant import Plant
-from models.recordings import RecordingError
+from models.recordings import Recording, RecordingError
 from models.recordings.record import joined
 
 CAR = ti.sedan()
@@ -214,3 +216,18 @@ def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused
     shown = replace(log, v_y=doubtful.told_v_y(log).v_y, estimated=("v_y",))
     codes = [one.code for one in judge_prediction(doubtful, shown).findings]
     assert ("side_slip_unknown" in codes) == refused
+
+
+def test_of_a_long_log_the_hardest_part_teaches_and_of_hours_the_recursion_tells():
+    n = 40_000
+    t = 0.1 * np.arange(n)
+    r = np.where((t > 1000.0) & (t < 1300.0), 0.3, 0.01) * np.sin(0.5 * t)
+    log = Recording(
+        name="long", t=t, v_x=np.full(n, 20.0), v_y=None, r=r, delta_f=0.1 * r, delta_r=0.0 * t,
+        a_y=20.0 * r,
+    )  # fmt: skip
+    part = hardest(log, 300.0)
+    assert part.stop - part.start == 3000 and abs(t[part.start] - 1000.0) < 10.0
+    assert hardest(log.between(0.0, 100.0), 300.0) == slice(0, len(log.between(0.0, 100.0)))
+    assert usual(log) == "inertial" and usual(log.between(0.0, 3500.0)) == "fit"
+    assert usual(replace(log, v_y=0.1 * r)) == "fit"
