@@ -136,6 +136,7 @@ def test_the_exported_step_of_a_fit_is_its_exact_one(fitted, drive):
 
 def test_a_run_of_a_fit_is_exported_to_go_on_learning(drive, fitted, tmp_path, monkeypatch):
     monkeypatch.setattr(exporting, "measure", lambda *_: [])
+    monkeypatch.setattr(exporting, "figures_text", lambda _: "")
     run = ti.identify(drive, CAR, FitMethod.for_vehicle(CAR))
     step = ti.export(run, tmp_path / "ecu").package.specialized
     assert isinstance(step.method, AxleIdentifier)
