@@ -200,7 +200,8 @@ class Search:
             step = -covariance @ slope
             gain = before - priors.cost(base.p) - 0.5 * float(slope @ step)
             value = base[one.parameter] + float(step[k])
-            yield one, gain, value, math.sqrt(covariance[k, k])
+            if covariance[k, k] > 0.0:
+                yield one, gain, value, math.sqrt(covariance[k, k])
 
     def promised(self, base: Posterior) -> list[tuple[float, Suspect, float]]:
         """Return what each suspect of the balance would bring, if all were straight lines.
@@ -261,6 +262,8 @@ class Search:
         The balance is a parabola of the parameter there, the others moving with it.
         """
         k, covariance = INDEX[name], post.covariance
+        if not covariance[k, k] > 0.0:  # singular but for rounding: it tells nothing
+            return post, math.inf, math.inf, 0.0
         sd = math.sqrt(covariance[k, k])
         along = covariance[k] / covariance[k, k]
 

@@ -464,3 +464,17 @@ def test_a_finding_that_is_sure_has_a_repair():
 
 def test_every_suspect_has_a_name_in_words():
     assert {one.code for one in SUSPECTS if "_" in one.code} <= set(NAMES)
+
+
+def test_a_candidate_without_a_variance_is_not_believed(driven):
+    """As a matrix that is singular but for rounding leaves it."""
+    car, log, _ = driven
+    search = prepared(log, car)
+    assert search is not None and search.accelerometer is not None
+    base = search.nominal()
+    k = INDEX["v_y_bias"]
+    covariance = base.covariance.copy()
+    covariance[k, k] = -1e-9
+    _, sd, cost, _ = search.both(replace(base, covariance=covariance), "v_y_bias")
+    assert sd == cost == np.inf
+    assert np.isfinite(search.both(base, "v_y_bias")[1:]).all()
