@@ -38,7 +38,8 @@ def test_a_drive_is_asked_as_a_whole_and_in_halves(drive):
 
 def test_only_a_half_may_be_called_straight(drive, monkeypatch):
     log, car, _ = drive
-    straight = replace(log, r=0.01 * log.r)
+    names = ("v_y", "r", "delta_f", "a_y")
+    straight = replace(log, **{name: 0.01 * getattr(log, name) for name in names})
     alarms = doctor_answers.said_of_clean("sedan", 1, straight, car).alarms
     assert alarms[WHOLE]
     assert not any(alarms[part] for part in PARTS)
