@@ -263,7 +263,7 @@ def test_the_verdict_on_a_long_drive_says_that_a_portion_was_asked(long_drive, s
 
 
 def test_the_verdict_on_a_long_drive_finds_a_sensor_that_is_off(long_drive, short_portions, rng):
-    moved = replace(long_drive, v_y=long_drive.v_y - 0.8 * long_drive.r)
+    moved = replace(long_drive, v_y=long_drive.v_y - 2.0 * long_drive.r)
     verdict = judge(identify(noisy(moved, rng), CAR, AxleIdentifier.for_vehicle(CAR)))
     assert not verdict.valid
 

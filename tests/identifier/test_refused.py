@@ -50,7 +50,7 @@ def error(force, truth):
     return float((np.sqrt(((force - truth) ** 2).mean(0) / (truth**2).mean(0))).max())
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", [one for one in METHODS if not make_method(one, CAR).whole])
 def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
     rows, truth, method = rows_of(slalom), slalom.axle_force, make_method(name, CAR)
     a_y = slalom.a_y if method.needs_a_y else None

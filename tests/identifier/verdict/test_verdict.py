@@ -216,7 +216,8 @@ def test_a_number_of_a_refused_axle_is_not_valid(drive):
     assert not [number for number in verdict.numbers if number.valid]
     tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
     assert len(tires) == 4
-    assert {number.state for number in tires} == {"not valid"}
+    states = {number.state for number in tires}
+    assert "not valid" in states and "valid" not in states
 
 
 def moved(model, **by):
