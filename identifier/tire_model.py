@@ -36,7 +36,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "what learning believes, not calibrated; `run.tire` checks it on the drive"
+UNCALIBRATED = "what learning believes, not calibrated; run.tire checks it on the drive"
 
 
 class TireFunctions(NamedTuple):

@@ -154,16 +154,12 @@ def noted_errors(figure):
     return np.reshape(truth, (-1, 2)), np.reshape(online, (-1, 2))
 
 
-def test_figures_say_the_errors_of_the_tables(study, tmp_path, monkeypatch):
+def test_figures_say_the_errors_of_the_tables(study, tmp_path):
     """Both count from the onset on: before it there is no force to miss."""
-    drawn = {}
-    monkeypatch.setattr(
-        tireid.commands.paper, "save_figure", lambda figure, path: drawn.update({path.name: figure})
-    )
-    write_study(tmp_path, study)
+    drawn = write_study(tmp_path, study)
     for name, maneuver in (("fig3", "step_steer"), ("fig5", "slalom")):
         trial = study.typical(maneuver, "integral")
-        noted = noted_errors(drawn[f"{name}_{maneuver}_integral.png"])
+        noted = noted_errors(drawn[f"{name}_{maneuver}_integral"])
         truth, online = (np.sqrt(np.mean(axles**2, axis=1)) for axles in noted)
         times = FREEZES[maneuver]
         names = ["online", *(f"against_truth_{t:g}" for t in times)]

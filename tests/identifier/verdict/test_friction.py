@@ -71,7 +71,7 @@ def test_a_band_that_nobody_calibrated_tells_no_friction(tires, wetter):
     unchecked = tires.with_calibration(None)
     assert tires.band_calibrated and not unchecked.band_calibrated
     assert "band: calibrated on the drive" in tires.summary()
-    assert "not calibrated; `run.tire`" in unchecked.summary()
+    assert "not calibrated; run.tire" in unchecked.summary()
     with pytest.raises(ValueError, match=r"friction\(\) wants a calibrated band"):
         predict(unchecked, wetter).friction()
     assert predict(unchecked, wetter).verdict.friction is None
