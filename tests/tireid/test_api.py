@@ -16,7 +16,7 @@ import pytest
 import tireid as ti
 from identifier.baselines import CurveModel
 from identifier.export.package import build_package
-from identifier.methods import make_method
+from identifier.methods import continuing, make_method
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
 from mpc.tires import prediction_tire
@@ -532,12 +532,13 @@ def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch
     monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     written = ti.export(run, tmp_path / "run", name="axle")
     assert (tmp_path / "run" / "include" / "axle.h").is_file()
-    expected = build_package(run.method, car, run.freeze(), name="axle", single=False)
+    learns = continuing(run.freeze(), car, run.method.dt)  # sample by sample, from the fit
+    expected = build_package(learns, car, run.freeze(), name="axle", single=False)
     assert written.package.about["hash"] == expected.about["hash"]
     assert str(written).endswith(f"wrote {tmp_path / 'run'}/, hash {expected.about['hash']}")
     from_model = ti.export(run.freeze(), str(tmp_path / "model"), name="axle")
     assert from_model.package.about["hash"] == expected.about["hash"]
-    fresh = ti.export(run.method, tmp_path / "method", vehicle=car, name="axle")
+    fresh = ti.export(learns, tmp_path / "method", vehicle=car, name="axle")
     assert fresh.package.about["hash"] != expected.about["hash"]
     with pytest.raises(FileExistsError, match="overwrite=True replaces it"):
         ti.export(run, tmp_path / "run")
