@@ -54,7 +54,7 @@ class History:
 
     Parameters
     ----------
-    recording : what it ran over, with the v_y that the method told where there was none.
+    recording : what it ran over, with the v_y that the method estimated where there was none.
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
@@ -189,7 +189,7 @@ class History:
         if self.online:
             raise ValueError("an online run is beside another drive as of identify")
         model = self.freeze(t)
-        recording, outputs = _told(recording.as_logged(), model)
+        recording, outputs = _with_v_y(recording.as_logged(), model)
         force = model.axle_force(recording)
         return replace(
             self,
@@ -205,8 +205,8 @@ class History:
         for one in recordings:
             end = first + len(one)
             if one.v_y is None:
-                told = self.recording.needed("v_y")[first:end]
-                one = replace(one, v_y=told, estimated=("v_y",))
+                v_y = self.recording.needed("v_y")[first:end]
+                one = replace(one, v_y=v_y, estimated=("v_y",))
             state, outputs = self.state, self.outputs
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)
@@ -281,7 +281,7 @@ def identify(
     check_recording(recording, design)
     if design.whole:
         model = design.fitted(recording, vehicle, start, progress=progress)
-        recording, outputs = _told(recording, model)
+        recording, outputs = _with_v_y(recording, model)
         return History(
             vehicle=vehicle,
             design=design,
@@ -329,17 +329,17 @@ def identify(
     )
 
 
-def _told(recording: Recording, model: TireModel) -> tuple[Recording, Mapping[str, Array]]:
+def _with_v_y(recording: Recording, model: TireModel) -> tuple[Recording, Mapping[str, Array]]:
     """Return a recording with the v_y that a model tells where there is none, and how well."""
-    told = model.told_v_y(recording) if recording.v_y is None else None
-    if told is None:
+    found = model.estimated_v_y(recording) if recording.v_y is None else None
+    if found is None:
         return recording, {}
     names = ("v_y", "v_y_sd", "side_slip_observable")
     outputs = {
         name: np.asarray(values, dtype=np.float64)[:, None]
-        for name, values in zip(names, told[:3], strict=True)
+        for name, values in zip(names, found[:3], strict=True)
     }
-    return replace(recording, v_y=told.v_y, estimated=("v_y",)), outputs
+    return replace(recording, v_y=found.v_y, estimated=("v_y",)), outputs
 
 
 def learn(

@@ -30,7 +30,7 @@ from models.vehicle import Vehicle
 if TYPE_CHECKING:  # what some models answer with
     from identifier.axle.band import BandCalibration, SpreadByRange
     from identifier.axle.guarantee import Guarantee
-    from identifier.estimate.latent import Told
+    from identifier.estimate.latent import LateralVelocity
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -150,7 +150,7 @@ class TireModel(ABC):
         """
         return self.setup(recording.dt).output(recording, "axle_force")
 
-    def told_v_y(self, recording: Recording) -> "Told | None":
+    def estimated_v_y(self, recording: Recording) -> "LateralVelocity | None":
         """Return the v_y of a drive whose sensors show none; None of tires that cannot tell it."""
         del recording
         return None

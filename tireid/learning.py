@@ -129,9 +129,9 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     """
     if recording.v_y is not None:
         return recording
-    told = tire.told_v_y(recording)
-    if told is not None:
-        return replace(recording, v_y=told.v_y, estimated=("v_y",))
+    found = tire.estimated_v_y(recording)
+    if found is not None:
+        return replace(recording, v_y=found.v_y, estimated=("v_y",))
     design = InertialIdentifier.for_vehicle(tire.vehicle, dt=recording.dt)
     start = tire if design.resumes(tire) else None
     return run_over(recording, tire.vehicle, design, start).recording

@@ -69,7 +69,7 @@ def fit(
         Where a log has neither v_y nor a_y.
     """
     before = Priors.of(vehicle) if priors is None else priors
-    told, sd = Information.nothing(), Priors.of(vehicle).sd
+    known, sd = Information.nothing(), Priors.of(vehicle).sd
     parts: list[tuple[float, Information]] = []
     total = sum(one.duration for one in recordings)
     done, reach, found, parted, late = 0.0, Reach(), None, 0.0, 0.0
@@ -88,7 +88,7 @@ def fit(
             continue
         begin = None if found is None else found.p
         enough = ENOUGH if begin is None else ENOUGH_MORE
-        beliefs = before.after(told) if parts else before
+        beliefs = before.after(known) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
         segments += _segments(drives, roads)
@@ -97,7 +97,7 @@ def fit(
         part = Information.about(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
         )
-        told += part
+        known += part
         parts.append((drives[0].begin, part))
         went_on(sum(len(one.signals) * one.dt for one in drives))
     beliefs = before if found is None else _after(before, found)
@@ -136,7 +136,7 @@ def _after(beliefs: Priors, found: Posterior) -> Priors:
     where = np.ix_(index, index)
     information[where] = np.linalg.inv(found.covariance[where])
     moves[index] = True
-    return replace(beliefs, mean=found.p, information=information, moves=moves, typed=(), told=None)
+    return replace(beliefs, mean=found.p, information=information, moves=moves, typed=(), data=None)
 
 
 def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:

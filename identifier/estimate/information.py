@@ -1,7 +1,7 @@
 """What drives tell of tires and sensors as numbers that add up: Gauss-Newton's matrix and vector.
 
 The balance is linear in the forces of the curves, but not in the numbers of the Magic Formula. So
-the loss of drives about their optimum p*, without any prior, is told over
+the loss of drives about their optimum p*, without any prior, is written over
 
     u(p) = [φ_f, φ_r, ρ]:  ½ u'Λu - η'u,   Λ = C'HC,   η = Λ u(p*) - C'g
 

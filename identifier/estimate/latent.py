@@ -93,7 +93,7 @@ class Trust:
 TRUST = Trust()
 
 
-class Told(NamedTuple):
+class LateralVelocity(NamedTuple):
     """v_y at each sample and its standard deviation [m/s], whether it is known, and what the
     accelerometer shows beside forces of tires [weights], (n,).
     """
@@ -170,7 +170,7 @@ class Latent:
     ----------
     priors : of `latent_priors`; what is to be held does not move.
     columns : which parameters slopes are taken over, (m,): those that move, and others whose doubt
-        is to be told.
+        is to be given.
     """
 
     def __init__(
@@ -565,7 +565,9 @@ def _believed(beliefs: Priors) -> Array:
     return covariance
 
 
-def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) -> Told:
+def estimate_v_y(
+    recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
+) -> LateralVelocity:
     """Return the v_y of a drive on tires that are known, and how well.
 
     Parameters
@@ -580,7 +582,7 @@ def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
     information = np.zeros_like(believed.information)
     information[again, again] = believed.information[again, again]
     held = replace(believed, moves=moves, information=information)
-    told = Told(
+    found_v_y = LateralVelocity(
         vehicle.bicycle.l_r * recording.r,
         TRUST.side_slip * np.maximum(recording.v_x, vehicle.lowest_speed),
         np.zeros(len(recording), dtype=bool),
@@ -601,10 +603,10 @@ def tell_v_y(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
         variance += np.einsum("ni,ij,nj->n", free, found.P, free)
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
         beside = bias + roll / GRAVITY * nodes.given[:, 5]
-        _fill(told, recording, inner, nodes, found.z[:, 0], np.sqrt(variance), beside)
-    for values in told:
+        _fill(found_v_y, recording, inner, nodes, found.z[:, 0], np.sqrt(variance), beside)
+    for values in found_v_y:
         values.setflags(write=False)
-    return told
+    return found_v_y
 
 
 def _blocks(recording: Recording) -> Iterator[tuple[slice, slice]]:
@@ -617,7 +619,7 @@ def _blocks(recording: Recording) -> Iterator[tuple[slice, slice]]:
 
 
 def _fill(
-    told: Told,
+    found_v_y: LateralVelocity,
     recording: Recording,
     inner: slice,
     nodes: Nodes,
@@ -639,10 +641,10 @@ def _fill(
         a, b = np.searchsorted(recording.t, [t[0] - half, t[-1] + half])
         some = slice(max(int(a), inner.start), min(int(b), inner.stop))
         at = np.clip(recording.t[some], t[0], t[-1])
-        told.v_y[some] = CubicSpline(t, v_y[run])(at)
-        told.sd[some] = np.interp(at, t, sd[run])
-        told.beside[some] = np.interp(at, t, beside[run])
-        told.observable[some] = told.sd[some] < TRUST.observable * recording.v_x[some]
+        found_v_y.v_y[some] = CubicSpline(t, v_y[run])(at)
+        found_v_y.sd[some] = np.interp(at, t, sd[run])
+        found_v_y.beside[some] = np.interp(at, t, beside[run])
+        found_v_y.observable[some] = found_v_y.sd[some] < TRUST.observable * recording.v_x[some]
 
 
 def _next(values: Array) -> Array:

@@ -83,7 +83,7 @@ class FitMethod(Method):
         Raises
         ------
         ValueError
-            Where it is told to go on from a model of another method, or no sample is fast enough.
+            Where it shall go on from a model of another method, or no sample is fast enough.
         RecordingError
             Where there is neither v_y nor a_y.
         """

@@ -18,7 +18,7 @@ from identifier.axle.model import AxleModel
 from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate.drive import Drive
-from identifier.estimate.latent import TRUST, Told, tell_v_y
+from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import ERROR_SIZE, car_numbers, simulate
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
@@ -60,7 +60,7 @@ ELSEWHERE = 2.25
 # times what the drives that taught miss, on others; chosen on recordings of three real cars and two
 # simulated ones, since the errors of a plant that one draws are those that one thought of
 SURE_MASS, SURE_CENTER = 0.03, 0.01  # sd of a given mass, of it; of a center, in wheelbases
-TYPICAL = 0.5  # static loads, at which an error is told as a share of the force
+TYPICAL = 0.5  # static loads, at which an error is given as a share of the force
 SMALL = 1e-4  # rad, over which a slope is taken
 SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering that is noted
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
@@ -294,7 +294,7 @@ class FittedModel(TireModel):
         """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self._over(recording)[1]
 
-    def told_v_y(self, recording: Recording) -> Told:
+    def estimated_v_y(self, recording: Recording) -> LateralVelocity:
         """Return the v_y of a drive whose sensors show none, smoothed on these tires.
 
         Raises
@@ -302,12 +302,12 @@ class FittedModel(TireModel):
         RecordingError
             Where there is no a_y either.
         """
-        for r, p, told in _TOLD:
+        for r, p, found in _LAST:
             if r is recording.r and p is self.p:
-                return told
-        told = tell_v_y(recording, self.vehicle, self.p, self.covariance)
-        _TOLD.append((recording.r, self.p, told))
-        return told
+                return found
+        found = estimate_v_y(recording, self.vehicle, self.p, self.covariance)
+        _LAST.append((recording.r, self.p, found))
+        return found
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
@@ -579,7 +579,7 @@ class FittedModel(TireModel):
             drawn.append(replace(self, p=np.clip(p, priors.low, priors.high)))
         return tuple(drawn)
 
-    # What is told of it.
+    # What it says of itself.
 
     @property
     def cornering_stiffness(self) -> Array:
@@ -855,7 +855,7 @@ class FittedModel(TireModel):
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
-_TOLD: deque[tuple[Array, Array, Told]] = deque(maxlen=4)
+_LAST: deque[tuple[Array, Array, LateralVelocity]] = deque(maxlen=4)
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 
 

@@ -85,8 +85,8 @@ class Nodes:
             if count >= FEWEST:
                 some = slice(first, first + count * every)
                 felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
-                told = (nothing if v_y is None else v_y)[some]
-                pieces.append(_piece(recording, some, vehicle, every, felt, told))
+                shown = (nothing if v_y is None else v_y)[some]
+                pieces.append(_piece(recording, some, vehicle, every, felt, shown))
         if not pieces:
             raise ValueError(f"{recording.name}: too short to learn from without v_y")
         t, given, measured, counts, goes = (
@@ -148,10 +148,10 @@ def _piece(
     fresh = np.isfinite(v_y).reshape(-1, every)
     total = np.where(fresh, v_y.reshape(-1, every), 0.0).sum(axis=1)
     count = fresh.sum(axis=1)
-    told = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    v_y = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     counts: NDArray[np.bool_] = np.asarray(on.reshape(-1, every).all(axis=1))
     goes = np.append(counts[:-1] & counts[1:], False)
-    return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y), told]), counts, goes
+    return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y), v_y]), counts, goes
 
 
 def low_passed(signal: Array, hertz: float, dt: float) -> Array:

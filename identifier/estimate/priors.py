@@ -21,7 +21,7 @@ from models.vehicle import Vehicle
 LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
 LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
 SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
-SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse where a share is told: of it; least
+SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse of a given share: of it; least
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
 
@@ -92,7 +92,7 @@ class Priors:
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
     typed : which numbers somebody typed.
-    told : what drives told beside it.
+    data : what drives add to it
     """
 
     mean: Array
@@ -101,7 +101,7 @@ class Priors:
     information: Array
     moves: NDArray[np.bool_]
     typed: tuple[int, ...] = ()
-    told: Information | None = None
+    data: Information | None = None
 
     @classmethod
     def of(
@@ -128,7 +128,7 @@ class Priors:
             k, size = INDEX[name], unit[belief.per]
             mean[k], sd[k] = size * belief.mean, size * belief.sd
             low[k], high[k] = size * belief.low, size * belief.high
-        for name, (value, doubt) in _told(vehicle).items():
+        for name, (value, doubt) in _declared(vehicle).items():
             k = INDEX[name]
             mean[k], sd[k] = min(max(value, low[k]), high[k]), doubt
         for name, value in wide.items():
@@ -157,8 +157,8 @@ class Priors:
     @property
     def sd(self) -> Array:
         """Standard deviations of the parameters, each apart; 0 where it does not move, (p,)."""
-        told = np.diag(self.information)
-        return np.sqrt(np.divide(1.0, told, out=np.zeros_like(told), where=self.moves))
+        diagonal = np.diag(self.information)
+        return np.sqrt(np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=self.moves))
 
     def with_roads(self, count: int) -> "Priors":
         """Return the beliefs with ln of the friction of other roads behind, (p + count,)."""
@@ -187,7 +187,7 @@ class Priors:
         for k in self.typed:
             z2 = float(self.information[k, k] * away[k] ** 2)
             cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / (TAILS + 1.0)) - z2)
-        return cost if self.told is None else cost + self.told.around(p[: len(NAMES)])[0]
+        return cost if self.data is None else cost + self.data.around(p[: len(NAMES)])[0]
 
     def around(self, p: Array) -> tuple[Array, Array]:
         """Return gradient (p,) and positive curvature (p, p) of the cost at parameters `p` (p,)."""
@@ -196,27 +196,27 @@ class Priors:
             z2 = self.information[k, k] * away[k] ** 2
             curvature[k, k] *= (TAILS + 1.0) / (TAILS + 1.0 + z2)
         gradient: Array = curvature @ away
-        if self.told is not None:
+        if self.data is not None:
             n = len(NAMES)  # of other roads no drive before tells
-            _, slope, bend = self.told.around(p[:n])
+            _, slope, bend = self.data.around(p[:n])
             gradient[:n] += slope
             curvature[:n, :n] += bend
         return gradient, curvature
 
-    def after(self, told: Information) -> "Priors":
-        """Return the beliefs with what drives told."""
-        return replace(self, told=told)
+    def after(self, data: Information) -> "Priors":
+        """Return the beliefs with what drives add."""
+        return replace(self, data=data)
 
 
-def _told(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
+def _declared(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     """Return mean and standard deviation of what follows from numbers that a car tells, by name.
 
     An axle of share s that pushes f weights uses s W f/μ of its grip, W weights per static load.
     """
     L, grip = vehicle.wheelbase, np.exp(OF_AXLES["ln_grip"].mean)
-    told: dict[str, tuple[float, float]] = {}
+    declared: dict[str, tuple[float, float]] = {}
     if (height := vehicle.lengthwise("cg_height")) is not None:
-        told["load_transfer"] = LESS_LOAD * height / L, SURE_HEIGHT
+        declared["load_transfer"] = LESS_LOAD * height / L, SURE_HEIGHT
     for name, share in (("driving", "drive_front_share"), ("braking", "brake_front_share")):
         if (front := vehicle.lengthwise(share)) is not None:
             for axle, part, W in (
@@ -224,8 +224,8 @@ def _told(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
                 ("r", 1.0 - front, L / vehicle.l_f),
             ):
                 use = float(LESS_USE * part * W / grip)
-                told[f"{name}_{axle}"] = use, max(SURE_SHARE * use, LEAST_USE)
-    return told
+                declared[f"{name}_{axle}"] = use, max(SURE_SHARE * use, LEAST_USE)
+    return declared
 
 
 def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:

@@ -70,8 +70,8 @@ class Problem:
         moving = self.index[self.index < len(NAMES)]
         self.tires = len(moving)  # columns of slopes that are not of roads
         self._columns = moving if every else np.arange(self.tires)
-        told = NAMES[:-1] if every else [NAMES[k] for k in moving]
-        self._scan = motion_scan((*told, "ln_road"))
+        moved = NAMES[:-1] if every else [NAMES[k] for k in moving]
+        self._scan = motion_scan((*moved, "ln_road"))
         self._car = car_numbers(vehicle)
         self._strides = [max(1, round(STRIDE / one.dt)) for one in drives]
         self._kept = [
@@ -437,7 +437,7 @@ def _of_drives(problem: Problem, H: Array, gradient: Array) -> tuple[Array, Arra
 def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     """Return the optimum (p,) of what is believed, and its covariance (p, p).
 
-    With `Priors.after` these are the parameters that all drives told together.
+    With `Priors.after` these are the parameters of all drives together.
 
     Parameters
     ----------

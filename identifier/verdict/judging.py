@@ -180,8 +180,8 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
     if recording.a_y is None:
         return None
     if recording.logged_v_y is None:
-        told = model.told_v_y(recording.as_logged())
-        return None if told is None else told.beside
+        found = model.estimated_v_y(recording.as_logged())
+        return None if found is None else found.beside
     bank: Array = Drive.of(recording, model.vehicle, replay=True).signals[:, 6] / GRAVITY
     return bank
 
@@ -335,11 +335,11 @@ def _unobserved(asked: Asked) -> Iterator[Objection]:
     recording = asked.recording
     if recording.logged_v_y is not None or recording.a_y is None:
         return
-    told = asked.model.told_v_y(recording.as_logged())
-    if told is None:
+    found = asked.model.estimated_v_y(recording.as_logged())
+    if found is None:
         return
     at = asked.found.windows.starts
-    sd = float(np.median(told.sd[at] / recording.v_x[at]))
+    sd = float(np.median(found.sd[at] / recording.v_x[at]))
     if not sd <= RULES.side_slip:
         yield Objection(
             "side_slip_unknown",

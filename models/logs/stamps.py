@@ -238,7 +238,7 @@ def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock 
     column : from 0.
     """
     found = _clock(column, name, unit, head, _is_any)
-    return found and found._replace(words=found.words.replace("by its name (sure)", "as is told"))
+    return found and found._replace(words=found.words.replace("by its name (sure)", "as given"))
 
 
 def _plain(name: str) -> str:

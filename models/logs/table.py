@@ -238,7 +238,7 @@ class TableLog:
     def notes(self) -> tuple[str, ...]:
         """What was mended in what has been read so far, one sentence each."""
         even = f"time is even at {self._even:g} Hz, as "
-        even += "is told" if self.rate else "the lines above the table say"
+        even += "given" if self.rate else "the lines above the table say"
         return (*([even] if self._even else []), *dict.fromkeys(self._noted))
 
     @cached_property

@@ -281,7 +281,7 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     assert np.array_equal(read.v_y[known], log.v_y[kept][known])
     assert abs(read.v_y[~known] - log.v_y[single]) < 0.1, "v_y goes on as before for one sample"
     assert main(["channels", str(path), "--cut-holes"]) == 0
-    assert "they are cut out, as is told" in capsys.readouterr().out
+    assert "they are cut out, as given" in capsys.readouterr().out
 
 
 def test_a_map_says_refuse_or_cut_of_holes():

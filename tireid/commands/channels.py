@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     tell(channels_text(listed, seen, signals, proposal, frozenset(sure)))
     empty = holes_text(seen, signals)
     if empty:
-        cut = "cut out, as is told" if told.holes == CUT else CUT_BY_MAP
+        cut = "cut out, as given" if told.holes == CUT else CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
         told = replace(told, holes=CUT)
     aside = [] if "v_y" in missing else choice.aside_signals(signals, proposal)

@@ -147,7 +147,7 @@ def test_a_told_stiffness_changes_nothing(exact, learnt):
 
 def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
     other = driven(9)
-    told = learnt.told_v_y(blind(other, seed=4))
+    told = learnt.estimated_v_y(blind(other, seed=4))
     away = np.degrees((told.v_y - other.v_y) / other.v_x)
     assert np.sqrt(np.mean(away**2)) < 0.12
     assert np.mean(np.abs(told.v_y - other.v_y) < 2.0 * told.sd) > 0.9
@@ -155,7 +155,7 @@ def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
 
 
 def test_what_the_accelerometer_shows_beside_tires_is_found(learnt, exact):
-    told = learnt.told_v_y(blind(exact))
+    told = learnt.estimated_v_y(blind(exact))
     assert told.beside.mean() == pytest.approx(0.05 / 9.81, abs=0.004)
 
 
@@ -184,7 +184,7 @@ def test_nothing_goes_from_one_stretch_to_the_next(exact):
     nodes = Nodes.of(both, CAR)
     assert nodes.begins.sum() == 2
     assert not nodes.goes[np.flatnonzero(nodes.begins)[1] - 1]
-    told = fit([both], CAR).model.told_v_y(both)
+    told = fit([both], CAR).model.estimated_v_y(both)
     parts = [exact.between(0.0, 8.0).v_y, exact.between(12.0, 19.9).v_y]
     away = told.v_y - np.concatenate(parts)
     assert np.degrees(np.sqrt(np.mean(away**2)) / 20.0) < 0.15
@@ -213,7 +213,7 @@ def test_starts_part_only_where_both_explain_the_drive(problem, monkeypatch, wor
 def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused):
     doubtful = replace(learnt, covariance=wider * learnt.covariance)
     log = blind(driven(9), seed=4)
-    shown = replace(log, v_y=doubtful.told_v_y(log).v_y, estimated=("v_y",))
+    shown = replace(log, v_y=doubtful.estimated_v_y(log).v_y, estimated=("v_y",))
     codes = [one.code for one in judge_prediction(doubtful, shown).findings]
     assert ("side_slip_unknown" in codes) == refused
 

@@ -55,7 +55,7 @@ def test_a_column_that_counts_rows_is_no_time(tmp_path, name):
         open_log(path).read(["vx"])
     log = open_log(path, rate=50.0)
     steps(log)
-    assert log.listed()[-1].rate == 50.0 and "time is even at 50 Hz, as is told" in log.notes
+    assert log.listed()[-1].rate == 50.0 and "time is even at 50 Hz, as given" in log.notes
     both = written(tmp_path / "both.csv", {name: COUNTED, "stamp": numbers(T)})
     steps(open_log(both))
 
