@@ -292,7 +292,8 @@ def cost_table(costs: Sequence[Cost], about: str) -> str:
     about : over what instructions and stack were measured, and what else is to be said.
     """
     if not costs:
-        return f"Not measured: {', '.join(missing_tools())} could not be found."
+        lacking = ", ".join(missing_tools())
+        return f"Not measured: {lacking} could not be found." if lacking else "Not measured."
     works = costs[0].replay.work > 0
     head = (
         f"| processor | precision | flash [B] | RAM: static + state + params{' + work' * works} [B]"

@@ -120,7 +120,7 @@ class Method(ABC):
 
     @property
     def needs_v_y(self) -> bool:
-        """Whether it learns nothing from a recording without a lateral velocity; else tells it."""
+        """Whether its step needs a measured lateral velocity; else its step estimates it."""
         return True
 
     @property

@@ -102,8 +102,9 @@ def fit(
         went_on(sum(len(one.signals) * one.dt for one in drives))
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
-        late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-        nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=late)
+        own = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+        nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=own)
+        late = max(late, own, key=abs)
         if nodes.counts.any():
             learnt = learn_latent(nodes, vehicle, beliefs)
             found, parted = learnt.posterior, max(parted, learnt.parted)

@@ -12,6 +12,7 @@ what is left of all of it, which is more on a real car than on a simulated one.
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -144,10 +145,12 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Prior
     information, moves = beliefs.information.copy(), beliefs.moves.copy()
     fixed = [INDEX[name] for name in ("ln_sway", *(() if v_y else OF_V_Y))]
     information[fixed], information[:, fixed], moves[fixed] = 0.0, 0.0, False
-    for name, sd in (("r_bias", GYRO / scale), ("ln_inertia", INERTIA)):
-        k = INDEX[name]
-        if not moves[k]:
-            information[k, k], moves[k] = sd**-2, True
+    mean, bias, inertia = beliefs.mean.copy(), INDEX["r_bias"], INDEX["ln_inertia"]
+    mean[INDEX["ln_sway"]] = 0.0  # as the sway that the nodes are given
+    information[bias], information[:, bias], mean[bias] = 0.0, 0.0, 0.0  # another in each log
+    information[bias, bias], moves[bias] = (GYRO / scale) ** -2, True
+    if not moves[inertia]:
+        information[inertia, inertia], moves[inertia] = INERTIA**-2, True
     felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
     whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
@@ -155,7 +158,7 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Prior
     far = np.full(len(felt), np.inf)
     return replace(
         beliefs,
-        mean=np.concatenate([beliefs.mean, [0.0, ROLL, 0.0, 0.0]]),
+        mean=np.concatenate([mean, [0.0, ROLL, 0.0, 0.0]]),
         low=np.concatenate([beliefs.low, -far]),
         high=np.concatenate([beliefs.high, far]),
         information=whole,
@@ -475,7 +478,7 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
     index = problem.index[problem.index < P]
     moved = problem.index < P
     away = (other[1] - best.p)[index]
-    covariance = _believed(beliefs)
+    covariance = beliefs.covariance
     covariance[np.ix_(index, index)] = best.P[np.ix_(moved, moved)] + share * (
         1.0 - share
     ) * np.outer(away, away)
@@ -513,9 +516,7 @@ def hardest(recording: Recording, seconds: float) -> slice:
     return slice(first, first + n)
 
 
-def lateness(
-    recording: Recording, vehicle: Vehicle, priors: Priors, columns: NDArray[np.intp] | None = None
-) -> float:
+def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     """Return by how much a_y is later than the yaw rate [s], where that is no small matter.
 
     It is the delay with which the minute of hardest cornering is explained best, by whole samples,
@@ -523,46 +524,30 @@ def lateness(
 
     Parameters
     ----------
-    priors, columns : as of `Latent`.
+    priors : as of `Latent`.
     """
     part = hardest(recording, ASKED)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
     smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
     piece = replace(recording, a_y=smooth)
-    found: dict[int, float] = {}
-    count = 1
+    count = max(Nodes.of(piece, vehicle, part).counts.sum(), 1)
 
+    @cache
     def cost(samples: int) -> float:
-        nonlocal count
-        if samples not in found:
-            nodes = Nodes.of(piece, vehicle, part, a_y_late=samples * dt)
-            problem, count = Latent(nodes, vehicle, priors, columns), max(nodes.counts.sum(), 1)
-            _, _, found[samples], _ = problem.descend(*problem.settled(), problem.R, FEW)
-        return found[samples]
+        problem = Latent(Nodes.of(piece, vehicle, part, a_y_late=samples * dt), vehicle, priors)
+        return problem.descend(*problem.settled(), problem.R, FEW)[2]
 
     h = max(round(DELAYS * scale / dt), 1)
-    while True:  # a coarse grid, and one between
-        near = min(found, key=cost) if found else 0
-        for k in range(-1, 5) if not found else (-1, 1):
-            cost(near + k * h)
-        near = min(found, key=cost)
-        if h == 1 or len(found) > 6:
-            break
-        h = max(h // 2, 1)
+    near = min((k * h for k in range(-1, 5)), key=cost)
+    if h > 1:  # and one between
+        h //= 2
+        near = min((near - h, near, near + h), key=cost)
     if cost(0) - cost(near) < GAINED * max(1.0, 2.0 * cost(near) / count / TRUST.usual):
         return 0.0
     before, at, after = (cost(near + k * h) for k in (-1, 0, 1))
     bend = before - 2.0 * at + after
     off = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
     return dt * (near + h * float(np.clip(off, -0.5, 0.5)))
-
-
-def _believed(beliefs: Priors) -> Array:
-    """Return the covariance of what is believed, (p, p): of what a log does not tell."""
-    covariance = np.zeros_like(beliefs.information)
-    some = np.ix_(beliefs.moves, beliefs.moves)
-    covariance[some] = np.linalg.inv(beliefs.information[some])
-    return covariance
 
 
 def estimate_v_y(
@@ -588,7 +573,7 @@ def estimate_v_y(
         np.zeros(len(recording), dtype=bool),
         np.zeros(len(recording)),
     )
-    late = lateness(recording, vehicle, held, columns)
+    late = lateness(recording, vehicle, held)
     for outer, inner in _blocks(recording):
         nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
         if not nodes.counts.any():

@@ -30,7 +30,9 @@ PORTS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitMethod(Method):
-    """Maximum a posteriori of tires, body and sensors over a whole log (`estimate.solve`).
+    """Maximum a posteriori of tires, body and sensors over a whole log.
+
+    By `estimate.solve`, without a v_y by `estimate.latent`.
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ class FitMethod(Method):
 
     @property
     def tells_v_y(self) -> bool:
-        """Whether it tells the lateral velocity of a recording without one: it does."""
+        """Whether it estimates the lateral velocity of a log without one: of a whole log."""
         return True
 
     @property

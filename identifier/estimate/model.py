@@ -302,11 +302,16 @@ class FittedModel(TireModel):
         RecordingError
             Where there is no a_y either.
         """
-        for r, p, found in _LAST:
-            if r is recording.r and p is self.p:
+        log = recording
+        key = (
+            *(log.t, log.v_x, log.r, log.a_y, log.a_x, log.delta_f, log.delta_r),
+            *(self.p, self.covariance, self.vehicle),
+        )
+        for known, found in _LAST:
+            if all(one is other for one, other in zip(known, key, strict=True)):
                 return found
         found = estimate_v_y(recording, self.vehicle, self.p, self.covariance)
-        _LAST.append((recording.r, self.p, found))
+        _LAST.append((key, found))
         return found
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
@@ -602,10 +607,9 @@ class FittedModel(TireModel):
         given = self.vehicle.bicycle[4:]
         zero = np.zeros((1, 2))
         stiff = [sd[0] / SMALL for sd in self._curve_sd(np.full((1, 2), SMALL))]
-        peak = np.tile(np.maximum(self.known_slip, 1e-3), (1, 1))
-        top, _, _ = self.curve_at(peak)
+        peak = np.maximum(self.known_slip, 1e-3)[None]
+        top, at_known, _ = self.curve_at(peak)
         _, at_zero, _ = self.curve_at(zero)
-        _, at_known, _ = self.curve_at(peak)
         wide = self._curve_sd(peak)
         listed = []
         for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
@@ -855,7 +859,7 @@ class FittedModel(TireModel):
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
-_LAST: deque[tuple[Array, Array, LateralVelocity]] = deque(maxlen=4)
+_LAST: deque[tuple[tuple[Any, ...], LateralVelocity]] = deque(maxlen=4)
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 
 

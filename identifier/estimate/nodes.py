@@ -167,11 +167,10 @@ def low_passed(signal: Array, hertz: float, dt: float) -> Array:
 
 def _rolled(a: Array, omega: float, dt: float) -> tuple[Array, Array]:
     """Return ρ and ρ' of a body that sways under lateral accelerations, (n,), implicit in ρ'."""
-    rho, rate, stiff = float(a[0]), 0.0, dt * omega**2
+    from scipy.signal import lfilter, lfiltic  # takes long to import
+
+    stiff = dt * omega**2
     eased = 1.0 + 2.0 * DAMPING * omega * dt + dt * stiff
-    found = np.empty((len(a), 2))
-    for k, one in enumerate(a.tolist()):
-        rate = (rate + stiff * (one - rho)) / eased
-        rho += dt * rate
-        found[k] = rho, rate
-    return found[:, 0], found[:, 1]
+    b, c = [dt * stiff], [eased, dt * stiff - eased - 1.0, 1.0]
+    rho, _ = lfilter(b, c, a, zi=lfiltic(b, c, [a[0], a[0]]))
+    return rho, np.diff(rho, prepend=a[0]) / dt

@@ -111,10 +111,15 @@ class _Grid:
         end = min((float(t[-1]) for t in there), default=0.0)
         count = int(max(min((end - begin) / STEP, MOST), 0.0))
         self.t = begin + STEP * np.arange(count)
-        self._seen = seen
+        self._seen, self._means = seen, dict[str, Array]()
 
     def __getitem__(self, name: str) -> Array:
         """Return a channel at the instants, (n,); means over `WINDOW`."""
+        if name not in self._means:
+            self._means[name] = self._mean(name)
+        return self._means[name]
+
+    def _mean(self, name: str) -> Array:
         channel = self._seen[name]
         good = np.isfinite(channel.values)
         t, values = channel.t[good], channel.values[good]
@@ -153,7 +158,8 @@ def along_axes(
     speed, yaw_rate, lateral, steering : channels of the forward speed, r, a_y and δ by their names;
         but for the speed in no triad; "" where there is none.
     """
-    usable = [one for one in found if all(name in seen for name in one.names.values())]
+    there = {name for name, one in seen.items() if np.isfinite(one.values).sum() > 1}
+    usable = [one for one in found if there.issuperset(one.names.values())]
     asked = [name for one in usable for name in one.names.values()]
     named = [one for one in (speed, yaw_rate, lateral, steering) if one]
     grid = _Grid(seen, [*asked, *named])

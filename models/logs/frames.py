@@ -246,7 +246,7 @@ _COLUMNS = {  # of tables of frames, by what each is
     "id": "id addr address messageid arbitrationid canid identifier",
     "bus": "bus channel interface",
     "long": "extended ext ide isextended",
-    "data": "data message payload d1 d0",
+    "data": "data message payload d0 d1",
 }
 
 

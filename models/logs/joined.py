@@ -10,7 +10,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.log import Listed, LogFile, RecordingError, some
-from models.logs.stamps import find_clock, in_seconds, typical_rate
+from models.logs.stamps import find_clock, in_seconds, require_times, typical_rate
 from models.logs.table import Kind, Table, TableLog, kind_of
 from models.schema import require_few
 
@@ -36,9 +36,10 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
             f"{path}: is a folder of logs with the same channels, drives and no messages of one; "
             f"name them: {some([one.name for one in logs])}"
         )
-    zero = min((_start(log) for log in logs.values()), default=0.0)
+    starts = {file: _start(log) for file, log in logs.items()}
+    zero = min(starts.values(), default=0.0)
     found = [
-        (file.stem, one, (log, one.name, _start(log) - zero))
+        (file.stem, one, (log, one.name, starts[file] - zero))
         for file, log in logs.items()
         for one in log.listed()
     ]
@@ -91,10 +92,14 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
     cells = table.cells(kinds)
     require_few(RecordingError, str(table.path), len(cells.words[name].names), "columns", "names")
-    t = in_seconds(clock, cells.columns[clock.column])
+    stamps, codes = cells.columns[clock.column], cells.words[name].codes
+    require_times(str(table.path), clock, stamps, cells.rows, table.place)
+    t = in_seconds(clock, stamps)
+    order = np.argsort(codes, kind="stable")
+    edges = np.searchsorted(codes[order], np.arange(len(cells.words[name].names) + 1))
     found = []
     for k, word in enumerate(cells.words[name].names):
-        rows = np.flatnonzero(cells.words[name].codes == k)
+        rows = order[edges[k] : edges[k + 1]]
         rate = typical_rate(t[rows])
         listed = Listed(name=word, unit=units.get(word, ""), samples=rows.size, rate=rate)
         found.append(("", listed, rows))

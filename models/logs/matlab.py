@@ -18,7 +18,7 @@ from models.logs.units import PER_SECOND
 
 REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
-    "save('log.mat', '-struct', 's'); or --rate HZ tells the samples per second"
+    "save('log.mat', '-struct', 's'); or --rate HZ gives the samples per second"
 )
 
 

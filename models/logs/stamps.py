@@ -138,7 +138,7 @@ def no_clock(
     if way and not counted:
         return f"no column is a time: {shown(way[0])} is a distance; export the log over time"
     counts = f", {shown(counted[0])} counts samples" if counted else ""
-    told = "--rate HZ tells the samples per second, or --columns t=COLUMN the time"
+    told = "--rate HZ gives the samples per second, or --columns t=COLUMN the time"
     return f"no column is a time that rises{counts}; {told}"
 
 
@@ -414,6 +414,23 @@ def _of_day(text: str) -> int | None:
 
 
 @np.errstate(all="ignore")  # of numbers that are no times
+def require_times(
+    label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
+) -> None:
+    """Refuse a row without a time.
+
+    Parameters
+    ----------
+    values, rows : as of `seconds`, (n,) each.
+    """
+    missing = _first(values, lambda part: part == MISSING if part.dtype.kind == "i" else
+                     ~np.isfinite(part))  # fmt: skip
+    if missing is not None:
+        raise RecordingError(
+            f"{label}: {clock.name} must be a time in every row, {place} {rows[missing]} has none"
+        )
+
+
 def seconds(
     label: str,
     clock: Clock,
@@ -439,12 +456,7 @@ def seconds(
     """
     if values.size == 0:
         return Stamps(np.empty(0), ())
-    missing = _first(values, lambda part: part == MISSING if part.dtype.kind == "i" else
-                     ~np.isfinite(part))  # fmt: skip
-    if missing is not None:
-        raise RecordingError(
-            f"{label}: {clock.name} must be a time in every row, {place} {rows[missing]} has none"
-        )
+    require_times(label, clock, values, rows, place)
     t = in_seconds(clock, values)
     fall = _first_step(t, lambda step: step < 0.0)
     if fall is not None and clock.unit in ("instant", "hhmmss"):

@@ -282,7 +282,8 @@ class TableLog:
     @cached_property
     def start(self) -> float:
         """The instant that times of the calendar count from [s]; 0 of others."""
-        head = [] if self.clock is None else self.table.first_rows(self.clock.column)
+        rows = [] if self.clock is None else self.table.first_rows(self.clock.column)
+        head = [one for one in rows if one.strip()]
         return started(self.clock, head[0]) if self.clock and head else 0.0
 
     @cached_property

@@ -121,8 +121,9 @@ def recording_of(
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
         stretches = stretches._replace(kept=kept)
-    own = "vx is taken from" if posed else "\0"  # which the pose tells
-    notes = (*_notes(log), *(note for note in reading.notes if not note.startswith(own)))
+    of_pose = {column_of(name) for name, one in signals.items() if one.channel == ("pose",)}
+    kept = (one for one in reading.notes if one.partition(" is taken from ")[0] not in of_pose)
+    notes = (*_notes(log), *kept)
     notes += _hole_notes(parts)
     notes += _gap_notes(stretches.kept)
     notes += tuple(note for note in (*posed, learnt, rolls, spared) if note)

@@ -143,8 +143,8 @@ def world_axes(recording: Recording) -> str | None:
     if found is None:
         return None
     course, r = found
-    turning = np.abs(r) > 0.2 * np.percentile(np.abs(r), 99)
-    course, r = course[turning], r[turning]
+    turns = np.abs(r) > 0.2 * np.percentile(np.abs(r), 99)
+    course, r = course[turns], r[turns]
     if r.size * WINDOW < 2.0 or not float(np.sqrt(np.mean(r**2))) > 0.01:
         return None
     slope = float(course @ r) / float(r @ r)
@@ -230,6 +230,8 @@ def _check_lateral_acceleration(w: Means) -> str | None:
         return None
     X = _kinematics(w)
     some = turning(w.v_x_r, w.a_y)
+    if not some.any():
+        return None
     moved, felt = w.v_x_r[some], w.a_y[some]
     mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(moved))
     alike = correlation(felt - np.mean(felt), moved - np.mean(moved)) > SURE_PAIR

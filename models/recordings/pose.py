@@ -22,6 +22,7 @@ from models.logs.signals import POSE, Signal
 NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
 SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
 FEWEST = 30  # samples of a piece that is differentiated
+STANDS = 0.05  # [m/s], a pose that never goes faster does not move
 MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
 ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
 ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
@@ -60,8 +61,12 @@ def with_pose(
             "vy is not in it; tell the pose of another sensor, or leave it out"
         )
     found = {name: raws for name, raws in parts.items() if name not in POSE}
-    said = [motion.said]
     gyro = parts["r"][0] if "r" in parts else None
+    slow = typical_step(motion.r.t) > SLOW
+    of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
+    of_pose |= {} if slow and gyro is not None else {"r": motion.r}
+    what = "vx, vy and r" if "r" in of_pose else "vx and vy"
+    said = [f"{what} are taken from the pose{motion.said}"]
     late = None if gyro is None else lateness(gyro, motion.r)
     if gyro is not None and late is not None and abs(late) > LATE:
         box = [name for name in ("r", "a_y", "a_x") if name in found]
@@ -72,9 +77,6 @@ def with_pose(
         said.append(
             f"the gyro is {1e3 * abs(late):.0f} ms {side} the pose: {words} are moved by it"
         )
-    slow = typical_step(motion.r.t) > SLOW
-    of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
-    of_pose |= {} if slow and gyro is not None else {"r": motion.r}
     found |= {name: [raw] for name, raw in of_pose.items()}
     kept = {name: one for name, one in signals.items() if name in found}
     kept |= {name: Signal(channel=("pose",)) for name in of_pose}
@@ -104,7 +106,7 @@ def _of_quaternion(label: str, parts: Sequence[Raw]) -> Raw:
 
 
 class Motion(NamedTuple):
-    """What a pose tells: v_x, v_y [m/s] and r [rad/s] on its clock, and a sentence of it."""
+    """v_x, v_y [m/s] and r [rad/s] of a pose on its clock, and how it was read, in words."""
 
     v_x: Raw
     v_y: Raw
@@ -155,8 +157,8 @@ def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
     v_x, v_y, r = (Raw(clock, np.concatenate(one), x.place, rows) for one in columns)
     noise = [float(np.median([piece.noise[k] for piece in pieces])) for k in (0, 1)]
     said = (
-        f"vx, vy and a yaw rate are taken from the pose{turned}; its position scatters by "
-        f"{noise[0]:.2g} m, its heading by {math.degrees(noise[1]):.2g} deg"
+        f"{turned}; its position scatters by {noise[0]:.2g} m, its heading by "
+        f"{math.degrees(noise[1]):.2g} deg"
     )
     return Motion(v_x, v_y, r, said)
 
@@ -225,7 +227,10 @@ def smoothed(z: Array) -> Smooth:
 def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     """Return the headings, counted from x to y in rad, and what was done to them in words."""
     speeds = [np.hypot(*piece.rates.T) for piece in pieces]
-    fast = MOVES * max(float(speed.max()) for speed in speeds)
+    most = max(float(speed.max()) for speed in speeds)
+    if not most > STANDS:
+        raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
+    fast = MOVES * most
     moving = [(piece, speed > fast) for piece, speed in zip(pieces, speeds, strict=True)]
     travel = np.concatenate([np.arctan2(p.rates[m, 1], p.rates[m, 0]) for p, m in moving])
     heading = np.concatenate([p.heading[m] for p, m in moving])
@@ -233,7 +238,7 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     means = [np.mean(np.exp(1j * (travel - sign * unit * heading))) for sign, unit in ways]
     best = int(np.argmax(np.abs(means) > max(np.abs(means)) - 0.02))
     (sign, unit), mean = ways[best], means[best]
-    if abs(mean) < ALONG_ALL:
+    if not abs(mean) >= ALONG_ALL:
         raise RecordingError(
             f"{label}: the heading must go along with the direction of travel of x and y, it does "
             "not: another channel, or other axes?"

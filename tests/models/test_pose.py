@@ -9,9 +9,10 @@ from models.logs.clock import Raw
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.names import propose
+from models.logs.signals import Signal
 from models.recordings import LogMap, read_recording
 from models.recordings.map import told_signals
-from models.recordings.pose import lateness, motion_of, smoothed
+from models.recordings.pose import lateness, motion_of, smoothed, with_pose
 
 T = 0.01 * np.arange(3000)
 V_X = 2.0 + 0.5 * np.sin(0.5 * T)
@@ -249,3 +250,21 @@ def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
     found = read_recording(write(tmp_path / "bag", store, topics))
     assert any("80 ms late" in note for note in found.notes), found.notes
     judge(found)
+
+
+@pytest.mark.parametrize("place", [0.0, 12.3])
+def test_a_pose_that_stands_is_refused(place):
+    still = np.full(T.size, place)
+    with pytest.raises(RecordingError, match="the pose must move"):
+        motion_of("log", posed(x=still, y=still))
+
+
+def test_notes_of_a_pose_name_what_is_taken_from_it(tmp_path):
+    """A yaw rate of the box stays where the pose comes seldom, and is the pose's else."""
+    for every, words in ((1, "vx, vy and r are taken"), (20, "vx and vy are taken")):
+        some = slice(None, None, every)
+        parts = {**posed(X[some], Y[some], PSI[some], T[some]), "r": [raw(np.gradient(PSI, T))]}
+        given = {name: Signal(channel=(name,)) for name in parts}
+        parts = {k: one if isinstance(one, list) else [one] for k, one in parts.items()}
+        _, _, said = with_pose("log", given, parts)
+        assert said[0].startswith(words), said

@@ -499,3 +499,9 @@ def test_velocities_of_the_world_are_named(axes: str, peak: float) -> None:
         made = replace(made, r=-made.r, delta_f=-made.delta_f)
     world = replace(made, v_x=velocity.real, v_y=velocity.imag, a_y=None, axle_force=None)
     assert "of the world's axes" in refusal(world)
+
+
+def test_a_log_without_any_motion_sideways_is_judged_without_a_warning() -> None:
+    made, nothing = drive(peak=0.0), np.zeros(1200)
+    names = ("v_y", "r", "delta_f", "a_y")
+    check_physics(replace(made, axle_force=None, **dict.fromkeys(names, nothing)))

@@ -405,6 +405,7 @@ def test_a_log_without_v_y_is_learnt_and_has_the_date_of_its_file(garage, monkey
     other, row = Store("s").rows()
     assert (other.estimated_v_y, row.estimated_v_y) == (False, True)
     assert None not in (other.valid, row.valid) and not row.error
+    assert len(row.part_begin) == len(other.part_begin) == 1  # to be merged, both
     assert row.model == alone.model
     assert (row.date, row.vehicle, row.tires) == ("2023-11-14T22:13:20+00:00", sedan().name, "")
 

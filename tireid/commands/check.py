@@ -40,7 +40,7 @@ from tireid.commands.certificate_table import (
     method_text,
     unit_text,
 )
-from tireid.commands.demo_story import SLALOM, drives
+from tireid.commands.demo_story import drive_to_learn
 from tireid.figures.paper import error_figure, locus_figure
 from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
@@ -251,7 +251,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
             _write_certificate(folder, text, numbers)
-            learnt = drive or drives({"slalom": SLALOM})["slalom"]
+            learnt = drive or drive_to_learn()
             operation = design.operation(vehicle, driving)
             draw_check(folder, learnt, vehicle, design, operation, certificate)
         if options.tune is not None:

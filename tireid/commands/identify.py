@@ -123,18 +123,20 @@ def run(options: argparse.Namespace) -> int:
     logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
+    recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        beside = beside or usual(joined(logs)) != DEFAULT
+        beside = beside or usual(recording) != DEFAULT
         law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True, online=beside)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):
         check_recording(one, design)
     say("the doctor looks at the log")
-    diagnosis = diagnose(joined(logs), vehicle)
+    diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
     if repair:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
+        recording = joined(logs)
         vehicle = repair.on(vehicle)
         law, design = shared.chosen_method(
             options, vehicle, seed, without_v_y=without_v_y, online=beside
@@ -143,7 +145,6 @@ def run(options: argparse.Namespace) -> int:
         for one in (*logs, *others):
             check_physics(one)
             check_against_vehicle(one, vehicle)
-    recording = joined(logs)
     network = shared.network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
@@ -272,8 +273,8 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     if not learnt.online:
         return reach
     return (
-        f"{reach}\ncertificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets "
-        "and covariance stay in their boxes by construction (summary.json lists them)"
+        f"{reach}\ncertificate: {certificate.verdict}; parameter limits: enforced (listed in "
+        "summary.json)"
     )
 
 

@@ -32,6 +32,7 @@ from codegen.compiler import CompilationError
 from identifier.compare.work import Map, fresh_processes
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
+from identifier.estimate.priors import Priors
 from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
@@ -111,9 +112,10 @@ class Telling:
 
         Files count by what they hold, not by their names.
         """
-        dbc = self.log_map.dbc
+        dbc, beliefs = self.log_map.dbc, Priors.of(vehicle)
         parts = (
             vehicle,
+            (beliefs.mean.tobytes(), beliefs.information.tobytes()),
             InertialIdentifier.for_vehicle(vehicle, dt=DT),
             replace(self.log_map, dbc=""),
             Path(dbc).read_bytes() if dbc else b"",
@@ -344,7 +346,8 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
         inertial = InertialIdentifier.for_vehicle(vehicle, dt=recording.dt)
         recording = identify(recording, vehicle, inertial, start).recording
     priors = start.as_prior(vehicle) if isinstance(start, FittedModel) else None
-    model, _, parts = fit([recording], vehicle, priors, block=telling.part, coarse=True)
+    measured = replace(recording, estimated=())  # an estimated v_y is fitted as one of a sensor
+    model, _, parts = fit([measured], vehicle, priors, block=telling.part, coarse=True)
     return replace(
         row,
         **conditions(recording),

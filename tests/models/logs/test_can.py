@@ -369,11 +369,15 @@ TEXTS = {
     "SavvyCAN": lambda t, i, d: (
         f"{t * 1e6:.0f},{i:08X},true,Rx,0,{len(d)},{','.join(d.hex(' ').upper().split())},,,,,"
     ),
+    "bytes from 0": lambda t, i, d: (
+        f"{t:.4f},{i:#x},{len(d)},{','.join([*d.hex(' ').split(), *(8 - len(d)) * ['']])}"
+    ),
     "cabana": lambda t, i, d: f"{t:.4f},{i:#x},0,0x{d.hex()}",
     "cabana, decimal": lambda t, i, d: f"{t:.4f},{i},0,{d.hex()}",
 }
 HEADERS = {
     "SavvyCAN": "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n",
+    "bytes from 0": "Time,ID,DLC,D0,D1,D2,D3,D4,D5,D6,D7\n",
     "cabana": "time,addr,bus,data\n",
     "cabana, decimal": "time,addr,bus,data\n",
 }

@@ -76,6 +76,18 @@ def test_a_table_with_a_row_for_each_value_has_a_channel_for_each_name(tmp_path,
     np.testing.assert_allclose(read_recording(path).v_x, SIGNALS["vx"], atol=1e-4)
 
 
+def test_a_row_of_a_long_table_without_a_time_is_named(tmp_path):
+    path = tmp_path / "log.csv"
+    stamps = [at(t).isoformat(timespec="milliseconds") for t in T for _ in SIGNALS]
+    stamps[10] = ""
+    names = list(SIGNALS) * T.size
+    values = [SIGNALS[one][k] for k in range(T.size) for one in SIGNALS]
+    table(path, ("time", "name", "value"), stamps, names, values)
+    with pytest.raises(RecordingError, match="must be a time in every row, line 12 has none"):
+        log = open_log(path)
+        log.read([one.name for one in log.listed()])
+
+
 def test_units_of_a_long_table_stand_beside_its_names(tmp_path):
     path = tmp_path / "log.csv"
     told = {"Gyro Z": "deg/s", "Speed": "km/h"}

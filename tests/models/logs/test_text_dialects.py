@@ -280,7 +280,7 @@ WRONG = {
         plain().encode() * 3000 + b"1,2,\0,4,5\n",
         "is a binary file or damaged (it has NUL bytes in line 363001); a log is text",
     ),
-    "no time": ("a,b\n" + "1,2\n" * 20, "no column is a time that rises; --rate HZ tells"),
+    "no time": ("a,b\n" + "1,2\n" * 20, "no column is a time that rises; --rate HZ gives"),
     "an empty time": (
         plain().replace("\n0.030,", "\n,", 1),
         "Time [s] must be a time in every row, line 5 has none",

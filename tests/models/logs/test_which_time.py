@@ -112,6 +112,7 @@ def test_months_may_be_words_and_hours_those_of_a_watch(tmp_path, form):
 def test_dates_with_words_are_those_without():
     told = nanoseconds("2025-03-04 18:10:23.050")
     assert nanoseconds("4. Mär. 2025 18:10:23,050") == told
+    assert nanoseconds("4 juillet 2025 18:10:23") == nanoseconds("2025-07-04 18:10:23")
     assert nanoseconds("Tue Mar 4 2025 6:10:23.05 PM") == told
     assert nanoseconds("4 mars 2025 18:10:23.05") == told
     for text in ("4. Xyz 2025", "Mar 41, 2025", "13:10:00 PM", "March", "-", "Mon"):
