@@ -60,7 +60,7 @@ class Run:
         CannotFreezeError
             Where the method estimates a signal, not a model.
         """
-        return calibrated(self.history)
+        return calibrated(self.history, verdict=self.verdict if self.method.whole else None)
 
     def freeze(self, t: float | None = None) -> TireModel:
         """Return what was learnt until a time; its band is not calibrated.

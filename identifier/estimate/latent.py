@@ -130,7 +130,6 @@ class Smoothed:
     own: Array
     P: Array
     slopes: Array
-    iterations: int
 
 
 def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Priors:
@@ -331,18 +330,16 @@ class Latent:
         """Return states and parameters near an optimum, where parameters do not run away."""
         firm = copy(self)
         firm.priors = replace(self.priors, information=FIRM * self.priors.information)
-        z, p, _, _ = firm.descend(*self.begin(stiffer), self.R, FEW)
+        z, p, _ = firm.descend(*self.begin(stiffer), self.R, FEW)
         return z, p
 
-    def descend(
-        self, z: Array, p: Array, R: Array, most: int = 25
-    ) -> tuple[Array, Array, float, int]:
-        """Return states, parameters, cost and the number of iterations at an optimum."""
-        damping, v_x, total, cost = 1e-4, self.nodes.given[:, 0], 0, np.inf
+    def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float]:
+        """Return states, parameters and cost at an optimum."""
+        damping, v_x, cost = 1e-4, self.nodes.given[:, 0], np.inf
         index = self.index[self.free]
         sd = np.diag(self.priors.information)[index] ** -0.5
         low, high = self.priors.low[index], self.priors.high[index]
-        for total in range(1, most + 1):  # noqa: B007
+        for _ in range(most):
             weights = self.weights(z, p, R)
             cost = self.cost(z, p, weights)
             at, _ = self.around(z, p, weights)
@@ -371,7 +368,7 @@ class Latent:
             damping = max(damping / 6.0, 1e-9)
             if (moved < 3e-4 and turned < 0.05) or gained < 0.02:
                 break
-        return z, p, cost, total
+        return z, p, cost
 
     def spread(self, z: Array, p: Array, R: Array) -> tuple[Array, Array, Array, Array]:
         """Return covariance of states alone (n, 8, 8), of parameters that move, dz/dp of v_y
@@ -429,16 +426,16 @@ class Latent:
         ----------
         R : to begin with (3,); None takes that of good sensors.
         """
-        R, total = self.R if R is None else R, 0
+        R = self.R if R is None else R
         for _ in range(rounds):
-            z, p, _, count = self.descend(z, p, R, FEW)
+            z, p, _ = self.descend(z, p, R, FEW)
             own, _, _, shows = self.spread(z, p, R)
-            R, total = self.noise(z, p, own, shows, R), total + count
-        z, p, cost, count = self.descend(z, p, R)
+            R = self.noise(z, p, own, shows, R)
+        z, p, cost = self.descend(z, p, R)
         own, P, slopes, _ = self.spread(z, p, R)
         left = 2.0 * self.misfit(z, p, self.weights(z, p, R)) / max(self.nodes.counts.sum(), 1)
         wider = max(1.0, left / self.trust.usual)
-        return Smoothed(z, p, cost, R, wider * own, wider * P, slopes, total + count)
+        return Smoothed(z, p, cost, R, wider * own, wider * P, slopes)
 
 
 class Learnt(NamedTuple):
@@ -466,7 +463,7 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
     """
     problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, v_y))
     first = problem.smoothed(*problem.settled(STARTS[0]))
-    z, p, cost, _ = problem.descend(*problem.settled(STARTS[1]), first.R)
+    z, p, cost = problem.descend(*problem.settled(STARTS[1]), first.R)
     best, other = first, (z, p, cost)
     if cost < first.cost:
         best, other = problem.smoothed(z, p, first.R, 0), (first.z, first.p, first.cost)
@@ -495,7 +492,6 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
             scale=np.ones(2),
             memory=np.full(2, TRUST.error_time),
             cost=best.cost,
-            iterations=best.iterations,
         ),
         nodes,
         best.z,

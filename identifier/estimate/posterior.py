@@ -37,7 +37,6 @@ class Posterior:
     scale: Array
     memory: Array
     cost: float
-    iterations: int
 
     def __getitem__(self, name: str) -> float:
         return float(self.p[INDEX[name]])

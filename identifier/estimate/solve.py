@@ -371,7 +371,7 @@ def descend(
     low, high = priors.low[index], priors.high[index]
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     now = problem.residuals(p)
-    T, count = problem.memory(now.e) if memory is None else memory, 0
+    T = problem.memory(now.e) if memory is None else memory
     for count in range(1, iterations + 1):
         S2 = problem.scale(now.e)
         T = np.sqrt(T * problem.memory(now.e)) if count > 1 and memory is None else T
@@ -417,7 +417,6 @@ def descend(
         scale=np.sqrt(S2),
         memory=T,
         cost=cost,
-        iterations=count,
     )
 
 

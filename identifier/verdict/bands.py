@@ -33,6 +33,7 @@ from identifier.tire_model import TireModel
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import Evidence, Windows, evidence, modelled_force
 from identifier.verdict.parts import asked_run, taught_elsewhere
+from identifier.verdict.verdict import Verdict
 from models.recordings import Recording
 from models.recordings.portion import portion
 
@@ -79,7 +80,9 @@ class Missed(NamedTuple):
     within: NDArray[np.intp]
 
 
-def calibrated(history: History, t: float | None = None) -> TireModel:
+def calibrated(
+    history: History, t: float | None = None, verdict: Verdict | None = None
+) -> TireModel:
     """Return the model frozen at a time, its band calibrated; as frozen where that cannot be done.
 
     It cannot where the model has no band, or too little is driven.
@@ -87,6 +90,7 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     Parameters
     ----------
     t : time of the freeze in the recording's own clock [s]; None is the end.
+    verdict : what `judge` said of that time; None asks it where it is needed.
 
     Raises
     ------
@@ -98,7 +102,7 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
         Where the recording begins after that time.
     """
     if history.design.whole:
-        share = judge(history, t).force_missed
+        share = (verdict or judge(history, t)).force_missed
         return history.freeze(t).with_calibration(None, None if share is None else np.array(share))
     run = asked_run(history, t)
     model, recording = run.model, run.portion.recording

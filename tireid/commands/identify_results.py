@@ -162,7 +162,7 @@ def write_results(
     bound : of the guaranteed band of the last freeze; None asks for none.
     progress : told how far it is; None tells nobody.
     """
-    tire = calibrated(learnt, max(frozen))
+    tire = calibrated(learnt, max(frozen), verdict)
     if bound is not None:
         tire = guaranteed(learnt, bound.told, max(frozen), tire)
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}

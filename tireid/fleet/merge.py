@@ -334,10 +334,11 @@ def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
     listed = [_of_size(one) for one in cars]
     m0, S0 = (np.mean([one[k] for one in listed], axis=0) for k in (0, 1))
     m, T, V = m0, S0, len(listed)
+    held = np.linalg.inv(S0)
+    matrices, vectors = (np.array([one[k] for one in listed]) for k in (2, 3))
     for _ in range(PASSES):
-        between, held = np.linalg.inv(T), np.linalg.inv(S0)
-        P = np.linalg.inv(between + np.array([matrix for _, _, matrix, _ in listed]))
-        vectors = np.array([vector for *_, vector in listed])
+        between = np.linalg.inv(T)
+        P = np.linalg.inv(between + matrices)
         means = np.einsum("vij,vj->vi", P, between @ m + vectors)
         M = np.linalg.inv(V * between + held)
         m = M @ (between @ means.sum(axis=0) + held @ m0)

@@ -204,7 +204,7 @@ def test_starts_part_only_where_both_explain_the_drive(problem, monkeypatch, wor
     moved[:, 0] += 0.5
     monkeypatch.setattr(Latent, "settled", lambda self, stiffer=0.0: (z, p))
     monkeypatch.setattr(Latent, "smoothed", lambda self, *given: best)
-    monkeypatch.setattr(Latent, "descend", lambda *given: (moved, p, best.cost + worse, 1))
+    monkeypatch.setattr(Latent, "descend", lambda *given: (moved, p, best.cost + worse))
     found = learn_latent(problem.nodes, CAR, Priors.of(CAR))
     assert (found.parted > TRUST.parted) == parted
 
