@@ -613,16 +613,17 @@ def _fill(
 
     firsts = np.flatnonzero(nodes.begins)
     lasts = np.flatnonzero(nodes.counts & ~nodes.goes)
-    half = 0.5 * nodes.dt
+    beyond = 1.5 * nodes.dt  # half a node, and what is left of a stretch that makes none
     for first, last in zip(firsts, lasts, strict=True):
         if last - first < 3:
             continue
         run = slice(first, last + 1)
         t = nodes.t[run]
-        a, b = np.searchsorted(recording.t, [t[0] - half, t[-1] + half])
+        a, b = np.searchsorted(recording.t, [t[0] - beyond, t[-1] + beyond])
         some = slice(max(int(a), inner.start), min(int(b), inner.stop))
         at = np.clip(recording.t[some], t[0], t[-1])
-        found_v_y.v_y[some] = CubicSpline(t, v_y[run])(at)
+        spline = CubicSpline(t, v_y[run])
+        found_v_y.v_y[some] = spline(at) + spline(at, 1) * (recording.t[some] - at)
         found_v_y.sd[some] = np.interp(at, t, sd[run])
         found_v_y.beside[some] = np.interp(at, t, beside[run])
         found_v_y.observable[some] = found_v_y.sd[some] < TRUST.observable * recording.v_x[some]

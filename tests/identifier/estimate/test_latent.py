@@ -154,6 +154,15 @@ def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
     assert told.observable.mean() > 0.9
 
 
+@pytest.mark.parametrize("less", range(1, 5))
+def test_the_estimated_side_slip_goes_on_to_the_last_sample(learnt, exact, less):
+    """Whatever is left of the log behind the last node."""
+    log = exact.between(10.0, 22.0 - less * exact.dt)
+    found = learnt.estimated_v_y(blind(log)).v_y
+    for end in (slice(0, 8), slice(-8, None)):
+        assert np.abs(np.diff(found[end])).max() < 0.1, found[end]
+
+
 def test_what_the_accelerometer_shows_beside_tires_is_found(learnt, exact):
     told = learnt.estimated_v_y(blind(exact))
     assert told.beside.mean() == pytest.approx(0.05 / 9.81, abs=0.004)
