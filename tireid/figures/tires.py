@@ -127,7 +127,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
             facecolor=(style.SKY, 0.6),
             edgecolor=style.BLUE,
             linewidth=0.4,
-            zorder=3,
+            zorder=1.5,  # under the points, which it would make grey
             label=BAND,
         )
     for side in model.guaranteed_band(slip) or ():
