@@ -461,7 +461,7 @@ class Search:
             group=real * likely[1],
             text=text,
             repair=repair,
-            sure=sure and repair is not None,
+            sure=sure and repair is not None and suspect.possible(size, vehicle),
             note=suspect.code in NOTES,
         )
 

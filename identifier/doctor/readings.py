@@ -22,7 +22,8 @@ from identifier.doctor.consistency import (
 )
 from models.vehicle import GRAVITY, Vehicle
 
-DEGREE, KMH, MPH, MILLI = math.pi / 180.0, 1.0 / 3.6, 0.44704, 1e-3
+DEGREE, MILLI = math.pi / 180.0, 1e-3
+KMH, MPH, KNOT = 1.0 / 3.6, 0.44704, 1852.0 / 3600.0
 GAIN = 1.1  # that a change must earn: less than it is left by a third in a sum of logarithms
 FREEDOM = 0.5  # that a change must earn beside, whose factor is free
 ARM = "velocity_sensor_x"  # a size and no gross fault, tried beside: it may explain a log as well
@@ -42,7 +43,7 @@ ALIKE = math.log(1.15)  # factors that say the same
 STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
-PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
+PRICES = {"mph": 0.3, "knots": 0.3, "mm/s": 0.3}  # of units that few loggers use
 ALONE, UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle in deg
 
 
@@ -110,7 +111,7 @@ def _sign(*channels: str) -> Change:
     return _changed("sign", "", -1.0, *channels)
 
 
-SPEEDS = {"km/h": KMH, "mph": MPH, "mm/s": MILLI}
+SPEEDS = {"km/h": KMH, "mph": MPH, "knots": KNOT, "mm/s": MILLI}
 CHANGES = (
     *(_unit(unit, factor, "v_x", "v_y") for unit, factor in SPEEDS.items()),
     *(_unit(unit, factor, "v_x") for unit, factor in SPEEDS.items()),

@@ -17,6 +17,7 @@ SEDAN = 2.7  # m, wheelbase of whose size the numbers are
 DEGREES = math.degrees(1.0)  # in a rad
 INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
 SMALL, SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
+OVERHANG = 0.5  # wheelbases that a car, and what is mounted to it, reach beyond its axles
 CENTER = (0.25, 0.75)  # l_f over the wheelbase: a load that an axle of a car can have
 OPPOSITES = {  # of what a size says, where it is negative
     " late ": " early ",
@@ -119,6 +120,9 @@ class Suspect(NamedTuple):
                 return size > 0.0
             case "center_of_gravity":
                 return CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < CENTER[1]
+            case "velocity_sensor_x" | "acceleration_sensor_x":
+                beyond = OVERHANG * vehicle.wheelbase
+                return -vehicle.l_r - beyond < size < vehicle.l_f + beyond
             case "yaw_inertia":
                 least, most = usual_inertia(vehicle)
                 return least < vehicle.yaw_inertia / size / similar_inertia(vehicle) < most

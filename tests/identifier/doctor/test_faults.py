@@ -9,8 +9,8 @@ import pytest
 from benchmarks.answers import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
-from identifier.doctor import Finding, examine
-from identifier.doctor.faults import Search, _all_move, prepared
+from identifier.doctor import Finding, diagnose, examine
+from identifier.doctor.faults import Candidate, Search, _all_move, prepared
 from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
@@ -477,3 +477,22 @@ def test_a_candidate_without_a_variance_is_not_believed(driven):
     _, sd, cost, _ = search.both(replace(base, covariance=covariance), "v_y_bias")
     assert sd == cost == np.inf
     assert np.isfinite(search.both(base, "v_y_bias")[1:]).all()
+
+
+@pytest.mark.parametrize(("ahead", "sure"), [(1.0, True), (4.0, False)])
+def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
+    car, log, _ = driven
+    search = prepared(log, car)
+    assert search is not None
+    suspect = next(one for one in SUSPECTS if one.parameter == "v_y_lever")
+    one = Candidate(suspect, ahead, 0.1, 50.0, 50.0, 0.0, None)
+    assert search.finding(one, (0.9, 0.9), (), sure=True).sure is sure
+
+
+def test_speeds_in_knots_are_told_from_mph_by_nobody(driven):
+    car, log, _ = driven
+    for unit in (0.44704, 1852.0 / 3600.0):
+        said = diagnose(replace(log, v_x=log.v_x / unit, v_y=log.v_y / unit), car)
+        first = said.findings[0]
+        assert (first.code, first.channel, first.sure) == ("unit", "v_x", False)
+        assert "mph" in first.text and "knots" in first.text
