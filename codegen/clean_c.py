@@ -202,11 +202,11 @@ def in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> l
 
 Place = Callable[[int, int], str]  # (port, entry by columns) -> C expression
 
-FLOAT_MIN, FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
+_FLOAT_MIN, _FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
 LONGEST = 72  # characters of an expression that is not given a name
 FEW = 150  # results, of which compilers keep or write several at once in any order
 LARGEST = 6  # operations in one of more results that is computed only where it is read
-ATOMIC = ("const", "input")  # they are read where they stand
+_ATOMIC = ("const", "input")  # they are read where they stand
 TWICE = ("sq", "fmin", "fmax", "sign")  # they write an argument twice
 
 BINARY: Mapping[str, str] = {
@@ -232,7 +232,7 @@ def literal(value: float, prefix: str) -> str:
     value : finite.
     """
     size = abs(value)
-    in_float = math.copysign(min(max(size, FLOAT_MIN), FLOAT_MAX), value) if size else 0.0
+    in_float = math.copysign(min(max(size, _FLOAT_MIN), _FLOAT_MAX), value) if size else 0.0
     if in_float != value:
         return f"{prefix.upper()}_PICK({_digits(in_float)}, {_digits(value)})"
     return f"{prefix.upper()}_C({_digits(value)})"
@@ -311,7 +311,7 @@ class Statements:
             return large
         for place, uses in self.uses.items():
             node = self.graph.nodes[place]
-            size = 0 if node.op in ATOMIC else 1 + sum(operations[a] for a in node.args)
+            size = 0 if node.op in _ATOMIC else 1 + sum(operations[a] for a in node.args)
             if size >= LARGEST and uses == 1 and place not in self.results:
                 large.add(place)
             operations[place] = 0 if uses > 1 or place in large else size
@@ -329,7 +329,7 @@ class Statements:
         if not self._are_few():
             needed = self.graph.needed()
             results.sort(key=lambda result: needed[result[0]])
-        named = {p for p, n in self.uses.items() if n > 1 and self.graph.nodes[p].op not in ATOMIC}
+        named = {p for p, n in self.uses.items() if n > 1 and self.graph.nodes[p].op not in _ATOMIC}
         named |= self.large
         first_of = {p: p for p in named} | {p: self.members[p][0] for p in self.members}
         needs: dict[tuple[int, tuple[int, int] | None], list[tuple[int, None]]] = {
@@ -396,7 +396,7 @@ class Statements:
             return
         text = self._plain(node)
         long = len(text) > LONGEST and place not in self.results
-        if node.op not in ATOMIC and (self.uses[place] > 1 or long or place in self.large):
+        if node.op not in _ATOMIC and (self.uses[place] > 1 or long or place in self.large):
             kind = "bool" if node.op in CONDITIONS else f"{self.prefix}_real"
             name = self._new("c" if node.op in CONDITIONS else "t")
             self.lines.append(f"const {kind} {name} = {_bare(text)};")

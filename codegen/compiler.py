@@ -43,7 +43,7 @@ def cache_folder() -> Path:
         if not folder.is_dir():
             folder.parent.mkdir(parents=True, exist_ok=True)
             folder.mkdir(mode=0o700, exist_ok=True)
-        reason = distrust(folder.resolve())
+        reason = _distrust(folder.resolve())
     except (OSError, RuntimeError) as error:  # RuntimeError: this user has no home
         return _temporary_folder(str(error))
     if not os.access(folder, os.W_OK | os.X_OK):
@@ -51,7 +51,7 @@ def cache_folder() -> Path:
     return folder if reason is None else _temporary_folder(reason)
 
 
-def distrust(path: Path) -> str | None:
+def _distrust(path: Path) -> str | None:
     """Return why another user could have written a file or what is in a folder; None if none could.
 
     Raises
@@ -96,7 +96,7 @@ def kept(stem: str, ending: str) -> Path | None:
     """
     for file in sorted(cache_folder().glob(f"{stem}.*{ending}")):
         try:
-            reason = distrust(file)
+            reason = _distrust(file)
             if reason is None and file.name == f"{stem}.{_digest(file.read_bytes())}{ending}":
                 return file
         except OSError as error:
@@ -143,7 +143,7 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
-LEVELS = ("0", "1", "2", "3")
+_LEVELS = ("0", "1", "2", "3")
 LONG = 50_000  # characters of a source, beyond which to optimize it takes longer than a test runs
 # Before all other flags: words of $CC such as -ffast-math must not delete the guards either.
 KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
@@ -184,9 +184,9 @@ def _at_level(flags: tuple[str, ...], source: str) -> tuple[str, ...]:
     if not asked:
         return flags
     levels = asked.split(",")
-    if len(levels) > 2 or not set(levels) <= set(LEVELS):
+    if len(levels) > 2 or not set(levels) <= set(_LEVELS):
         raise CompilationError(
-            f"TIREID_OPTIMIZE must be one of {', '.join(LEVELS)}, or two of them, for short and "
+            f"TIREID_OPTIMIZE must be one of {', '.join(_LEVELS)}, or two of them, for short and "
             f"for long sources, it is {asked!r}"
         )
     level = levels[-1] if len(source) > LONG else levels[0]

@@ -90,8 +90,8 @@ def floor(x: Any) -> Any:
     return ca.floor(x) if isinstance(x, ca.SX | ca.MX | ca.DM) else np.floor(x)
 
 
-EXP_LIMIT = 85.0
-SQUARINGS = 5
+_EXP_LIMIT = 85.0
+_SQUARINGS = 5
 # exp(t) ≈ (E + O)/(E - O) with E + O = Σ c_k t^k, c_k = (16 - k)! 8!/(16! k! (8 - k)!)
 PADE = tuple(
     math.factorial(16 - k)
@@ -99,21 +99,21 @@ PADE = tuple(
     / (math.factorial(16) * math.factorial(k) * math.factorial(8 - k))
     for k in range(9)
 )
-ATAN_P = (
+_ATAN_P = (
     0.9999999999847872,
     1.5782164853325558,
     0.7302374508348184,
     0.0981935092083521,
     0.0017761824201668725,
 )
-ATAN_Q = (
+_ATAN_Q = (
     1.0,
     1.9115498173824181,
     1.1674207547775888,
     0.24788058455755405,
     0.012888591378789574,
 )
-SIN_S = (
+_SIN_S = (
     0.9999999999995306,
     -0.16666666666381078,
     0.008333333328228587,
@@ -134,13 +134,13 @@ def exp(y: Any) -> Any:
     ----------
     y : CasADi expression, array or number.
     """
-    y = where(y > EXP_LIMIT, EXP_LIMIT, y)
-    y = where(y < -EXP_LIMIT, -EXP_LIMIT, y)
-    t = y * (1.0 / 2**SQUARINGS)
+    y = where(y > _EXP_LIMIT, _EXP_LIMIT, y)
+    y = where(y < -_EXP_LIMIT, -_EXP_LIMIT, y)
+    t = y * (1.0 / 2**_SQUARINGS)
     s = t * t
     even, odd = polynomial(PADE[0::2], s), t * polynomial(PADE[1::2], s)
     result = (even + odd) / (even - odd)
-    for _ in range(SQUARINGS):
+    for _ in range(_SQUARINGS):
         result = result * result
     return result
 
@@ -155,7 +155,7 @@ def atan(x: Any) -> Any:
     steep = x * x > 1.0
     y = where(steep, -1.0 / where(steep, x, 1.0), x)
     s = y * y
-    value = y * polynomial(ATAN_P, s) / polynomial(ATAN_Q, s)
+    value = y * polynomial(_ATAN_P, s) / polynomial(_ATAN_Q, s)
     quarter = where(x > 0.0, 0.5 * math.pi, -0.5 * math.pi)
     return value + where(steep, quarter, 0.0)
 
@@ -168,4 +168,4 @@ def sin(x: Any) -> Any:
     x : CasADi expression, array or number [rad].
     """
     y = x - TURN * floor(x * (1.0 / TURN) + 0.5)
-    return y * polynomial(SIN_S, y * y)
+    return y * polynomial(_SIN_S, y * y)

@@ -266,7 +266,7 @@ def _as_casadi(number: int) -> Callable[..., Any]:
 
 
 # Of every operation that CasADi has, and of ours.
-ALL_BUILDERS = {name: _as_casadi(number) for number, name in OPERATIONS.items()} | dict(BUILDERS)
+_ALL_BUILDERS = {name: _as_casadi(number) for number, name in OPERATIONS.items()} | dict(BUILDERS)
 
 
 @simplifying(False)
@@ -290,4 +290,4 @@ def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function,
     results = [ca.SX(*function.size_out(i)) for i in range(function.n_out())]
     ports.append(ca.SX.sym(port, values.size))
     like = ca.Function(function.name(), ports, results, names, function.name_out())
-    return function_of(graph, like, ALL_BUILDERS), values
+    return function_of(graph, like, _ALL_BUILDERS), values

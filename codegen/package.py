@@ -27,7 +27,7 @@ from codegen.template import Values, Words, filled
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
 TAKEN = ("null", "jac", "hess")  # names that CasADi gives no function
-CMAKE = Path(__file__).with_name("package_cmake.txt")
+_CMAKE = Path(__file__).with_name("package_cmake.txt")
 
 
 class PackageNameError(TireidError, ValueError):
@@ -177,7 +177,7 @@ FUNCTIONS: Mapping[str, tuple[str, str]] = {  # in float and in double
 }
 
 
-def own_functions(prefix: str, called: Collection[str]) -> str:
+def _own_functions(prefix: str, called: Collection[str]) -> str:
     """Return those of our own functions that are called, each over an array, from one expression.
 
     Parameters
@@ -220,7 +220,7 @@ def used_macros(prefix: str, text: str) -> str:
 def equations_file(prefix: str, about: str, functions: Mapping[str, Statements]) -> str:
     """Return a generated C file of functions, which `<prefix>_equations.h` declares."""
     called = {own for statements in functions.values() for own in statements.called}
-    text = own_functions(prefix, called) + "\n".join(
+    text = _own_functions(prefix, called) + "\n".join(
         f"{signature}\n{{\n{_unread(signature, statements.block())}{statements.block()}}}\n"
         for signature, statements in functions.items()
     )
@@ -256,7 +256,7 @@ def cmake(
     """
     sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
     values = {"sources": "\n".join(f"  {path}" for path in sources), "flags": " ".join(flags)}
-    return {"CMakeLists.txt": filled(CMAKE, {**about, **values, "so_that": so_that})}
+    return {"CMakeLists.txt": filled(_CMAKE, {**about, **values, "so_that": so_that})}
 
 
 # The manifest: everything that went in, what came out, and their hashes.

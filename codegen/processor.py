@@ -17,10 +17,10 @@ from codegen.errors import TireidError
 from codegen.package import manifest_with_figures, renamed
 from codegen.writing import write_file
 
-TARGET = Path(__file__).parent / "target"
+_TARGET = Path(__file__).parent / "target"
 CROSS_COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
-WRAPPED = tuple(f"-Wl,--wrap=__aeabi_{name}" for name in ("dadd", "dsub", "drsub"))
+_WRAPPED = tuple(f"-Wl,--wrap=__aeabi_{name}" for name in ("dadd", "dsub", "drsub"))
 TIMEOUT = 120.0  # s
 
 
@@ -133,7 +133,7 @@ def replay(
         if isinstance(where, str):
             words, command = [where, *flags, "host.c", "-lm"], [str(folder / "replay")]
         else:
-            extra = ["soft_add.c", *WRAPPED] if corrected and not where.has_double else []
+            extra = ["soft_add.c", *_WRAPPED] if corrected and not where.has_double else []
             board = ["-ffreestanding", "-Wno-unused", "-nostartfiles", "-T", "mps2.ld", *extra]
             libraries = ["board.c", "--specs=nosys.specs", "-Wl,--no-warnings", "-lm"]
             words = [CROSS_COMPILER, *flags, *where.flags, "-std=gnu99", *board, *libraries]
@@ -146,7 +146,7 @@ def replay(
 
 def _build(folder: Path, program: Program, words: Sequence[str], *, single: bool) -> None:
     sources = [*_write(folder, program.files), "replay.c"]
-    for path in (*TARGET.iterdir(), program.replayed):
+    for path in (*_TARGET.iterdir(), program.replayed):
         text = path.read_text(encoding="utf-8")
         write_file(folder / path.name, renamed(text, {program.prefix: program.name}))
     if program.samples is not None:

@@ -57,21 +57,21 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
 """
 
 
-Longs: TypeAlias = "ctypes.Array[ctypes.c_long]"
+_Longs: TypeAlias = "ctypes.Array[ctypes.c_long]"
 
 
-ADDRESSES = ("loop", "layout")  # of a scan, found when they are asked for
+_ADDRESSES = ("loop", "layout")  # of a scan, found when they are asked for
 
 
 class Layout(NamedTuple):
     """What is alike in every call of a compiled loop: places and sizes of ports, for C."""
 
-    arg_step: Longs
-    carry_arg: Longs
-    carry_res: Longs
-    carry_size: Longs
-    out_res: Longs
-    out_size: Longs
+    arg_step: _Longs
+    carry_arg: _Longs
+    carry_res: _Longs
+    carry_size: _Longs
+    out_res: _Longs
+    out_size: _Longs
     out_sizes: list[int]
     sz_arg: int
     sz_res: int
@@ -133,7 +133,7 @@ class Scan:
 
     def __getstate__(self) -> dict[str, object]:
         """Return what it is made of: what points into this process is loaded anew in another."""
-        return {name: value for name, value in vars(self).items() if name not in ADDRESSES}
+        return {name: value for name, value in vars(self).items() if name not in _ADDRESSES}
 
     @cached_property
     def loop(self) -> "ctypes._NamedFuncPointer | None":
@@ -158,12 +158,12 @@ class Scan:
         out_sizes = [step.numel_out(p) for p in self.outputs]
         strides = [step.numel_in(p) if p in self.over else 0 for p in names_in]
         return Layout(
-            arg_step=longs([*strides, -1]),
-            carry_arg=longs([names_in.index(p) for p in self.carry]),
-            carry_res=longs([names_out.index(f"{p}_next") for p in self.carry]),
-            carry_size=longs([step.numel_in(p) for p in self.carry]),
-            out_res=longs([names_out.index(p) for p in self.outputs]),
-            out_size=longs(out_sizes),
+            arg_step=_longs([*strides, -1]),
+            carry_arg=_longs([names_in.index(p) for p in self.carry]),
+            carry_res=_longs([names_out.index(f"{p}_next") for p in self.carry]),
+            carry_size=_longs([step.numel_in(p) for p in self.carry]),
+            out_res=_longs([names_out.index(p) for p in self.outputs]),
+            out_size=_longs(out_sizes),
             out_sizes=out_sizes,
             sz_arg=max(step.sz_arg(), len(names_in)),
             sz_res=max(step.sz_res(), len(names_out)),
@@ -379,7 +379,7 @@ def shaped(flat: Array, size: tuple[int, int]) -> Array:
     return flat.reshape(*flat.shape[:-1], columns, rows).swapaxes(-1, -2)
 
 
-def longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
+def _longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
     """Return integers as C wants them."""
     return (ctypes.c_long * max(len(numbers), 1))(*numbers)
 

@@ -13,7 +13,7 @@ from codegen.graph import Graph, Node
 
 Form = dict[int, float]  # place: coefficient
 
-CANCELLED = 1e-14  # relative size of a coefficient that is rounding only
+_CANCELLED = 1e-14  # relative size of a coefficient that is rounding only
 
 
 def simplified(graph: Graph) -> Graph:
@@ -235,10 +235,10 @@ def _add(total: Form, other: Form) -> None:
             continue
         before = total[place]
         value = before + c
-        if abs(value) <= CANCELLED * (abs(before) + abs(c)):
+        if abs(value) <= _CANCELLED * (abs(before) + abs(c)):
             del total[place]
             continue
         near = float(round(value)) if math.isfinite(value) else value
-        if near != value and abs(value - near) <= CANCELLED * abs(near):
+        if near != value and abs(value - near) <= _CANCELLED * abs(near):
             value = near  # 0.9999999999999999 is 1
         total[place] = value

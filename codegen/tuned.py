@@ -9,7 +9,7 @@ from codegen.clean_c import EXPANDED, recognized
 from codegen.graph import Graph, assumed, decision, function_of, graph_of, simplifying
 from codegen.simplify import simplified
 
-WORTHWHILE = 0.5  # share of nodes that the smaller part may have, else nothing is decided
+_WORTHWHILE = 0.5  # share of nodes that the smaller part may have, else nothing is decided
 KEPT = 16  # functions whose forms are kept: who exports again often asks for the same ones
 
 
@@ -46,7 +46,7 @@ def _tuned(serialized: str, sampled: tuple[str, ...]) -> Tuned:
     names = function.name_in()
     place = decision(graph, {names.index(port) for port in sampled})
     true, false = (simplified(_part(graph, place, holds)) for holds in (True, False))
-    if len(false.reached()) > WORTHWHILE * len(true.reached()):
+    if len(false.reached()) > _WORTHWHILE * len(true.reached()):
         place, true = None, simplified(graph)
         false = true
     where_true, where_false = (function_of(part, function, EXPANDED) for part in (true, false))

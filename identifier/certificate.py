@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 Status = Literal["pass", "warn", "fail"]
 Verdict = Literal["pass", "warn", "fail", "not certified"]
-NOT_CERTIFIED: Verdict = "not certified"
-SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
+_NOT_CERTIFIED: Verdict = "not certified"
+_SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +49,8 @@ class Certificate:
     def verdict(self) -> Verdict:
         """The worst status; "not certified" without a property."""
         if not self.properties:
-            return NOT_CERTIFIED
-        return max((entry.status for entry in self.properties), key=SEVERITY.index)
+            return _NOT_CERTIFIED
+        return max((entry.status for entry in self.properties), key=_SEVERITY.index)
 
     def __repr__(self) -> str:
         counts = f"{len(self.properties)} properties, {len(self.held)} boxes held"

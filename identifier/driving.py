@@ -75,7 +75,7 @@ class Driving:
 REFERENCE_WHEELBASE = 2.7  # m: the car for which the numbers below, and scales of inputs, are meant
 BANDWIDTH = 0.7  # Hz: a brisk slalom; the steering of a normal driver stays below 0.5 Hz
 # Four standard deviations of a good inertial sensor and a steering encoder, m/s, rad/s, rad.
-PEAK_NOISE = {"v_x": 0.12, "v_y": 0.12, "r": 0.012, "delta": 0.002}
+_PEAK_NOISE = {"v_x": 0.12, "v_y": 0.12, "r": 0.012, "delta": 0.002}
 
 
 def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Driving:
@@ -94,8 +94,8 @@ def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Drivin
         slip=2.0 * sliding,
         friction=1.0,
         bandwidth=bandwidth,
-        noise_v_x=PEAK_NOISE["v_x"] * ratio,
-        noise_v_y=PEAK_NOISE["v_y"] * ratio,
-        noise_r=PEAK_NOISE["r"] / ratio,
-        noise_delta=PEAK_NOISE["delta"],
+        noise_v_x=_PEAK_NOISE["v_x"] * ratio,
+        noise_v_y=_PEAK_NOISE["v_y"] * ratio,
+        noise_r=_PEAK_NOISE["r"] / ratio,
+        noise_delta=_PEAK_NOISE["delta"],
     )

@@ -19,9 +19,9 @@ class FrozenModelError(TireidError, ValueError):
 
 
 DEAD = 0.02  # of the stated stiffness, below which an axle does not push
-PROBE = 0.02  # rad, a slip at which every tire pushes back
+_PROBE = 0.02  # rad, a slip at which every tire pushes back
 WIDE = 0.3  # rad, beyond the slip of every tire's peak
-LARGEST_MIN_SPEED = 50.0  # m/s: above it, a car would have forces on motorways only
+_LARGEST_MIN_SPEED = 50.0  # m/s: above it, a car would have forces on motorways only
 
 VEHICLE_KEYS = ("name", *BICYCLE)
 
@@ -51,7 +51,7 @@ def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
     return Vehicle(**table.record(Vehicle, skip=("chassis",)))
 
 
-class SteadyTires(Protocol):
+class _SteadyTires(Protocol):
     """What has steady axle forces at slip angles, and knows the linear tires of its car."""
 
     @property
@@ -67,7 +67,7 @@ class SteadyTires(Protocol):
         """
 
 
-def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
+def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
     """Refuse tires that no road has: forces that are not finite or too large, or a dead axle.
 
     Parameters
@@ -79,7 +79,7 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
     ValueError
         Of that class, with the forces or the stiffness.
     """
-    force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
+    force = np.asarray(tires.force_at(np.array([-WIDE, -_PROBE, _PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
         raise refusal(
             f"axle forces must be finite and below {LARGEST_FORCE:g} N, at {WIDE} rad of slip and "
@@ -87,11 +87,11 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
         )
     if not (force[2] > force[1]).all():
         raise refusal(
-            f"axle forces must rise with slip, at {-PROBE} and {PROBE} rad they are "
+            f"axle forces must rise with slip, at {-_PROBE} and {_PROBE} rad they are "
             f"{force[1].tolist()} and {force[2].tolist()} N: check units, the order of inputs, "
             "and the sign of slip (slip_sign)"
         )
-    slope = (force[2] - force[1]) / (2.0 * PROBE)
+    slope = (force[2] - force[1]) / (2.0 * _PROBE)
     for axle, here, said in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
         if not here >= DEAD * said:
             raise refusal(
@@ -110,9 +110,9 @@ def require_min_speed(speed: float) -> None:
     Raises
     ------
     ValueError
-        Where it is not above zero, or above `LARGEST_MIN_SPEED`.
+        Where it is not above zero, or above `_LARGEST_MIN_SPEED`.
     """
-    if not 0.0 < speed <= LARGEST_MIN_SPEED:
+    if not 0.0 < speed <= _LARGEST_MIN_SPEED:
         raise ValueError(
-            f"min_speed must be positive and at most {LARGEST_MIN_SPEED:g} m/s, it is {speed:g}"
+            f"min_speed must be positive and at most {_LARGEST_MIN_SPEED:g} m/s, it is {speed:g}"
         )

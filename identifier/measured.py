@@ -6,7 +6,7 @@ Files keep SI; what is printed is kN/rad where they have N/rad.
 import math
 
 DIGITS = 3  # of a value, or of its standard deviation where that is larger
-PRINTED = {"N/rad": (1e-3, "kN/rad")}  # factor and unit of what is printed
+_PRINTED = {"N/rad": (1e-3, "kN/rad")}  # factor and unit of what is printed
 NOT_IDENTIFIABLE = "not identifiable from this drive"
 
 
@@ -49,9 +49,9 @@ def printed_value(value: float, sd: float | None, unit: str) -> str:
 
 def printed_scale(unit: str) -> float:
     """Return what values in a unit of files are multiplied by to be printed."""
-    return PRINTED.get(unit, (1.0, unit))[0]
+    return _PRINTED.get(unit, (1.0, unit))[0]
 
 
 def printed_unit(unit: str) -> str:
     """Return the unit that is printed for a unit of files."""
-    return PRINTED.get(unit, (1.0, unit))[1]
+    return _PRINTED.get(unit, (1.0, unit))[1]

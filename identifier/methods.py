@@ -34,19 +34,19 @@ from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 
-Factory = Callable[[Vehicle, int], Method]
+_Factory = Callable[[Vehicle, int], Method]
 DEFAULT = "fit"  # on logs
 LIVE = "axle"  # the default in a car, sample by sample
 WITHOUT_V_Y = "inertial"  # the default in a car without a lateral velocity
-LONGEST_BLIND = 3600.0  # [s] of a log without v_y, beyond which the recursive default tells it
+_LONGEST_BLIND = 3600.0  # [s] of a log without v_y, beyond which the recursive default tells it
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
 
-def _paper(law: str) -> Factory:
+def _paper(law: str) -> _Factory:
     return lambda vehicle, seed: PaperIdentifier.for_vehicle(vehicle, law=law, seed=seed)
 
 
-def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
+def _seedless(factory: Callable[[Vehicle], Method]) -> _Factory:
     def unseeded(vehicle: Vehicle, seed: int) -> Method:
         del seed
         return factory(vehicle)
@@ -54,7 +54,7 @@ def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
     return unseeded
 
 
-METHODS: Mapping[str, Factory] = {
+METHODS: Mapping[str, _Factory] = {
     DEFAULT: _seedless(FitMethod.for_vehicle),
     LIVE: _seedless(AxleIdentifier.for_vehicle),
     WITHOUT_V_Y: _seedless(InertialIdentifier.for_vehicle),
@@ -153,7 +153,7 @@ def methods() -> tuple[str, ...]:
 
 def usual(recording: Recording) -> str:
     """Return the name of the default method of a log."""
-    blind = recording.logged_v_y is None and recording.duration > LONGEST_BLIND
+    blind = recording.logged_v_y is None and recording.duration > _LONGEST_BLIND
     return WITHOUT_V_Y if blind else DEFAULT
 
 

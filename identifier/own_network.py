@@ -42,8 +42,8 @@ from models.vehicle import Vehicle
 
 FORCES = ("F_yf", "F_yr")
 LARGEST = 1e9  # of a weight, SI: a stiffness in N/rad fits
-READS_ONNX = (3, 8, 2)  # the first CasADi that knows the operations of such networks
-BY_COUNT = {
+_READS_ONNX = (3, 8, 2)  # the first CasADi that knows the operations of such networks
+_BY_COUNT = {
     2: ("alpha_f", "alpha_r"),
     5: ("v_x", "v_y", "r", "delta_f", "delta_r"),
 }  # what the columns mean where nobody says
@@ -94,8 +94,8 @@ def read_network(content: bytes, inputs: Sequence[str] | None = None) -> ca.Func
 def _imported(content: bytes) -> ca.Function:
     """Return the graph for one sample, tensors as they stand in the file."""
     version = ca.CasadiMeta.version()
-    if tuple(int(part) for part in re.findall(r"\d+", version)[:3]) < READS_ONNX:
-        needed = ".".join(map(str, READS_ONNX))
+    if tuple(int(part) for part in re.findall(r"\d+", version)[:3]) < _READS_ONNX:
+        needed = ".".join(map(str, _READS_ONNX))
         raise UnusableNetworkError(f"reading ONNX needs CasADi {needed}, this is {version}")
     with tempfile.TemporaryDirectory(prefix="tireid-") as folder:
         path = Path(folder) / "network.onnx"
@@ -152,8 +152,8 @@ def _signals(network: ca.Function, inputs: Sequence[str] | None) -> tuple[str, .
         chosen = tuple(inputs)
     elif len(names) == count and set(names) <= set(SIGNALS):
         chosen = names
-    elif count in BY_COUNT:
-        chosen = BY_COUNT[count]
+    elif count in _BY_COUNT:
+        chosen = _BY_COUNT[count]
     else:
         raise UnusableNetworkError(
             f"the network reads {count} columns: say with inputs which of {list(SIGNALS)} they are"

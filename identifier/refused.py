@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from models.vehicle import GRAVITY, Vehicle
 
-FROUDE = 60.0  # largest speed, in sqrt(g wheelbase): 300 m/s for a sedan
+_FROUDE = 60.0  # largest speed, in sqrt(g wheelbase): 300 m/s for a sedan
 TURN = 4.0  # largest yaw rate, in sqrt(g/wheelbase): 8 rad/s for a sedan
 STEERING = 1.5  # rad
 WEIGHTS = 5.0  # largest force of an axle, in weights of the car
@@ -40,7 +40,7 @@ class SampleLimits(NamedTuple):
     def of(cls, vehicle: Vehicle) -> "SampleLimits":
         """Return the limits of a car, by its size and weight."""
         return cls(
-            speed=FROUDE * vehicle.froude_speed,
+            speed=_FROUDE * vehicle.froude_speed,
             yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),
             steering=STEERING,
             force=WEIGHTS * vehicle.weight,

@@ -74,9 +74,9 @@ class Rerun:
             if len(self.begins) == 1:
                 self._found[k] = found
             of = partial(self._of_block, k, found)
-            state = OnDemand(self.ports("state"), partial(of, "state"))
-            outputs = OnDemand(self.ports("outputs"), partial(of, "outputs"))
-            after = OnDemand(self.ports("state"), partial(_last_row, state))
+            state = _OnDemand(self.ports("state"), partial(of, "state"))
+            outputs = _OnDemand(self.ports("outputs"), partial(of, "outputs"))
+            after = _OnDemand(self.ports("state"), partial(_last_row, state))
             yield Block(part, state, outputs, after)
 
     def _of_block(self, k: int, found: Found, kind: Kind, port: str) -> Array:
@@ -132,7 +132,7 @@ def _last_row(state: Mapping[str, Array], port: str) -> Array:
     return last
 
 
-class OnDemand(Mapping[str, Array]):
+class _OnDemand(Mapping[str, Array]):
     """Values by port, each computed when it is asked for."""
 
     def __init__(self, ports: tuple[str, ...], compute: Callable[[str], Array]) -> None:
@@ -155,7 +155,7 @@ class OnDemand(Mapping[str, Array]):
         return port in self._ports
 
 
-class Recalled(OnDemand):
+class Recalled(_OnDemand):
     """By port, what a run records: computed again when it is asked for.
 
     Parameters

@@ -19,7 +19,7 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
-IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
+_IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
 
 
 class DivergedError(TireidError, ArithmeticError):
@@ -82,7 +82,7 @@ class History:
     def diverged_at(self) -> float | None:
         """Time [s] from which a force is not finite or a hundred times the weight, or None."""
         for part in blocks(len(self.recording)):
-            possible = np.abs(self.axle_force[part]) < IMPOSSIBLE_FORCE * self.vehicle.weight
+            possible = np.abs(self.axle_force[part]) < _IMPOSSIBLE_FORCE * self.vehicle.weight
             sane = possible.all(axis=1)
             if not sane.all():
                 return float(self.recording.t[part][np.argmin(sane)])
@@ -478,7 +478,7 @@ class OnlineIdentifier:
             array[:] = values[port]
         stepper.advance()
         self._force = stepper.outputs["axle_force"].copy()
-        if not np.abs(self._force).max() < IMPOSSIBLE_FORCE * self.vehicle.weight:
+        if not np.abs(self._force).max() < _IMPOSSIBLE_FORCE * self.vehicle.weight:
             self._diverged = True
 
     def _refused(self) -> Array:

@@ -39,7 +39,7 @@ STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
 UNCALIBRATED = "what learning believes, not calibrated; run.tire checks it on the drive"
 
 
-class TireFunctions(NamedTuple):
+class _TireFunctions(NamedTuple):
     """What a tire is to one's own optimal control problem: named CasADi functions, SI.
 
     x = [v_y, r] [m/s, rad/s] and, where the force follows a lagged slip, [α'_f, α'_r] [rad].
@@ -656,7 +656,7 @@ class TireModel(ABC):
             lines.append(self.vehicle.estimates)
         return "\n".join(lines)
 
-    def casadi_function(self) -> TireFunctions:
+    def casadi_function(self) -> _TireFunctions:
         """Return force curve, equations of motion and prediction step, the weights in them.
 
         Speed must be positive. Where the slip lags, a step holds the lag above half of itself.
@@ -684,7 +684,7 @@ class TireModel(ABC):
             ["x", "delta", "v_x", "dt"],
             ["x_next"],
         )
-        return TireFunctions(self._force_curve(), dynamics.expand(), step.expand())
+        return _TireFunctions(self._force_curve(), dynamics.expand(), step.expand())
 
     def _force_curve(self) -> ca.Function:
         alpha, v_x = ca.MX.sym("alpha", 2), ca.MX.sym("v_x")

@@ -32,7 +32,7 @@ class BicycleParameters(NamedTuple):
     C_r: Any
 
 
-class Bicycle(NamedTuple):
+class _Bicycle(NamedTuple):
     """The matrices of (4), (6) and (7), each 2x2; those in ξ: A_ξ [1/s] and B_ξ [N/rad]."""
 
     A: Any
@@ -47,7 +47,7 @@ def _matrix(a: Any, b: Any, c: Any, d: Any) -> Any:
     return ca.vertcat(ca.horzcat(a, b), ca.horzcat(c, d))
 
 
-def bicycle(parameters: BicycleParameters, v_x: Any) -> Bicycle:
+def bicycle(parameters: BicycleParameters, v_x: Any) -> _Bicycle:
     """Return the matrices of the bicycle at a speed.
 
     Parameters
@@ -67,7 +67,7 @@ def bicycle(parameters: BicycleParameters, v_x: Any) -> Bicycle:
     K_inv = _matrix(m * l_r, I_z, m * l_f, -I_z) / wheelbase
     A_xi = K_inv @ A @ K  # (7), depends on v_x
     B_xi = ca.diag(ca.vertcat(C_f, C_r))  # (7): K⁻¹ B = diag(C_f, C_r) exactly
-    return Bicycle(A, B, K, K_inv, A_xi, B_xi)
+    return _Bicycle(A, B, K, K_inv, A_xi, B_xi)
 
 
 def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:

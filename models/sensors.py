@@ -121,8 +121,8 @@ def is_shown(channel: str, value: float) -> bool:
 
 
 STRAIGHT = 0.2  # median over 90th percentile of second differences, below which lines were drawn
-MOST_BETWEEN = 10  # samples over which differences are taken
-NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
+_MOST_BETWEEN = 10  # samples over which differences are taken
+_NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
 
 
 def white_noise(signal: Array) -> float:
@@ -135,7 +135,7 @@ def white_noise(signal: Array) -> float:
     signal : samples (n,).
     """
     bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
-    return float(np.median(np.abs(bend)) / (NORMAL_MEDIAN * np.sqrt(6.0)))
+    return float(np.median(np.abs(bend)) / (_NORMAL_MEDIAN * np.sqrt(6.0)))
 
 
 def noise_in_means(signal: Array) -> float:
@@ -149,7 +149,7 @@ def noise_in_means(signal: Array) -> float:
     ----------
     signal : samples (n,).
     """
-    for k in range(1, MOST_BETWEEN + 1):
+    for k in range(1, _MOST_BETWEEN + 1):
         if len(signal) <= 8 * k:
             break
         bend = np.abs(signal[2 * k :] - 2.0 * signal[k:-k] + signal[: -2 * k])

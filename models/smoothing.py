@@ -6,7 +6,7 @@ import numpy as np
 
 from codegen.arrays import Array
 
-NEGLIGIBLE = 1e-20  # share of an earlier sample
+_NEGLIGIBLE = 1e-20  # share of an earlier sample
 
 
 def window(half: int) -> Array:
@@ -44,7 +44,7 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
     y[1:] = (ramp - keep) * signal[:-1] + (1.0 - ramp) * signal[1:]
     # 1/(1 - q) = (1 + q)(1 + q²)(1 + q⁴)...: of a sum over all samples before, by whole arrays
     behind = 1
-    while behind < y.size and keep > NEGLIGIBLE:
+    while behind < y.size and keep > _NEGLIGIBLE:
         y[behind:] += keep * y[:-behind]  # NumPy reads all of the right side first
         keep, behind = keep * keep, 2 * behind
     return y

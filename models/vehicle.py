@@ -185,12 +185,12 @@ GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 # Stiffness: the middle of the 12 to 20 static loads per rad that passenger cars have, on the soft
 # side, as on a road that is not of the best; 0.25 of the load a degree.
 
-MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
-STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
+_MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
+_STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
 RULES = {
-    "yaw_inertia": f"mass l_f l_r, {MODEL_INERTIA:g} of it for a model car",
-    "cornering_stiffness_front": f"{STIFFNESS_SHARE:g} static axle loads per rad",
-    "cornering_stiffness_rear": f"{STIFFNESS_SHARE:g} static axle loads per rad",
+    "yaw_inertia": f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car",
+    "cornering_stiffness_front": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
+    "cornering_stiffness_rear": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
 }
 UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 
@@ -199,10 +199,10 @@ UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 # What a car may have is told over its static axle load at a speed: Formula cars have 0.4 of it at
 # 30 m/s, the lightest of Formula Student about 2; lift takes off a few hundredths on road cars.
 
-AIR_DENSITY = 1.2  # ρ [kg/m³]: dry air at 20 °C, 100 m above the sea
+_AIR_DENSITY = 1.2  # ρ [kg/m³]: dry air at 20 °C, 100 m above the sea
 LIGHTEST = 0.2  # load of an axle that lifts, over the static one: a car that flies is not modelled
 DOWNFORCE_SPEED = 30.0  # m/s
-LEAST_PRESS, MOST_PRESS = -0.5, 5.0  # static axle loads of downforce there
+_LEAST_PRESS, _MOST_PRESS = -0.5, 5.0  # static axle loads of downforce there
 AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
 
 # What a car may tell of braking and driving: height of its center of gravity over the wheelbase,
@@ -210,9 +210,9 @@ AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
 
 OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # told there as well
 LENGTHWISE = (*OF_CHASSIS, "drag_area")  # of a `Vehicle`
-MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
-DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
-MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
+_MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
+_DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
+_MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
 
 
 def load_ratio(downforce: Any, v_x: Any) -> Any:
@@ -257,9 +257,9 @@ def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
     _require_size(mass, l_f, l_r)
     weight, wheelbase = mass * GRAVITY, l_f + l_r
     return {
-        "yaw_inertia": mass * l_f * l_r * (MODEL_INERTIA if wheelbase < FULL_SIZE else 1.0),
-        "cornering_stiffness_front": STIFFNESS_SHARE * weight * l_r / wheelbase,
-        "cornering_stiffness_rear": STIFFNESS_SHARE * weight * l_f / wheelbase,
+        "yaw_inertia": mass * l_f * l_r * (_MODEL_INERTIA if wheelbase < FULL_SIZE else 1.0),
+        "cornering_stiffness_front": _STIFFNESS_SHARE * weight * l_r / wheelbase,
+        "cornering_stiffness_rear": _STIFFNESS_SHARE * weight * l_f / wheelbase,
     }
 
 
@@ -366,16 +366,16 @@ class Vehicle:
                 )
         for name, load in zip(AREAS, self.axle_loads, strict=True):
             require_number(VehicleError, name, getattr(self, name))
-            unit = 0.5 * AIR_DENSITY * DOWNFORCE_SPEED**2 / load  # static loads per m^2
-            if not LEAST_PRESS <= getattr(self, name) * unit <= MOST_PRESS:
+            unit = 0.5 * _AIR_DENSITY * DOWNFORCE_SPEED**2 / load  # static loads per m^2
+            if not _LEAST_PRESS <= getattr(self, name) * unit <= _MOST_PRESS:
                 raise VehicleError(
-                    f"{name} in m^2 must lie between {LEAST_PRESS / unit:.3g} and "
-                    f"{MOST_PRESS / unit:.3g}, a downforce of {LEAST_PRESS:g} to {MOST_PRESS:g} "
+                    f"{name} in m^2 must lie between {_LEAST_PRESS / unit:.3g} and "
+                    f"{_MOST_PRESS / unit:.3g}, a downforce of {_LEAST_PRESS:g} to {_MOST_PRESS:g} "
                     f"static loads of the axle at {DOWNFORCE_SPEED:g} m/s, it is "
                     f"{getattr(self, name):g}: check the units"
                 )
-        most_drag = MOST_DRAG * self.weight / (0.5 * AIR_DENSITY * DOWNFORCE_SPEED**2)
-        highest = {"cg_height": MOST_HEIGHT * self.wheelbase, "drag_area": most_drag}
+        most_drag = _MOST_DRAG * self.weight / (0.5 * _AIR_DENSITY * DOWNFORCE_SPEED**2)
+        highest = {"cg_height": _MOST_HEIGHT * self.wheelbase, "drag_area": most_drag}
         for name in LENGTHWISE:
             if (value := getattr(self, name)) is None:
                 continue
@@ -408,8 +408,8 @@ class Vehicle:
         """Deceleration by the air over v_x^2 [1/m]; of a passenger car where no area is told."""
         area = self.drag_area
         if area is None:
-            area = DRAG_AREA if self.wheelbase >= FULL_SIZE else 0.0
-        return 0.5 * AIR_DENSITY * area / self.mass
+            area = _DRAG_AREA if self.wheelbase >= FULL_SIZE else 0.0
+        return 0.5 * _AIR_DENSITY * area / self.mass
 
     @property
     def wheelbase(self) -> float:
@@ -433,7 +433,7 @@ class Vehicle:
     def downforce(self) -> tuple[float, float]:
         """Downforce of the front and the rear axle over static load and v_x^2, κ [s^2/m^2]."""
         front, rear = (
-            0.5 * AIR_DENSITY * getattr(self, name) / load
+            0.5 * _AIR_DENSITY * getattr(self, name) / load
             for name, load in zip(AREAS, self.axle_loads, strict=True)
         )
         return front, rear
@@ -446,7 +446,7 @@ class Vehicle:
         downforce : κ of both axles [s^2/m^2], as `downforce` has them.
         """
         pairs = zip(downforce, self.axle_loads, strict=True)
-        areas = [2.0 * one * load / AIR_DENSITY for one, load in pairs]
+        areas = [2.0 * one * load / _AIR_DENSITY for one, load in pairs]
         return dict(zip(AREAS, areas, strict=True))
 
     @property

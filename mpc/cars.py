@@ -74,7 +74,7 @@ class Car(Protocol):
         """
 
 
-HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
+_HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 
 
 class DoubleTrackCar:
@@ -96,7 +96,7 @@ class DoubleTrackCar:
         tire: Tire | None = None,
         *,
         friction: Friction | None = None,
-        driver: Driver = HOLDING,
+        driver: Driver = _HOLDING,
         period: float = 0.01,
         dt: float = 1e-3,
     ) -> None:

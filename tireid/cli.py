@@ -19,7 +19,7 @@ from tireid.progress import complain, flush_out, listen_to_library, unwritten
 LONGEST_LINE = 900  # characters of a message, command and option not counted
 
 
-class Parser(argparse.ArgumentParser):
+class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all errors of tireid."""
 
     def error(self, message: str) -> NoReturn:
@@ -37,9 +37,9 @@ def _hint(message: str, program: str) -> str:
     return "; ".join(renamed) or f"see {program} --help"
 
 
-def build_parser(words: Sequence[str]) -> Parser:
+def build_parser(words: Sequence[str]) -> _Parser:
     """Return the parser of a command line: all commands, and the options of the one it names."""
-    parser = Parser(
+    parser = _Parser(
         prog="tireid",
         description="Learns a car's lateral tire forces while it drives and freezes them.",
         epilog=limits_text(),

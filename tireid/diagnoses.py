@@ -45,7 +45,7 @@ NAMES = {  # of findings by their code, where the code is not the word
 }
 
 GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
-OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
+_OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
 
 
 def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
@@ -59,7 +59,7 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
     )
 
 
-def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
+def _finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
     """Return what was found as rows: what, size, confidence, repair."""
     return [
         [
@@ -89,12 +89,12 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
-        table = text_table([list(HEADER), *finding_rows(diagnosis)], "<<<<")
+        table = text_table([list(HEADER), *_finding_rows(diagnosis)], "<<<<")
         return "\n".join([head, table, *diagnosis.lines(unseen=unseen)])
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
 
 
-def tone_of(diagnosis: Diagnosis) -> page.Tone:
+def _tone_of(diagnosis: Diagnosis) -> page.Tone:
     """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
     if not diagnosis.healthy:
         return "bad"
@@ -110,7 +110,7 @@ def diagnosis_section(
     diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Is the log right?"
 ) -> page.Section:
     """Return the section of a report that holds a diagnosis."""
-    rows = finding_rows(diagnosis)
+    rows = _finding_rows(diagnosis)
     blocks: list[page.Block] = [
         page.Paragraph(
             text="What is wrong with the log, or with what is declared of its car, by the log "
@@ -157,7 +157,7 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
             "doctor",
             None,
             f"doctor: {one.text}",
-            one.code in GROSS or (one.code, one.channel) == OF_ALL_FORCES,
+            one.code in GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
         )
         for one in left
     ]
@@ -191,7 +191,7 @@ def write_doctor_report(
         page.Headline(
             str(count),
             f"finding{'s' * (count != 1)} in the log or the car's file",
-            tone_of(diagnosis),
+            _tone_of(diagnosis),
         ),
         page.Headline(
             str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"
@@ -199,7 +199,7 @@ def write_doctor_report(
     ]
     if after is not None:
         left = str(len(after.findings))
-        numbers.append(page.Headline(left, "left after the repair", tone_of(after)))
+        numbers.append(page.Headline(left, "left after the repair", _tone_of(after)))
     report = page.Report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",

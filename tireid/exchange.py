@@ -16,9 +16,9 @@ try:
 except ImportError:  # not on Windows
     fcntl = None  # type: ignore[assignment]
 
-AT_FDCWD, RENAME_EXCHANGE = -100, 2  # <fcntl.h> and <linux/fs.h>
-CANNOT = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP}  # here, or on this disk
-UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # <fcntl.h> and <linux/fs.h>
+_CANNOT = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP}  # here, or on this disk
+_UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
 
 
 class ClaimedError(TireidError, OSError):
@@ -49,10 +49,10 @@ def exchange(one: Path, other: Path) -> bool:
     if function is None:
         return False
     names = os.fsencode(one), os.fsencode(other)
-    if function(AT_FDCWD, names[0], AT_FDCWD, names[1], RENAME_EXCHANGE) == 0:
+    if function(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
         return True
     number = ctypes.get_errno()
-    if number in CANNOT:
+    if number in _CANNOT:
         return False
     raise OSError(number, os.strerror(number), str(other))
 
@@ -106,7 +106,7 @@ def _lock(held: int, *, ours: bool) -> None:
     except BlockingIOError:
         raise
     except OSError as error:
-        if error.errno not in UNLOCKABLE:
+        if error.errno not in _UNLOCKABLE:
             raise
         if not ours:
             raise BlockingIOError(errno.EAGAIN, "held") from error

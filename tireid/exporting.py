@@ -27,15 +27,15 @@ from tireid.progress import Progress
 from tireid.run import Run
 
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
-COSTS, TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
+_COSTS, _TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
 UNCALIBRATED = (
     "the band is as learning is told of its errors: begin with the model of a drive to calibrate it"
 )
 PARTS = (  # of an export: about how long each takes, and the option that asks for it
     ("the identifier", 1.0, ""),
     (NETWORK, 1.0, "onnx"),
-    (COSTS, 17.0, ""),
-    (TRACKING, 17.0, "mpc"),
+    (_COSTS, 17.0, ""),
+    (_TRACKING, 17.0, "mpc"),
     (UNITS, 8.0, "fmu"),
 )
 
@@ -136,12 +136,12 @@ def export(
             _write_onnx(scratch, method, car, package, start, band=band)
         if mpc:
             frozen_start(package)  # likewise
-        costs = measure(package, progress.begin(COSTS))
+        costs = measure(package, progress.begin(_COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
         told = []
         if mpc:
-            progress.begin(TRACKING)
+            progress.begin(_TRACKING)
             told = write_tracker(scratch, package, single=single, caution=caution)
         if fmu:
             progress.begin(UNITS)
@@ -187,7 +187,7 @@ def _write_onnx(
     export_onnx(model, folder / f"{package.specialized.name}.onnx", with_band=band)
 
 
-TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
+_TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
 
 
 def write_tracker(folder: Path, package: Package, *, single: bool, caution: float) -> list[str]:
@@ -205,7 +205,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     texts = {**tracker.files, "README.md": mpc_readme(tracker, mpc_figures_text(costs, times))}
     texts[manifest] = with_figures(texts[manifest], costs)
     _write_texts(folder, pair.files)
-    _write_texts(folder / TRACKER, texts)
+    _write_texts(folder / _TRACKER, texts)
     return [
         *(f"{one.processor}, {one.precision}: {tracker.name} takes {one.words}" for one in costs),
         f"this machine: {tracker.name} takes {times.median:.0f} us a step, hash "

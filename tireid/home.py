@@ -14,7 +14,7 @@ HOME = __file__.rsplit(os.sep, 2)[0]
 PACKAGES = ("codegen", "models", "identifier", "mpc")
 
 
-class OwnPackages:
+class _OwnPackages:
     """What Python asks where a module lies; it answers for the packages of tireid alone."""
 
     @staticmethod
@@ -31,8 +31,8 @@ def find_own_packages() -> None:
             raise ImportError(
                 f"{place} hides the package {name!r} of tireid, as it was imported first: rename it"
             )
-    if OwnPackages not in sys.meta_path:
-        sys.meta_path.insert(0, OwnPackages)
+    if _OwnPackages not in sys.meta_path:
+        sys.meta_path.insert(0, _OwnPackages)
 
 
 def _place(module: ModuleType | None) -> str:

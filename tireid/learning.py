@@ -22,8 +22,8 @@ from tireid.run import Run
 log = logging.getLogger("tireid.doctor")
 
 # How to make what a door wants, for who hands it something else.
-RECORDING = "as of read_recording"
-VEHICLE = "as of Vehicle.from_toml or sedan"
+_RECORDING = "as of read_recording"
+_VEHICLE = "as of Vehicle.from_toml or sedan"
 METHOD = 'as of make_method("axle", vehicle), or a name of methods()'
 TIRE = "as of Run.tire or TireModel.load"
 
@@ -67,8 +67,8 @@ def identify(
     TypeError
         Where an argument is of another kind.
     """
-    require_kind(Recording, RECORDING, recording=recording)
-    require_kind(Vehicle, VEHICLE, vehicle=vehicle)
+    require_kind(Recording, _RECORDING, recording=recording)
+    require_kind(Vehicle, _VEHICLE, vehicle=vehicle)
     if isinstance(method, str):
         method = make_method(method, vehicle)
     if method is not None:
@@ -110,7 +110,7 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
     TypeError
         Where an argument is of another kind.
     """
-    require_kind(Recording, RECORDING, recording=recording)
+    require_kind(Recording, _RECORDING, recording=recording)
     require_kind(TireModel, TIRE, tire=tire)
     return predict(tire, with_v_y(recording, tire), since=since)
 

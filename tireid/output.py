@@ -30,7 +30,7 @@ from tireid.progress import say
 
 MARKER = ".tireid"  # in every folder that we write: what we put there
 FORMAT = "tireid output 1"
-SPARE_NAMES = 1000  # results-2, results-3, ...
+_SPARE_NAMES = 1000  # results-2, results-3, ...
 
 
 class OutputError(TireidError, ValueError):
@@ -253,11 +253,11 @@ def _swap(new: Path, target: Path, final: Path, *, aside: Path) -> None:
 
 def _kept_elsewhere(new: Path, final: Path) -> Path:
     """Give the new folder a name that is free, and return it."""
-    for number in range(2, SPARE_NAMES):
+    for number in range(2, _SPARE_NAMES):
         other = final.with_name(f"{final.name}-{number}")
         if not os.path.lexists(other) and _takes_name(new, other):
             return other
-    raise OutputError(f"{final.name}-2 to {final.name}-{SPARE_NAMES} are all taken")
+    raise OutputError(f"{final.name}-2 to {final.name}-{_SPARE_NAMES} are all taken")
 
 
 def _discard(folder: Path) -> None:

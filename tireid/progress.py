@@ -124,7 +124,7 @@ class Stopwatch:
 # then; in a program that only uses the library nothing at all.
 
 QUIET, PLAIN, LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
-TELLING = 0.02  # share from which the time left is told
+_TELLING = 0.02  # share from which the time left is told
 _listening = False
 _live = False  # whether such a line stands on the terminal
 
@@ -215,7 +215,7 @@ class Progress:
         self._told = now
         done = min(self._before + self._weight * share, 1.0)
         told = [text or self._name, f"{100.0 * done:.0f} %"]
-        if done > TELLING:
+        if done > _TELLING:
             told.append(f"{_time_text((now - self._begun) * (1.0 - done) / done)} left")
         line = f"{self._what}: {', '.join(one for one in told if one)}"
         if live:

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 from codegen.escape import html
 from models.files import write_atomically
 
-SIGNATURES = {  # of files, by their kind
+_SIGNATURES = {  # of files, by their kind
     b"\x89PNG\r\n\x1a\n": "png",
     b"GIF89a": "gif",
     b"RIFF": "webp",
@@ -49,15 +49,15 @@ LETTERS = {
     "lambda": "λ",
     "theta": "θ",
 }
-INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|l_f|l_r|A_d|T_freeze)\b")
-RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|l_f|l_r|A_d|T_freeze)\b")
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def printed(text: str) -> str:
     """Return a text of our own with Greek letters and raised exponents in place of ASCII."""
     words = re.compile(rf"\b({'|'.join(LETTERS)})(?=\d?\b)")
     greek = words.sub(lambda found: LETTERS[found[1]], text)
-    raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(RAISED), greek)
+    raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), greek)
     return raised.replace("`", "").replace("->", "→").replace("+-", "±")
 
 
@@ -118,7 +118,7 @@ class Picture:
 
     def __post_init__(self) -> None:
         data = self.image.read_bytes() if isinstance(self.image, Path) else self.image
-        if not data.startswith(tuple(SIGNATURES)):
+        if not data.startswith(tuple(_SIGNATURES)):
             raise ValueError(f"the picture {self.caption!r} must be SVG, PNG, GIF or WebP")
         object.__setattr__(self, "image", data)
 
@@ -221,7 +221,7 @@ def write_report(path: Path, report: Report) -> None:
 
 def _inline(text: str) -> str:
     """Return text for the page, with the indices of our letters lowered."""
-    return INDEXED.sub(
+    return _INDEXED.sub(
         lambda found: "<i>{}</i><sub>{}</sub>".format(*found[1].split("_")), html(text)
     )
 
@@ -284,7 +284,7 @@ def _table(table: Table, number: int) -> str:
 def _picture(picture: Picture, number: int) -> str:
     assert isinstance(picture.image, bytes)
     caption, data = _inline(picture.caption), b64encode(picture.image).decode("ascii")
-    (kind,) = (name for start, name in SIGNATURES.items() if picture.image.startswith(start))
+    (kind,) = (name for start, name in _SIGNATURES.items() if picture.image.startswith(start))
     read = f'<i class="read">{_inline(picture.read)}</i>' if picture.read else ""
     return "\n".join(
         [

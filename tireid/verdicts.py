@@ -15,7 +15,7 @@ from tireid.report import Block, Cell, Headline, Marked, Paragraph, Section, Tab
 HEADER = ("", "front", "is", "rear", "is")
 
 
-def numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
+def _numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
     """Return the numbers of a verdict by title with the unit that is printed, and by axle."""
     rows: dict[str, dict[Axle, Number]] = {}
     for number in verdict.numbers:
@@ -24,7 +24,7 @@ def numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
     return rows
 
 
-def marked_number(verdict: Verdict, number: Number | None) -> Marked:
+def _marked_number(verdict: Verdict, number: Number | None) -> Marked:
     """Return a number of a verdict as a report shows it: grey what was not identified.
 
     Grey are all numbers of an answer that is not valid, struck those of the axle that refuses it.
@@ -43,7 +43,7 @@ def marked_number(verdict: Verdict, number: Number | None) -> Marked:
 def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
     rows = [
         [title, *(cell for axle in AXLES for cell in _cells(by_axle.get(axle)))]
-        for title, by_axle in numbers_by_title(verdict).items()
+        for title, by_axle in _numbers_by_title(verdict).items()
     ]
     table = [text_table([list(HEADER), *rows])] if numbers else []
     return "\n".join([*table, *verdict.lines])
@@ -116,9 +116,9 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
     """Return stiffness, grip and relaxation length of both axles, as numbers of a report."""
     return [
         Headline(
-            [marked_number(verdict, by_axle[axle]) for axle in AXLES], f"{title}, front / rear"
+            [_marked_number(verdict, by_axle[axle]) for axle in AXLES], f"{title}, front / rear"
         )
-        for title, by_axle in numbers_by_title(verdict).items()
+        for title, by_axle in _numbers_by_title(verdict).items()
         if len(by_axle) == len(AXLES)
     ]
 
@@ -151,8 +151,8 @@ def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
 def verdict_section(verdict: Verdict) -> Section:
     """Return the section of a report that holds a verdict; its findings are the warnings above."""
     rows: list[list[Cell]] = [
-        [title, *(marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
-        for title, by_axle in numbers_by_title(verdict).items()
+        [title, *(_marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
+        for title, by_axle in _numbers_by_title(verdict).items()
     ]
     lines = (verdict.headline, verdict.missed_line, *verdict.unseen)
     blocks: list[Block] = [

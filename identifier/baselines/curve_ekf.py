@@ -28,14 +28,14 @@ from models.vehicle import GRAVITY, Vehicle
 # has a peak and keeps its sign.
 
 TYPICAL_SHAPE = 1.4  # C of a passenger tire, Pacejka, Tyre and Vehicle Dynamics, figure 4.9
-LOGIT = math.log((TYPICAL_SHAPE - 1.0) / (2.0 - TYPICAL_SHAPE))
+_LOGIT = math.log((TYPICAL_SHAPE - 1.0) / (2.0 - TYPICAL_SHAPE))
 STIFFNESS, SHAPE, FRICTION = range(3)
 LIMITS = (2.0, 3.0, 1.5)  # of |θ| by kind: stiffness within a factor of 7.4, friction 4.5
-LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
-OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
+_LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
+_OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
 
 
-SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
+_SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
 KINDS = (STIFFNESS, STIFFNESS, SHAPE, SHAPE, FRICTION, FRICTION)  # of each θ of the curve
 MAGIC = CURVES["magic_formula"]
 
@@ -43,27 +43,27 @@ MAGIC = CURVES["magic_formula"]
 def decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
     """Return B, C, D (2, 3) of θ: log stiffness, logit shape, log friction; front and rear each."""
     slope = ca.vertcat(p.C_f, p.C_r) * ca.exp(theta[0:2])  # B C D, which data tell sooner than B
-    C = 1 + 1 / (1 + ca.exp(-theta[2:4] - LOGIT))
+    C = 1 + 1 / (1 + ca.exp(-theta[2:4] - _LOGIT))
     D = friction * loads * ca.exp(theta[4:6])
     return ca.horzcat(slope / (C * D), C, D)
 
 
-def encoded(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
+def _encoded(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
     """Return the θ that `decoded` makes such parameters of, (6,)."""
     B, C, D = parameters.T
     stated, loads = np.array(vehicle.bicycle)[4:], np.array(vehicle.axle_loads)
-    shape = np.log((C - 1.0) / (2.0 - C)) - LOGIT
+    shape = np.log((C - 1.0) / (2.0 - C)) - _LOGIT
     return np.concatenate([np.log(B * C * D / stated), shape, np.log(D / (friction * loads))])
 
 
 OWN = 4  # unknowns beside those of the curve: ln σ/σ₀ (2,), δ₀ and b over their spreads
-OWN_PRIOR = ("relaxation_length", "steering_spread", "v_y_spread")
+_OWN_PRIOR = ("relaxation_length", "steering_spread", "v_y_spread")
 
 
-def filtered_tire(textbook: bool) -> FilteredTire:
+def _filtered_tire(textbook: bool) -> FilteredTire:
     """Return what makes the forces of a curve by θ = [curve, ln σ/σ₀, δ₀ and b over spreads].
 
-    Prior: friction [-], then those of `OWN_PRIOR` where it is not the textbook's.
+    Prior: friction [-], then those of `_OWN_PRIOR` where it is not the textbook's.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def filtered_tire(textbook: bool) -> FilteredTire:
     def lag(known: Any, theta: Any) -> Any:
         return known[1] * ca.exp(theta[n : n + 2])
 
-    own, prior = (0, 0) if textbook else (OWN, len(OWN_PRIOR))
+    own, prior = (0, 0) if textbook else (OWN, len(_OWN_PRIOR))
     return FilteredTire(
         slip=slip,
         force=force,
@@ -95,7 +95,7 @@ def filtered_tire(textbook: bool) -> FilteredTire:
 
 @cache
 def _scan(textbook: bool) -> Scan:
-    tire = filtered_tire(textbook)
+    tire = _filtered_tire(textbook)
     return Scan(build_step("magic_formula_ekf", tire), carry=tire.carry, over=OVER)
 
 
@@ -152,7 +152,7 @@ class CurveEkf(Method):
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        filtered = ("walk", *NOISE, "friction", *SPREADS, *OWN_PRIOR, "relaxation_spread")
+        filtered = ("walk", *NOISE, "friction", *_SPREADS, *_OWN_PRIOR, "relaxation_spread")
         names = (*filtered, "dt", "learning_speed", "min_speed")
         require_positive(ValueError, **{name: getattr(self, name) for name in names})
 
@@ -203,7 +203,7 @@ class CurveEkf(Method):
             refusal = "the stored model is not a curve 'magic_formula'"
             stored = resumed(start, CurveModel, refusal, curve="magic_formula")
             with np.errstate(invalid="ignore", divide="ignore"):  # judged below
-                theta = encoded(vehicle, self.friction, stored.parameters)
+                theta = _encoded(vehicle, self.friction, stored.parameters)
             if not np.isfinite(theta).all():
                 raise ValueError(
                     "a curve to begin with must have positive stiffness and friction and a shape "
@@ -211,7 +211,7 @@ class CurveEkf(Method):
                 )
             own = self._own_of(stored)
         lags = 0 if self.textbook else 2
-        prior = () if self.textbook else OWN_PRIOR
+        prior = () if self.textbook else _OWN_PRIOR
         noise = [self.v_y_noise, self.r_noise, *[self.v_y_noise / self.learning_speed] * lags]
         return Setup(
             scan=_scan(self.textbook),
@@ -236,7 +236,7 @@ class CurveEkf(Method):
     @property
     def spread(self) -> Array:
         """Standard deviations of the unknowns θ at first, (n,) [-]."""
-        of_curve = [getattr(self, SPREADS[kind]) for kind in KINDS]
+        of_curve = [getattr(self, _SPREADS[kind]) for kind in KINDS]
         own = [] if self.textbook else [self.relaxation_spread, self.relaxation_spread, 1.0, 1.0]
         return np.array([*of_curve, *own])
 
@@ -244,7 +244,7 @@ class CurveEkf(Method):
     def limit(self) -> Array:
         """What the unknowns θ stay within, (n,) [-]."""
         of_curve = [LIMITS[kind] for kind in KINDS]
-        own = [] if self.textbook else [LAG_LIMIT, LAG_LIMIT, *OFFSET_LIMITS]
+        own = [] if self.textbook else [_LAG_LIMIT, _LAG_LIMIT, *_OFFSET_LIMITS]
         return np.array([*of_curve, *own])
 
     def model(self, vehicle: Vehicle, theta: Array) -> CurveModel:
@@ -279,7 +279,7 @@ class CurveEkf(Method):
         """Return the lag and the offsets of a stored curve as unknowns, (4,) or none."""
         if self.textbook:
             return np.zeros(0)
-        lag = np.maximum(stored.relaxation_length / self.relaxation_length, math.exp(-LAG_LIMIT))
+        lag = np.maximum(stored.relaxation_length / self.relaxation_length, math.exp(-_LAG_LIMIT))
         return np.concatenate(
             [np.log(lag), stored.offset / (self.steering_spread, self.v_y_spread)]
         )

@@ -40,7 +40,7 @@ from models.vehicle import GRAVITY, Vehicle
 
 TINY = 1e-9  # rad: keeps Dugoff's λ finite at zero slip, where it does not matter
 LONGEST = 10.0  # wheelbases, of a relaxation length
-MOST_OFFSET = np.array([0.5, 10.0])  # rad and m/s: beyond it a sensor is not mounted, but broken
+_MOST_OFFSET = np.array([0.5, 10.0])  # rad and m/s: beyond it a sensor is not mounted, but broken
 
 
 class Curve(NamedTuple):
@@ -55,7 +55,7 @@ class Curve(NamedTuple):
     force: Callable[..., Any]
 
 
-def small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+def _small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - (v_y ± l r)/v_x of (3), (2,) [rad].
 
     Parameters
@@ -67,7 +67,7 @@ def small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     return slip_angles(p.l_f, p.l_r, v_x, x, u)
 
 
-def wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+def _wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - atan((v_y ± l r)/v_x) (2,) [rad].
 
     Parameters
@@ -76,7 +76,7 @@ def wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     """
-    return u + ca.atan(small_slip(p, v_x, x, u) - u)
+    return u + ca.atan(_small_slip(p, v_x, x, u) - u)
 
 
 def linear(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
@@ -127,9 +127,9 @@ def dugoff(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
 
 
 CURVES: Mapping[str, Curve] = {
-    "linear": Curve(("C_N_rad",), small_slip, linear),
-    "magic_formula": Curve(("B_1_rad", "C", "D_N"), wheel_slip, magic_formula),
-    "dugoff": Curve(("C_N_rad", "mu"), wheel_slip, dugoff),
+    "linear": Curve(("C_N_rad",), _small_slip, linear),
+    "magic_formula": Curve(("B_1_rad", "C", "D_N"), _wheel_slip, magic_formula),
+    "dugoff": Curve(("C_N_rad", "mu"), _wheel_slip, dugoff),
 }
 
 
@@ -149,7 +149,7 @@ def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: 
 # A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff.
 
 
-def build_curve(name: str, *, lagged: bool) -> ca.Function:
+def _build_curve(name: str, *, lagged: bool) -> ca.Function:
     """Return a curve as a step with one output, axle_force (2,) [N]; at rest 0.
 
     Carried: `LaggedSlip` where it lags, else nothing. Constant: parameters of the curve (2, n),
@@ -184,15 +184,15 @@ def build_curve(name: str, *, lagged: bool) -> ca.Function:
 
 
 @cache
-def curve_scan(name: str, *, lagged: bool) -> Scan:
-    """Return the compiled loop of `build_curve`.
+def _curve_scan(name: str, *, lagged: bool) -> Scan:
+    """Return the compiled loop of `_build_curve`.
 
     Parameters
     ----------
     name : one of `CURVES`.
     lagged : whether the slip lags.
     """
-    return Scan(build_curve(name, lagged=lagged), carry=LAG_PORTS if lagged else (), over=OVER)
+    return Scan(_build_curve(name, lagged=lagged), carry=LAG_PORTS if lagged else (), over=OVER)
 
 
 def unlagged() -> dict[str, Array]:
@@ -242,7 +242,7 @@ class CurveModel(TireModel):
         longest = LONGEST * self.vehicle.wheelbase
         for name, value, low, high in (
             ("relaxation_length [m]", self.relaxation_length, 0.0, longest),
-            ("offset [rad, m/s]", self.offset, -MOST_OFFSET, MOST_OFFSET),
+            ("offset [rad, m/s]", self.offset, -_MOST_OFFSET, _MOST_OFFSET),
         ):
             if value.shape != (2,) or not ((low <= value) & (value <= high)).all():
                 raise ValueError(
@@ -253,7 +253,7 @@ class CurveModel(TireModel):
     def setup(self, dt: float) -> Setup:
         """Return what a replay needs."""
         return Setup(
-            scan=curve_scan(self.curve, lagged=self.lagged),
+            scan=_curve_scan(self.curve, lagged=self.lagged),
             carry=unlagged() if self.lagged else {},
             constants={
                 "parameters": self.parameters,

@@ -53,7 +53,7 @@ from models.vehicle import Vehicle
 TIRE = TIRES["dugoff"]
 Z = 2 + TIRE.unknowns  # numbers of z
 CARRY = ("estimate", "P", "arrival", "arrival_P", "trajectory", "window", "running")
-OWN_PORTS = (
+_OWN_PORTS = (
     *(port for port in PORTS if port.name != "before"),
     Port("arrival", "of estimate", "what is known of z before the window"),
     Port("arrival_P", "of estimate", "covariance of arrival", rule=COVARIANCE),
@@ -161,7 +161,7 @@ class Begun(NamedTuple):
     ahead: Any
 
 
-def build_beginning() -> ca.Function:
+def _build_beginning() -> ca.Function:
     """Return `Begun` of estimate, P, running, the last column, the sample and the constants."""
     heard = heard_ports()
     s, p = heard.sample, heard.sample.parameters
@@ -194,7 +194,7 @@ def build_beginning() -> ca.Function:
     )
 
 
-def build_told() -> ca.Function:
+def _build_told() -> ca.Function:
     """Return axle_force and v_y of the next estimate, of the θ carried into the sample."""
     s, numbers = heard_ports().sample, ca.SX.sym("numbers", len(Numbers._fields))
     following, estimate = ca.SX.sym("following", Z), ca.SX.sym("estimate", Z)
@@ -229,7 +229,7 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     known = [port[name] for name in constants]
     old_at, old = ca.horzsplit(port["trajectory"]), ca.horzsplit(port["window"])
     first = [port["estimate"], port["P"], port["running"], old[-1]]
-    begun = Begun(*build_beginning()(*first, *(port[name] for name in OVER), *known))
+    begun = Begun(*_build_beginning()(*first, *(port[name] for name in OVER), *known))
 
     def forward(at: list[Any], columns: list[Any], z: Any, P: Any) -> list[Stage]:
         found: list[Stage] = []
@@ -263,7 +263,7 @@ def build_step(samples: int, iterations: int) -> ca.Function:
         "window": ca.horzcat(*columns),
         "running": ca.logic_and(begun.fast, sane),
     }
-    told = build_told()(estimate, port["estimate"], port["u"], port["v_x"], *known)
+    told = _build_told()(estimate, port["estimate"], port["u"], port["v_x"], *known)
     return ca.Function(
         f"horizon_{samples}_{iterations}",
         list(port.values()),
@@ -351,7 +351,7 @@ class HorizonEstimator(Method):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
-        return OWN_PORTS
+        return _OWN_PORTS
 
     @property
     def remark(self) -> str:

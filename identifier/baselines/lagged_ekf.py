@@ -41,7 +41,7 @@ STIFFNESS, FRICTION = 14.0, 0.85  # at first, in static axle loads
 BOUNDS = np.log([[2.0, 60.0], [0.2, 1.6]])  # of ln C and ln μ
 TIRE = slice(4, 8)  # of the state
 STATES = 10
-NO_GATE = 1e6  # standard deviations
+_NO_GATE = 1e6  # standard deviations
 
 
 class Numbers(NamedTuple):
@@ -62,7 +62,7 @@ class Numbers(NamedTuple):
     learning_speed: Any
 
 
-def curve_parameters(theta: Any, loads: Any) -> Any:
+def _curve_parameters(theta: Any, loads: Any) -> Any:
     """Return B [1/rad], C [-] and D [N] of both axles, (2, 3).
 
     Parameters
@@ -88,7 +88,7 @@ def build_step(name: str) -> ca.Function:
     going = ca.logic_and(learning, running > 0.5)
 
     def force(z: Any, slip: Any, u: Any) -> Any:
-        return CURVE.force(curve_parameters(z[TIRE], loads), loads, slip, u)
+        return CURVE.force(_curve_parameters(z[TIRE], loads), loads, slip, u)
 
     def slip_of(z: Any, v_x: Any, x: Any, u: Any) -> Any:
         return measured_slip(CURVE, p, ca.vertcat(z[8], 0), v_x, x, u)
@@ -109,7 +109,7 @@ def build_step(name: str) -> ca.Function:
     H[2, :] *= heard.hears
     missed = ca.vertcat(s.x - shows[:2], heard.hears * (heard.a_y - shows[2]))
     R = ca.diag(ca.vertcat(*told[:3]) ** 2)
-    found = corrected(F @ P @ F.T + ca.diag(walks**2 * dt), H, R, missed, NO_GATE)
+    found = corrected(F @ P @ F.T + ca.diag(walks**2 * dt), H, R, missed, _NO_GATE)
 
     after = ahead + found.move
     low, high = (np.repeat(BOUNDS[:, k], 2) for k in (0, 1))
@@ -241,7 +241,7 @@ class LaggedEkf(Method):
         state : estimate (10,).
         """
         z = state["estimate"].ravel()
-        values = curve_parameters(ca.DM(z[TIRE]), ca.DM(vehicle.axle_loads))
+        values = _curve_parameters(ca.DM(z[TIRE]), ca.DM(vehicle.axle_loads))
         return CurveModel(
             vehicle=vehicle,
             curve="magic_formula",

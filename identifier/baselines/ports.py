@@ -16,7 +16,7 @@ from identifier.setup import Port
 from models.bicycle import BicycleParameters, bicycle
 
 OVER = ("x", "u", "v_x")
-SAMPLING = ("dt", "min_speed")
+_SAMPLING = ("dt", "min_speed")
 
 
 class Sample(NamedTuple):
@@ -52,7 +52,7 @@ def sample_ports() -> Sample:
         u=ca.SX.sym("u", 2),
         v_x=ca.SX.sym("v_x"),
         vehicle=vehicle,
-        sampling=ca.SX.sym("sampling", len(SAMPLING)),
+        sampling=ca.SX.sym("sampling", len(_SAMPLING)),
         parameters=BicycleParameters(*ca.vertsplit(vehicle)),
     )
 

@@ -18,11 +18,11 @@ from models.bicycle import BicycleParameters
 OVER = ("x", "u", "v_x", "a_y")  # of x the yaw rate alone
 V_Y = Port("v_y", "m/s", "lateral velocity at the center of gravity, positive to the left")
 V_Y_SD = Port("v_y_sd", "m/s", "standard deviation of v_y")
-MOST_FELT = 98.0  # m/s²: no car feels more
+_MOST_FELT = 98.0  # m/s²: no car feels more
 MOST_SLIDING = 0.7  # |v_y|/v_x beyond which an estimate is none
 
 
-class Heard(NamedTuple):
+class _Heard(NamedTuple):
     """A sample without v_y: the ports of it, and a_y [m/s²], 0 where there is none.
 
     hears : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
@@ -45,11 +45,11 @@ class Heard(NamedTuple):
         return self.sample.x[1]
 
 
-def heard_ports() -> Heard:
+def heard_ports() -> _Heard:
     """Return fresh symbols."""
     a_y = ca.SX.sym("a_y")
-    hears = ca.fabs(a_y) < MOST_FELT  # NaN is not
-    return Heard(sample_ports(), ca.if_else(hears, a_y, 0), hears, a_y)
+    hears = ca.fabs(a_y) < _MOST_FELT  # NaN is not
+    return _Heard(sample_ports(), ca.if_else(hears, a_y, 0), hears, a_y)
 
 
 def steady_v_y(p: BicycleParameters, v_x: Any, r: Any, u: Any) -> Any:
@@ -106,7 +106,7 @@ def expected(
     return ca.vertcat(estimate[1], (F[0] + F[1]) / p.m)
 
 
-class Corrected(NamedTuple):
+class _Corrected(NamedTuple):
     """What a measurement makes of an estimate.
 
     move : of the estimate (n,).   P : covariance after (n, n).   keep : I - K H (n, n).
@@ -119,7 +119,7 @@ class Corrected(NamedTuple):
     pull: Any
 
 
-def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> Corrected:
+def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> _Corrected:
     """Return what a measurement of two numbers makes of an estimate, in Joseph's form.
 
     Parameters
@@ -137,4 +137,4 @@ def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> Correcte
     K = P @ H.T @ S_inverse
     keep = ca.SX.eye(P.size1()) - K @ H
     after = keep @ P @ keep.T + K @ R @ K.T
-    return Corrected(K @ trusted, (after + after.T) / 2, keep, H.T @ S_inverse @ trusted)
+    return _Corrected(K @ trusted, (after + after.T) / 2, keep, H.T @ S_inverse @ trusted)

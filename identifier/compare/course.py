@@ -154,7 +154,7 @@ class Shares(NamedTuple):
     other: float | None
 
 
-def shown_to(method: Method, recording: Recording) -> Recording:
+def _shown_to(method: Method, recording: Recording) -> Recording:
     """Return what a comparison shows a method: no lateral velocity, where it tells one."""
     return recording if method.needs_v_y else replace(recording, v_y=None)
 
@@ -168,7 +168,7 @@ def cross_replay(method: Method, course: Course) -> Trial:
     online, frozen, diverged_at, freezes = {}, {}, {}, True
     told: dict[str, SideSlip] = {}
     for recording in course.recordings:
-        history = identify(shown_to(method, recording), course.vehicle, method)
+        history = identify(_shown_to(method, recording), course.vehicle, method)
         end = float(recording.t[-1])
         online[recording.name] = course.error(recording, history.axle_force)
         found = side_slip(history, course.min_speed, recording.v_y)

@@ -95,7 +95,7 @@ def run_comparison(
     )
 
 
-def frozen_share(found: Shares) -> float | None:
+def _frozen_share(found: Shares) -> float | None:
     """Return the frozen error on other recordings, or where learnt if there is only one [%]."""
     return found.in_sample if found.other is None else found.other
 
@@ -105,7 +105,7 @@ def ranking(comparison: Comparison) -> list[str]:
 
     def key(name: str) -> tuple[bool, float]:
         found = comparison.shares(name)
-        error = frozen_share(found)
+        error = _frozen_share(found)
         return (error is None, found.online if error is None else error)
 
     return sorted(comparison.trials, key=key)

@@ -24,7 +24,7 @@ OF_A_Y = ("a_y.offset", "a_y.factor", "a_y.delay", "a_y.place", "a_y.lag")
 FILTERED, STRIDE = 0.25, 0.1  # [s] of means, and between them
 ERROR, RELATIVE = 0.02, 0.03  # of g, and of the acceleration
 LEAST = 0.3  # of the scale of what is missed
-LEAST_MEMORY = 0.25  # [s]
+_LEAST_MEMORY = 0.25  # [s]
 
 
 class Line(NamedTuple):
@@ -106,7 +106,7 @@ class Accelerometer:
             S2 = max(float(np.mean(w * e**2)), LEAST**2)
         if not self.memory:
             found = autocorrelation_time([np.clip(e, -4.0, 4.0)], STRIDE, e.size)
-            self.memory = max(found, LEAST_MEMORY)
+            self.memory = max(found, _LEAST_MEMORY)
             n = seconds / self.memory / moved.size
         away = (theta - mean) / sd
         loss = 2.5 * np.log1p(e**2 / (4.0 * S2)).sum() + 0.5 * moved.size * math.log(S2)

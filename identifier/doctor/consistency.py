@@ -23,17 +23,17 @@ from models.vehicle import GRAVITY, Vehicle
 FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
 # Curves that are tried, on one grid of c and μ, so that many have the same c/μ: to saturate them,
 # which costs most, is done once for each of these.
-FINENESS, STIFFNESSES, FRICTIONS = 100.0 ** (1.0 / 27.0), 28, 15
-STIFFNESS = FINENESS ** np.arange(STIFFNESSES)  # c [1/rad], 1 to 100
-FRICTION = 0.3 * FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], 0.3 to 3.3
-RATIOS = FINENESS ** np.arange(1 - FRICTIONS, STIFFNESSES)[:, None] / 0.3  # c/μ [1/rad]
-RATIO_OF = np.arange(STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS - 1  # of μ and c
+_FINENESS, _STIFFNESSES, FRICTIONS = 100.0 ** (1.0 / 27.0), 28, 15
+STIFFNESS = _FINENESS ** np.arange(_STIFFNESSES)  # c [1/rad], 1 to 100
+FRICTION = 0.3 * _FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], 0.3 to 3.3
+RATIOS = _FINENESS ** np.arange(1 - FRICTIONS, _STIFFNESSES)[:, None] / 0.3  # c/μ [1/rad]
+_RATIO_OF = np.arange(_STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS - 1  # of μ and c
 # A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
-DISBELIEF = 0.3  # per square of the logarithm of c over the told one
+_DISBELIEF = 0.3  # per square of the logarithm of c over the told one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
 EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
 CLEAR = 2.5  # times its noise that a channel must swing for its unit to be told
-ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
+_ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
 
 
 class Reading(NamedTuple):
@@ -190,20 +190,20 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> Axle
 
 def _curve_leaves(force: Array, slip: Array, told: float) -> float:
     """Return the logarithm of the share of a force that no curve of its slip explains."""
-    disbelief = DISBELIEF * np.log(STIFFNESS / told) ** 2
+    disbelief = _DISBELIEF * np.log(STIFFNESS / told) ** 2
     force = force - force.mean()
     size = float(force @ force) + 1e-12
     bent = RATIOS * slip
     bent /= np.sqrt(1.0 + bent * bent)
     bent -= bent.mean(axis=1, keepdims=True)
     along, power = bent @ force, np.einsum("ij,ij->i", bent, bent)
-    left = size - 2.0 * FRICTION * along[RATIO_OF] + FRICTION**2 * power[RATIO_OF]
+    left = size - 2.0 * FRICTION * along[_RATIO_OF] + FRICTION**2 * power[_RATIO_OF]
     return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + EXACT) + disbelief))
 
 
 def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
     """Return the logarithm of the share of a_y that the motion does not explain."""
     shown, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
-    slope = float(np.clip(shown @ moved / (moved @ moved + 1e-12), *ROLLING))
+    slope = float(np.clip(shown @ moved / (moved @ moved + 1e-12), *_ROLLING))
     left = float(np.sum((shown - slope * moved) ** 2)) / (float(shown @ shown) + 1e-12)
     return math.log(min(left, 1.0) + EXACT)

@@ -30,7 +30,7 @@ from identifier.motion.parameters import INDEX
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-Widths = Mapping[str, float]  # standard deviation of what is believed wide, by suspect's parameter
+_Widths = Mapping[str, float]  # standard deviation of what is believed wide, by suspect's parameter
 BESIDE = {"ln_inertia": 0.1}  # believed of any car: what is told of it is an estimate
 
 
@@ -66,7 +66,7 @@ class Rules:
 
 RULES = Rules()
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
-SIZES_BLIND = "sizes of faults: no tire explains the log"
+_SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
     (
         "delta_f",
@@ -110,7 +110,7 @@ class Candidate(NamedTuple):
         return one.channel == two.channel and {one.code, two.code} == {"delay", "lag"}
 
 
-class Taken(NamedTuple):
+class _Taken(NamedTuple):
     """A fault that was taken in, those that this drive cannot tell from it, and if it is sure."""
 
     first: Candidate
@@ -133,14 +133,14 @@ class Search:
     accelerometer: Accelerometer | None
     wide: dict[str, float] = field(default_factory=dict)
     mean: dict[str, float] = field(default_factory=dict)
-    found: list[Taken] = field(default_factory=list)
+    found: list[_Taken] = field(default_factory=list)
 
     @property
     def vehicle(self) -> Vehicle:
         """The car as it was told."""
         return self.problem.vehicle
 
-    def priors(self, wide: Widths) -> Priors:
+    def priors(self, wide: _Widths) -> Priors:
         """Return what is believed where some of it is believed wide.
 
         Without the tails of a typed number, which would be a suspect that is wide from the first.
@@ -169,7 +169,7 @@ class Search:
         """Return what is believed wide with one more."""
         return {**self.wide, one.parameter: one.scaled(one.wide, self.vehicle)}
 
-    def line(self, p: Array, wide: Widths) -> Line | None:
+    def line(self, p: Array, wide: _Widths) -> Line | None:
         """Return what the accelerometer says, None where there is none."""
         return None if self.accelerometer is None else self.accelerometer.line(p, wide)
 
@@ -336,7 +336,7 @@ class Search:
                 # What the accelerometer said of it, the balance shall not forget.
                 self.mean[best.suspect.parameter] = best.value
                 self.wide[best.suspect.parameter] = RULES.kept * best.deviation
-            self.found.append(Taken(best, alike, sure))
+            self.found.append(_Taken(best, alike, sure))
             problem = self.problem.under(self.priors(self.wide))
             start = base.p if best.post is None else best.post.p
             base = descend(problem, start, enough=RULES.enough)
@@ -378,7 +378,7 @@ class Search:
     def left_out(
         self,
         post: Posterior,
-        wide: Widths,
+        wide: _Widths,
         parts: tuple[Array, Array],
         zero: Suspect | None = None,
     ) -> Array:
@@ -498,7 +498,7 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
         channel, text = UNEXPLAINED[int(np.argmax(worst))]
         share = f"{100.0 * worst.max():.0f} % of its force is missed (usual: below 12 %)"
         one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")
-        return Examination((one,), (SIZES_BLIND,), taken)
+        return Examination((one,), (_SIZES_BLIND,), taken)
     found = list(search.findings(post))
     if search.accelerometer is not None:
         found = _of_one_device(found, vehicle)

@@ -7,7 +7,7 @@ from typing import Any
 from models.recordings.repair import Repair
 
 MOST = 0.99  # confidence that is told
-MATTERS = 0.5  # confidence that something is wrong, from which it is told as such
+_MATTERS = 0.5  # confidence that something is wrong, from which it is told as such
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ class Finding:
     @property
     def matters(self) -> bool:
         """Whether it is more likely than not that something is wrong with the log."""
-        return self.alarm >= MATTERS and not self.note
+        return self.alarm >= _MATTERS and not self.note
 
     @property
     def percent(self) -> str:

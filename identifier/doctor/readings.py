@@ -23,28 +23,28 @@ from identifier.doctor.consistency import (
 from models.vehicle import GRAVITY, Vehicle
 
 DEGREE, MILLI = math.pi / 180.0, 1e-3
-KMH, MPH, KNOT = 1.0 / 3.6, 0.44704, 1852.0 / 3600.0
+_KMH, _MPH, _KNOT = 1.0 / 3.6, 0.44704, 1852.0 / 3600.0
 GAIN = 1.1  # that a change must earn: less than it is left by a third in a sum of logarithms
-FREEDOM = 0.5  # that a change must earn beside, whose factor is free
+_FREEDOM = 0.5  # that a change must earn beside, whose factor is free
 ARM = "velocity_sensor_x"  # a size and no gross fault, tried beside: it may explain a log as well
 FREE = ("steering", "other_car", "yaw_inertia", ARM)
-DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
+_DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
 KEPT = 8  # readings that are taken further
 JUDGED = 10  # of the best, by laws that need no vehicle
 MOST = 4  # changes at once
 STEERING = np.geomspace(1.0 / 2500.0, 4.0, 48)  # factors of the steering angle that are tried
-SAME_STEERING, SAME_SIZE, SAME_INERTIA = math.log(2.5), math.log(2.2), math.log(2.0)
+_SAME_STEERING, _SAME_SIZE, _SAME_INERTIA = math.log(2.5), math.log(2.2), math.log(2.0)
 # within which nothing is gross
-FINER, FINEST = 5, 12  # golden sections: of an arm, of a steering angle
+_FINER, FINEST = 5, 12  # golden sections: of an arm, of a steering angle
 SIZES = np.geomspace(1.0 / 32.0, 32.0, 41)
-INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
-ARMS = np.linspace(-1.0, 1.0, 17)  # wheelbases
+_INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
+_ARMS = np.linspace(-1.0, 1.0, 17)  # wheelbases
 ALIKE = math.log(1.15)  # factors that say the same
-STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
+_STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
-PRICES = {"mph": 0.3, "knots": 0.3, "mm/s": 0.3}  # of units that few loggers use
-ALONE, UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle in deg
+_PRICES = {"mph": 0.3, "knots": 0.3, "mm/s": 0.3}  # of units that few loggers use
+_ALONE, _UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle in deg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,15 +103,15 @@ def _changed(code: str, unit: str, factor: float, *channels: str, price: float =
 
 
 def _unit(unit: str, factor: float, *channels: str) -> Change:
-    alone = ALONE if channels == ("v_y",) else 0.0
-    return _changed("unit", unit, factor, *channels, price=PRICES.get(unit, 0.0) + alone)
+    alone = _ALONE if channels == ("v_y",) else 0.0
+    return _changed("unit", unit, factor, *channels, price=_PRICES.get(unit, 0.0) + alone)
 
 
 def _sign(*channels: str) -> Change:
     return _changed("sign", "", -1.0, *channels)
 
 
-SPEEDS = {"km/h": KMH, "mph": MPH, "knots": KNOT, "mm/s": MILLI}
+SPEEDS = {"km/h": _KMH, "mph": _MPH, "knots": _KNOT, "mm/s": MILLI}
 CHANGES = (
     *(_unit(unit, factor, "v_x", "v_y") for unit, factor in SPEEDS.items()),
     *(_unit(unit, factor, "v_x") for unit, factor in SPEEDS.items()),
@@ -127,17 +127,17 @@ CHANGES = (
             sideslip=True,
             price=price,
         )
-        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, UNUSUAL))
+        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, _UNUSUAL))
     ),
     _unit("deg", DEGREE, "delta_f"),
     *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),
     _sign("v_x", "v_y"),
 )
-ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y"))
+_ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Explanation:
+class _Explanation:
     """A reading of a log, the changes that make it, and what it leaves.
 
     Parameters
@@ -159,7 +159,7 @@ class Explanation:
         """What it leaves and what its changes cost; a number that is free costs more."""
         free = sum(change.code in FREE for change in self.changes)
         prices = sum(GAIN + change.price for change in self.changes)
-        return self.left + prices + FREEDOM * free
+        return self.left + prices + _FREEDOM * free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,14 +173,14 @@ class Read:
         the best that nothing gross is in; None else.
     """
 
-    best: Explanation
-    other: Explanation
+    best: _Explanation
+    other: _Explanation
     without: "Read | None" = None
 
     @property
     def confidence(self) -> float:
         """From a half, where the next best reading is as good, to 1."""
-        return 1.0 / (1.0 + math.exp(-STEEPNESS * (self.other.cost - self.best.cost)))
+        return 1.0 / (1.0 + math.exp(-_STEEPNESS * (self.other.cost - self.best.cost)))
 
 
 def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...]], bool]) -> Read:
@@ -191,9 +191,9 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
     possible : whether the log breaks no law with some changes; of the best readings those that do
         are left out, unless all do.
     """
-    changes = CHANGES + (ON_ACCELEROMETER if motion.a_y is not None else ())
+    changes = CHANGES + (_ON_ACCELEROMETER if motion.a_y is not None else ())
     changes = tuple(one for one in changes if one.shows_in(motion))
-    as_told = Explanation(
+    as_told = _Explanation(
         changes=(), reading=Reading(), left=unexplained(motion, vehicle, Reading())
     )
     tried, best = [as_told], as_told
@@ -203,9 +203,9 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
         longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
         tried += longer
         before, best = best, min(tried, key=lambda one: one.cost)
-        if best is before and (len(beam) > 1 or best.left < equations * DEEPER):
+        if best is before and (len(beam) > 1 or best.left < equations * _DEEPER):
             break
-        good = best is not before and best.left < equations * DEEPER
+        good = best is not before and best.left < equations * _DEEPER
         beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:KEPT]
     ranked = sorted(tried, key=lambda one: (one.cost, len(one.changes)))
     lawful = [one for one in ranked[:JUDGED] if possible(one.changes)]
@@ -217,7 +217,7 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
     return replace(found, without=in_place)
 
 
-def _chosen(ranked: list[Explanation]) -> Read:
+def _chosen(ranked: list[_Explanation]) -> Read:
     """Return the first of some explanations, and the next that means something else."""
     best, *others = ranked
     others = [one for one in others if one.cost >= best.cost]
@@ -225,34 +225,34 @@ def _chosen(ranked: list[Explanation]) -> Read:
     return Read(best=best, other=other)
 
 
-def _means_else(one: Explanation, best: Explanation) -> bool:
+def _means_else(one: _Explanation, best: _Explanation) -> bool:
     """Whether an explanation lacks a gross fault of the best one, or has another in its place."""
     return not all(any(change.is_like(other) for other in one.gross) for change in best.gross)
 
 
 def _longer(
-    one: Explanation, changes: Sequence[Change], motion: Motion, vehicle: Vehicle
-) -> list[Explanation]:
+    one: _Explanation, changes: Sequence[Change], motion: Motion, vehicle: Vehicle
+) -> list[_Explanation]:
     """Return an explanation with each change that it does not have yet."""
     taken = frozenset[str]().union(*(change.fields for change in one.changes))
     free = [change for change in changes if not change.fields & taken]
     if "delta ratio" not in taken:
         free += _steerings(one, motion, vehicle)
     if "size size" not in taken and not one.changes:
-        free += _scaled("other_car", "size", SIZES, SAME_SIZE, motion, vehicle)
+        free += _scaled("other_car", "size", SIZES, _SAME_SIZE, motion, vehicle)
     if "inertia size" not in taken:
-        free += _scaled("yaw_inertia", "inertia", INERTIAS, SAME_INERTIA, motion, vehicle, one)
+        free += _scaled("yaw_inertia", "inertia", _INERTIAS, _SAME_INERTIA, motion, vehicle, one)
     if not any(change.code == ARM for change in one.changes):
         free += _arms(one, motion, vehicle)
     longer = []
     for change in free:
         reading = change.on(one.reading)
         left = unexplained(motion, vehicle, reading)
-        longer.append(Explanation(changes=(*one.changes, change), reading=reading, left=left))
+        longer.append(_Explanation(changes=(*one.changes, change), reading=reading, left=left))
     return longer
 
 
-def _steerings(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
+def _steerings(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     """Return the factor of the steering angle that leaves least, where it is a gross one."""
     told = one.reading.delta
     as_it_is = forces_and_slips(motion, vehicle, one.reading._replace(delta=0.0))
@@ -265,7 +265,7 @@ def _steerings(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Chang
 
     tried = {float(factor): left(float(factor)) for factor in (*STEERING, *-STEERING)}
     factor = _refined(min(tried, key=lambda one: tried[one]), left)
-    if factor > 0.0 and abs(math.log(factor)) < SAME_STEERING:
+    if factor > 0.0 and abs(math.log(factor)) < _SAME_STEERING:
         return []
     return [Change(code="steering", channels=("delta_f",), factors=(("delta", factor),))]
 
@@ -277,7 +277,7 @@ def _scaled(
     same: float,
     motion: Motion,
     vehicle: Vehicle,
-    one: Explanation | None = None,
+    one: _Explanation | None = None,
 ) -> list[Change]:
     """Return the factor of a number of the car that leaves least, where it is a gross one."""
     before = Reading() if one is None else one.reading
@@ -292,18 +292,18 @@ def _scaled(
     return [Change(code=code, factors=((name, size),))]
 
 
-def _arms(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
+def _arms(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     """Return the place of the velocity sensor, within a wheelbase, that leaves least."""
     length = one.reading.size * vehicle.wheelbase
 
     def left(share: float) -> float:
         return unexplained(motion, vehicle, one.reading._replace(arm=share * length))
 
-    share = min(map(float, ARMS), key=left)
+    share = min(map(float, _ARMS), key=left)
     if share == 0.0:
         return []
-    step = float(ARMS[1] - ARMS[0])
-    share = _least(left, share - step, share + step, FINER)
+    step = float(_ARMS[1] - _ARMS[0])
+    share = _least(left, share - step, share + step, _FINER)
     return [Change(code=ARM, channels=("v_y",), arm=share * length)]
 
 

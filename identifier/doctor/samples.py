@@ -20,16 +20,16 @@ LATERAL = ("v_y", "r", "delta_f", "a_y")
 CHANNELS = ("v_x", *LATERAL, "delta_r")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
          "a_y": "m/s^2"}  # fmt: skip
-SPIKE = 12.0  # times the noise beyond its neighbors
+_SPIKE = 12.0  # times the noise beyond its neighbors
 FREEZE = 0.3  # [s] that a noisy channel repeats one number
 MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
-ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
+_ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 REPEATED, FEW = 0.01, 5  # of a noisy channel: share of repeated samples, and how often
-CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
-GOES_ON = 0.6  # of a step after a rest, that the next but one has where a channel begins to move
+_CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
+_GOES_ON = 0.6  # of a step after a rest, that the next but one has where a channel begins to move
 ON_GRID = 0.9  # of steps that are multiples of the smallest
-ESTIMATED, SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
-OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
+_ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
+_OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
 ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
 COARSE = 0.05  # quantum over the rms of a channel
 CERTAIN = 0.99
@@ -82,7 +82,7 @@ def _piece_findings(recording: Recording) -> list[Finding]:
     signals = channels(recording)
     found = list(_copies(signals))
     named = {one.channel for one in found} | set(_still(signals))
-    jump = clock_jump(recording, signals)
+    jump = _clock_jump(recording, signals)
     if jump is not None:
         found.append(jump)
     for name, signal in signals.items():
@@ -220,7 +220,7 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
 def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
     """A channel that holds one number: for long, or again and again, as noise never does."""
     signal, dt = getattr(recording, name), recording.dt
-    zero = _zero(name, runs, recording) if name in ESTIMATED else None
+    zero = _zero(name, runs, recording) if name in _ESTIMATED else None
     if zero is not None:
         yield zero
         return
@@ -234,7 +234,7 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
     first = float(recording.t[at])
     of_all, again = float(np.sum(runs.length[lost] - 1)), int(np.count_nonzero(lost))
     of_others = of_all - (length - 1) * bool(frozen and lost[longest])
-    enough = CAUGHT_UP if grain is not None else REPEATED + _rounded_alike(signal)
+    enough = _CAUGHT_UP if grain is not None else REPEATED + _rounded_alike(signal)
     known = noisy or grain is not None
     if known and of_others / len(recording) > enough and again >= FEW:
         typical = float(np.median(runs.length[lost])) * dt
@@ -272,7 +272,7 @@ def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
     turning = [
         one for one in places if _moves(name, recording, one.start, one.stop - one.start, usual)
     ]
-    if len(turning) < SWITCHED:
+    if len(turning) < _SWITCHED:
         return None
     off = np.zeros(len(recording), dtype=bool)
     for one in places:
@@ -323,7 +323,7 @@ def _lost_on_the_way(signal: Array, runs: Runs, grain: float | None) -> NDArray[
     change = np.concatenate([np.diff(signal), [0.0, 0.0, 0.0]])
     end = runs.first + runs.length - 1
     step, after, later = change[end], change[end + 1], change[end + 2]
-    goes_on = step * later > GOES_ON * step**2
+    goes_on = step * later > _GOES_ON * step**2
     far = np.minimum(np.abs(step), np.abs(step + after)) > 1.5 * grain
     may: NDArray[np.bool_] = again & far & ~goes_on
     return may
@@ -385,7 +385,7 @@ def _noise(signal: Array) -> float:
     cut = 6.0 * float(np.median(np.abs(a)))
     kept = (np.abs(a) < cut) & (np.abs(b) < cut)
     together = float(a[kept] @ b[kept]) / (float(np.sum(a[kept] ** 2)) + 1e-300)
-    return float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0)) if together < ALTERNATE else 0.0
+    return float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0)) if together < _ALTERNATE else 0.0
 
 
 def _runs(signal: Array) -> Runs:
@@ -445,7 +445,7 @@ def _spikes(signal: Array, noise: float) -> NDArray[np.intp]:
     )
     around = np.ptp(np.stack([signal[:-4], signal[1:-3], signal[3:-1], signal[4:]]), axis=0)
     size = np.percentile(signal, 99) - np.percentile(signal, 1)
-    far = np.abs(off) > np.maximum(SPIKE * noise, np.maximum(0.05 * size, 3.0 * around))
+    far = np.abs(off) > np.maximum(_SPIKE * noise, np.maximum(0.05 * size, 3.0 * around))
     found: NDArray[np.intp] = np.flatnonzero(far) + 2
     return found
 
@@ -469,7 +469,7 @@ def _jitter(signal: Array, dt: float) -> tuple[float, float] | None:
         return None
     x, y = x / size_x, y / size_y
     X = np.column_stack([np.ones(x.size), x])
-    y = np.minimum(y, OUTLIER * _two_step(X, y))
+    y = np.minimum(y, _OUTLIER * _two_step(X, y))
     weight = 1.0 / _two_step(X, y)
     normal = X.T @ (weight[:, None] ** 2 * X)
     try:
@@ -499,10 +499,10 @@ BLOCK = 5  # samples in a row that were logged before, of all channels
 SHORTEST = 4.0  # samples that a jump has at least
 SMOOTH = ("v_y", "r", "v_x")  # that no car can change at once, as it can its steering
 SIDE = 12  # samples on each side of a jump
-JUMP, ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two channels, in a third
+_JUMP, _ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two channels, in a third
 
 
-def clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
+def _clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
     """Return where the clock jumped, None where it did not."""
     moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
     again = _logged_again(moving)
@@ -574,7 +574,7 @@ def _torn(moving: Mapping[str, Array], dt: float) -> tuple[int, float, float] | 
     table = np.sort(np.stack(score), axis=0)
     at = int(np.argmax(table[-2]))
     smooth = max(score[names.index(name)][at] for name in names if name in SMOOTH)
-    if table[-2, at] < JUMP or table[-3, at] < ALSO or smooth < JUMP:
+    if table[-2, at] < _JUMP or table[-3, at] < _ALSO or smooth < _JUMP:
         return None
     jumps, rates = np.stack(torn)[:, at], np.stack(rate)[:, at]
     scale = np.array([np.std(moving[name]) for name in names])

@@ -28,14 +28,14 @@ from models.recordings.checks import physics_contradiction
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle
 
-QUIET = 0.8  # [m/s^2] of v_x r, which a drive must exceed in `LIVELY` of its windows
-LIVELY = 0.005
+QUIET = 0.8  # [m/s^2] of v_x r, which a drive must exceed in `_LIVELY` of its windows
+_LIVELY = 0.005
 SURE = 0.95
-SEVERAL = 3  # changes at once, beyond which nothing is sure
+_SEVERAL = 3  # changes at once, beyond which nothing is sure
 WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
 NEAR = math.log(1.15)  # of a factor to that of a unit
-PERFECT = 0.999
-OFTEN = 0.1  # of a drive, from which a channel that reads exactly 0 so long is no measurement
+_PERFECT = 0.999
+_OFTEN = 0.1  # of a drive, from which a channel that reads exactly 0 so long is no measurement
 SLOW = 1.0  # s between samples, from which a clock is in ms
 
 
@@ -72,8 +72,8 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         one.channel
         for one in samples
         if one.code == "copied"
-        or (one.code == "frozen" and _lasts(one, recording, PERFECT))
-        or (one.code == "zero" and _lasts(one, recording, OFTEN))
+        or (one.code == "frozen" and _lasts(one, recording, _PERFECT))
+        or (one.code == "zero" and _lasts(one, recording, _OFTEN))
     ]
     if missing:
         return Screened(
@@ -81,7 +81,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             repair=Repair(),
             blind=f"{' and '.join(missing)} was not measured",
         )
-    quiet = quiet_finding(recording)
+    quiet = _quiet_finding(recording)
     if quiet is not None:
         return Screened(
             findings=(quiet, *samples, *told), repair=Repair(), blind="the car hardly corners"
@@ -94,7 +94,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
 
     def possible(changes: tuple[Change, ...]) -> bool:
         try:
-            read_so, _ = repair_of(changes).apply(some, vehicle)
+            read_so, _ = _repair_of(changes).apply(some, vehicle)
         except RecordingError:  # beyond what a car does
             return False
         return physics_contradiction(read_so) is None
@@ -118,12 +118,14 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
 
 def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
     """Return what the best reading says is grossly wrong."""
-    gross = [one for change in found.best.gross for one in reading_findings(change, found, vehicle)]
-    gross = one_steering(gross)
+    gross = [
+        one for change in found.best.gross for one in _reading_findings(change, found, vehicle)
+    ]
+    gross = _one_steering(gross)
     return doubted(gross, gross)  # a reading is judged as a whole
 
 
-def repair_of(changes: tuple[Change, ...]) -> Repair:
+def _repair_of(changes: tuple[Change, ...]) -> Repair:
     """Return what takes changes out of a log; of the car nothing is changed."""
     repair = Repair()
     for change in changes:
@@ -170,7 +172,7 @@ def _lasts(finding: Finding, recording: Recording, share: float) -> bool:
     return finding.size >= share * sum(one.duration for one in driven_pieces(recording))
 
 
-def quiet_finding(recording: Recording) -> Finding | None:
+def _quiet_finding(recording: Recording) -> Finding | None:
     """Return that a drive has no corners, None where it has."""
     pieces = looked_at(recording)
     fast, turns = max(usual_speed(pieces), 1e-9), []
@@ -178,7 +180,7 @@ def quiet_finding(recording: Recording) -> Finding | None:
         windows = driven_windows(piece, SLOWEST * fast)
         if len(windows):
             turns.append(np.abs(windows.mean(piece.v_x * piece.r)))
-    peak = float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - LIVELY))) if turns else 0.0
+    peak = float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - _LIVELY))) if turns else 0.0
     if peak >= QUIET:
         return None
     return Finding(
@@ -223,18 +225,18 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
     ]
 
 
-def reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
+def _reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
     """Return a change of the best reading as findings, of units one for each channel."""
     if change.code != "unit" or len(change.channels) == 1:
-        return [reading_finding(change, found, vehicle)]
+        return [_reading_finding(change, found, vehicle)]
     parts = [
         replace(change, channels=(name,), factors=(factor,))
         for name, factor in zip(change.channels, change.factors, strict=True)
     ]
-    return [reading_finding(part, found, vehicle) for part in parts]
+    return [_reading_finding(part, found, vehicle) for part in parts]
 
 
-def one_steering(gross: list[Finding]) -> list[Finding]:
+def _one_steering(gross: list[Finding]) -> list[Finding]:
     """Return findings with one of the steering angle where there were several: factors multiply."""
     of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
     if len(of_steering) < 2:
@@ -244,10 +246,10 @@ def one_steering(gross: list[Finding]) -> list[Finding]:
     return [one, *(other for other in gross if other not in of_steering)]
 
 
-def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
+def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     """Return a change of the best reading as a finding."""
     confidence = found.confidence
-    if len(found.best.gross) > SEVERAL:
+    if len(found.best.gross) > _SEVERAL:
         confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
     factors = dict(change.factors)
     names = " and ".join(change.channels)

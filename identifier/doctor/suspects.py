@@ -16,10 +16,10 @@ from models.vehicle import Vehicle
 SEDAN = 2.7  # m, wheelbase of whose size the numbers are
 DEGREES = math.degrees(1.0)  # in a rad
 INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
-SMALL, SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
+SMALL, _SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
 OVERHANG = 0.5  # wheelbases that a car, and what is mounted to it, reach beyond its axles
-CENTER = (0.25, 0.75)  # l_f over the wheelbase: a load that an axle of a car can have
-OPPOSITES = {  # of what a size says, where it is negative
+_CENTER = (0.25, 0.75)  # l_f over the wheelbase: a load that an axle of a car can have
+_OPPOSITES = {  # of what a size says, where it is negative
     " late ": " early ",
     "too much": "too little",
     " ahead of ": " behind ",
@@ -27,13 +27,13 @@ OPPOSITES = {  # of what a size says, where it is negative
     "too far back": "too far forward",
     "push more at speed, as by a downforce": "push less at speed, as by a lift",
 }
-POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "rate": -0.5}
+_POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "rate": -0.5}
 NOTES = ("center_of_gravity", "yaw_inertia", "downforce")  # of the car: never an alarm, never sure
 
 
 def usual_inertia(vehicle: Vehicle) -> tuple[float, float]:
     """Return from what to what I_z/(m l_f l_r) of cars of a size goes."""
-    return (SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]), INERTIA[1]
+    return (_SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]), INERTIA[1]
 
 
 def similar_inertia(vehicle: Vehicle) -> float:
@@ -77,7 +77,7 @@ class Suspect(NamedTuple):
 
     def scaled(self, value: float, vehicle: Vehicle) -> float:
         """Return `wide` or `least` of a car."""
-        return float(value * (vehicle.wheelbase / SEDAN) ** POWERS[self.grows])
+        return float(value * (vehicle.wheelbase / SEDAN) ** _POWERS[self.grows])
 
     def size(self, value: float) -> float:
         """Return the size of a finding of a value of its parameter."""
@@ -119,7 +119,7 @@ class Suspect(NamedTuple):
             case "lag":
                 return size > 0.0
             case "center_of_gravity":
-                return CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < CENTER[1]
+                return _CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < _CENTER[1]
             case "velocity_sensor_x" | "acceleration_sensor_x":
                 beyond = OVERHANG * vehicle.wheelbase
                 return -vehicle.l_r - beyond < size < vehicle.l_f + beyond
@@ -134,8 +134,8 @@ class Suspect(NamedTuple):
         if self.code == "center_of_gravity":
             swapped = abs(vehicle.l_f - vehicle.l_r - size) < 1.5 * abs(deviation)
             text += ", as if they were swapped" * swapped
-        if size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
-            size, text = -size, text.replace(said, OPPOSITES[said])
+        if size < 0.0 and (said := next((one for one in _OPPOSITES if one in text), None)):
+            size, text = -size, text.replace(said, _OPPOSITES[said])
         shown = f"{with_doubt(size * self.per_unit, abs(deviation) * self.per_unit)}{self.shown}"
         return text.format(size=shown, origin=vehicle.origin(self.code))
 
@@ -150,7 +150,7 @@ WORDS = {  # of a channel, and the parameter of its factor
     "delta_f": ("the steering angle", "steering_gain"),
     "a_y": ("the lateral acceleration", "a_y.factor"),
 }
-DEVICES = {"v_y": "v_y", "r": "r", "delta_f": "steering", "a_y": "a_y."}
+_DEVICES = {"v_y": "v_y", "r": "r", "delta_f": "steering", "a_y": "a_y."}
 TURNING = Suspect(
     "r_delay", "delay", "r+a_y", "s", 0.12, 0.004, "",
     "the yaw rate and the lateral acceleration, of one device, are {size} late against the "
@@ -170,7 +170,7 @@ def _of_channels() -> tuple[Suspect, ...]:
                 f"{WORDS[name][0]} reads {{size}} too much", shown, per_unit)
         for parameter, name, unit, wide, least, grows, shown, per_unit in offsets
     ]  # fmt: skip
-    for name, device in DEVICES.items():
+    for name, device in _DEVICES.items():
         stem, words = device if device.endswith(".") else f"{device}_", WORDS[name][0]
         # Force follows steering by relaxation and sway: what is left of them is no delay.
         least, grows = (0.008, "speed") if name == "delta_f" else (0.004, "")

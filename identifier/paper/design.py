@@ -36,7 +36,7 @@ from models.schema import Table, read_toml
 from models.vehicle import GRAVITY, Vehicle
 
 
-class Variant(NamedTuple):
+class _Variant(NamedTuple):
     """A law of the paper as it is compared: its law, and where its gains come from.
 
     title : what a reader is told.   law : one of `LAWS`.
@@ -58,16 +58,16 @@ class Variant(NamedTuple):
         return found.scaled_by_forgetting() if self.scaled else found
 
 
-VARIANTS: Mapping[str, Variant] = {
-    "integral": Variant("integral", "integral", "integral"),
-    "instantaneous": Variant("instantaneous", "instantaneous", "integral"),
-    "instantaneous_scaled": Variant(
+VARIANTS: Mapping[str, _Variant] = {
+    "integral": _Variant("integral", "integral", "integral"),
+    "instantaneous": _Variant("instantaneous", "instantaneous", "integral"),
+    "instantaneous_scaled": _Variant(
         "instantaneous at eta/lambda", "instantaneous", "integral", scaled=True
     ),
-    "pi_lead": Variant("PI-lead", "pi_lead", "pi_lead"),
+    "pi_lead": _Variant("PI-lead", "pi_lead", "pi_lead"),
 }
 
-SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.1  # [s]: finer is only work, coarser is blind
+_SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.1  # [s]: finer is only work, coarser is blind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +118,7 @@ class PaperIdentifier(Method):
                 raise ValueError(
                     f"{name} must be one of {list(known)}, not {getattr(self, name)!r}"
                 )
-        require_within(ValueError, SHORTEST_STEP, LONGEST_STEP, dt=self.dt)
+        require_within(ValueError, _SHORTEST_STEP, LONGEST_STEP, dt=self.dt)
         require_within(ValueError, 1e-6, 1e9, force_unit=self.force_unit)
         require_within(ValueError, 1e-6, 200.0, min_speed=self.min_speed)
         require_within(ValueError, 0, 2**63 - 1, seed=self.seed)
@@ -291,7 +291,7 @@ def _K_inv(parameters: BicycleParameters) -> Array:
     return np.array(ca.DM(bicycle(parameters, 1.0).K_inv))  # K does not depend on v_x
 
 
-def natural_force_unit(mass: float) -> float:
+def _natural_force_unit(mass: float) -> float:
     """Return the power of ten [N] nearest to a fifteenth of a car's weight.
 
     The gains are well scaled where forces are of order one: 1 kN for a passenger car, 1 N for a
@@ -346,7 +346,7 @@ def design_for(
         input_source=input_source,
         integrator=integrator,
         dt=dt,
-        force_unit=natural_force_unit(vehicle.mass),
+        force_unit=_natural_force_unit(vehicle.mass),
         min_speed=vehicle.lowest_speed,
         seed=seed,
         driving=driving,

@@ -24,10 +24,10 @@ from codegen.arrays import Array
 from codegen.errors import TireidError
 from models.rules import require_within
 
-Direction = Callable[[Any, Any], Any]
+_Direction = Callable[[Any, Any], Any]
 
 
-def static_direction(A_d: Any, drive: Any) -> Any:
+def _static_direction(A_d: Any, drive: Any) -> Any:
     """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
 
     Parameters
@@ -95,7 +95,7 @@ class Law:
     z: float = 0.0
     xi: float = 0.0
     lead: float = 0.0
-    direction: Direction = static_direction
+    direction: _Direction = _static_direction
 
     def __post_init__(self) -> None:
         shares = (self.z, self.xi, self.lead)
@@ -168,7 +168,7 @@ def beyond_ball(weights: Any, radius: Any) -> Any:
     return weights - ball(weights, radius)
 
 
-class WeightRates(NamedTuple):
+class _WeightRates(NamedTuple):
     """Time derivatives of the weights: W_dot (2, n_h) and V_dot (n_h, n_in)."""
 
     W_dot: Any
@@ -188,11 +188,11 @@ def weight_rates(
     eta_V: Any,
     rho_W: Any,
     rho_V: Any,
-    direction: Direction = static_direction,
+    direction: _Direction = _static_direction,
     leaking: Callable[[Any, Any], Any] = whole,
     W_free: Any = 0.0,
     V_free: Any = 0.0,
-) -> WeightRates:
+) -> _WeightRates:
     """Return (11)-(12), each a descent along the static gradient with a leakage.
 
     Parameters
@@ -218,7 +218,7 @@ def weight_rates(
     slope = 1 - sigma**2  # diagonal of I - Λ, (13)
     W_dot = -eta_W * g @ sigma.T - rho_W * leak * leaking(W, W_free)  # (11)
     V_dot = -eta_V * (slope * (W.T @ g)) @ x_bar.T - rho_V * leak * leaking(V, V_free)  # (12)
-    return WeightRates(W_dot, V_dot)
+    return _WeightRates(W_dot, V_dot)
 
 
 # The series-parallel observer (8), the error filter (10), and where the network reads the state.
@@ -226,7 +226,7 @@ def weight_rates(
 # ξ, ξ̂ [U s]: axle impulse, measured and estimated.   u = [δ_f, δ_r] [rad].   f̂ [U]: network
 # output.
 
-InputSource = Callable[[Any, Any], Any]
+_InputSource = Callable[[Any, Any], Any]
 
 
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
@@ -283,7 +283,7 @@ def estimated(xi: Any, xi_hat: Any) -> Any:
     return xi_hat
 
 
-INPUT_SOURCES: Mapping[str, InputSource] = {"measured": measured, "estimated": estimated}
+INPUT_SOURCES: Mapping[str, _InputSource] = {"measured": measured, "estimated": estimated}
 
 # One step of an ordinary differential equation, with its inputs held over the step.
 

@@ -163,8 +163,8 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
 
 # The paper's network, frozen: weights at one instant and all that axle forces need.
 
-LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
-LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
+_LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
+_LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
 
 
 def build_frozen(network: Network) -> ca.Function:
@@ -190,7 +190,7 @@ def build_frozen(network: Network) -> ca.Function:
     )
 
 
-def build_replay(network: Network) -> ca.Function:
+def _build_replay(network: Network) -> ca.Function:
     """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port."""
     frozen = build_frozen(network)
     ports = {name: ca.SX.sym(name, *frozen.size_in(name)) for name in frozen.name_in()}
@@ -213,7 +213,7 @@ def _frozen(network: Network) -> ca.Function:
 
 @cache
 def _replay_scan(network: Network) -> Scan:
-    return Scan(build_replay(network), carry=(), over=("x", "u", "v_x"))
+    return Scan(_build_replay(network), carry=(), over=("x", "u", "v_x"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -254,8 +254,8 @@ class NetworkModel(TireModel):
                 raise ValueError(f"{name} holds a number that is not finite: the law has diverged")
         with np.errstate(over="ignore"):  # beyond the limit, too
             largest = self.force_unit * np.abs(self.weights.W).sum(axis=1).max()
-        require_within(ValueError, 0.0, LARGEST_SUM, **{"force_unit times |W|": largest})
-        require_within(ValueError, 0.0, LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
+        require_within(ValueError, 0.0, _LARGEST_SUM, **{"force_unit times |W|": largest})
+        require_within(ValueError, 0.0, _LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
     def setup(self, dt: float) -> Setup:
         """Return what a replay needs."""

@@ -30,14 +30,14 @@ from identifier.setup import AXLE_FORCE, Port
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("xi_hat", "z", "W", "V")
-NETWORK_PORTS = (
+_NETWORK_PORTS = (
     AXLE_FORCE,
     Port("f_hat", "U", "force of the network alone, front and rear"),
     Port("W", "U", "output weights, rows front and rear", learnt=True),
     Port("V", "-", "hidden weights, rows units, columns scaled inputs", learnt=True),
 )
 PORTS = (
-    *NETWORK_PORTS,
+    *_NETWORK_PORTS,
     Port("xi_tilde", "U s", "error of the observed axle impulse, front and rear"),
     Port("xi_hat", "U s", "observed axle impulse, front and rear"),
     Port("z", "U s^2", "filtered error, front and rear"),

@@ -20,7 +20,7 @@ from identifier.plan.tires import FLAT, PlausibleTires
 
 COLOR = 5.0  # times the correlation time that learning is told: half a second, as errors of models
 EVERY = 2  # step of the simulation that counts: 54 ms in a sedan, the regressor is low-passed
-MATTERING = 12  # slips at which the curve is asked, up to where it is flat
+_MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 
 
 def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array:
@@ -71,7 +71,7 @@ def asked(tires: PlausibleTires, v_x: float) -> Doubt:
     v_x : speed [m/s].
     """
     ladder = np.array(tires.method.ladder)
-    slips = tires.slip_at(FLAT)[0][:, None] * np.linspace(0.0, 1.0, MATTERING + 1)[1:]
+    slips = tires.slip_at(FLAT)[0][:, None] * np.linspace(0.0, 1.0, _MATTERING + 1)[1:]
     units = np.stack([unit_matrix(one, tires.method.ladder) for one in slips])
     slope = np.einsum("asj,aj->as", (1.0 - units**2) / ladder, tires.W[0])
     return Doubt(slips, units, slope * np.array([[1.0], [1.0 / v_x]]))

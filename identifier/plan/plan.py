@@ -34,13 +34,13 @@ from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
 TURNS = 0.8  # share of the planned lateral force that a car may need to turn inside the area
-MOST_PASSES = 12
-LEAST_TIME, MOST_TIME = 0.5, 60.0  # s
+_MOST_PASSES = 12
+_LEAST_TIME, _MOST_TIME = 0.5, 60.0  # s
 SLALOM = 0.27  # 1/sqrt(L/g): frequency of the slalom it is compared with, 0.5 Hz for a sedan
-AMPLITUDES = np.geomspace(0.05, 1.0, 24)  # of the largest angle
+_AMPLITUDES = np.geomspace(0.05, 1.0, 24)  # of the largest angle
 PROBED = 15.0  # sqrt(L/g), of a maneuver whose amplitude is looked for: 8 s in a sedan
-RANDOM = 8  # random steerings that it is compared with
-LONGER = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0])  # times, of a slalom that catches up
+_RANDOM = 8  # random steerings that it is compared with
+_LONGER = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0])  # times, of a slalom that catches up
 
 
 class Rival(NamedTuple):
@@ -170,8 +170,8 @@ def make_plan(
     PlanError
         Where the area is too small for the speed, or the time is none to learn in.
     """
-    if not LEAST_TIME <= time <= MOST_TIME:
-        raise PlanError(f"the time must be {LEAST_TIME:g} to {MOST_TIME:g} s, it is {time:g}")
+    if not _LEAST_TIME <= time <= _MOST_TIME:
+        raise PlanError(f"the time must be {_LEAST_TIME:g} to {_MOST_TIME:g} s, it is {time:g}")
     least = tires.vehicle.lowest_speed * 3.0
     if space.speed < least:
         raise PlanError(
@@ -195,10 +195,10 @@ def make_plan(
             )
         raise PlanError(_too_small(tires, space, longest, needed))
     count = max(1, math.ceil(time / longest))
-    if count > MOST_PASSES:
+    if count > _MOST_PASSES:
         raise PlanError(
             f"{time:g} s in this area take {count} passes of {longest:.2g} s, more than "
-            f"{MOST_PASSES}: give more room or less time"
+            f"{_MOST_PASSES}: give more room or less time"
         )
     passes: list[Pass] = []
     known = tires
@@ -238,7 +238,7 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
     space : speed and share; its sides are not looked at.
     of : the maneuver by its amplitude.
     """
-    sizes = AMPLITUDES * Search(tires=tires, space=space, duration=1.0, guided=False).largest_angle
+    sizes = _AMPLITUDES * Search(tires=tires, space=space, duration=1.0, guided=False).largest_angle
     every = [of(float(size)) for size in sizes]
     t = steps_of(tires, min(every[0].duration, PROBED * tires.vehicle.froude_time))
     delta = np.column_stack([one.steering(t)[:, 0] for one in every])
@@ -285,13 +285,13 @@ def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
 
 def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> tuple[Rival, ...]:
     """Return a slalom and random steering at the share of the grip, with as much room as wanted."""
-    slalom = hardest(tires, space, slalom_of(tires.vehicle, float(LONGER[-1]) * time))
+    slalom = hardest(tires, space, slalom_of(tires.vehicle, float(_LONGER[-1]) * time))
     late = math.inf
-    for times in LONGER:
+    for times in _LONGER:
         if _rated(tires, space, [slalom], float(times) * time).error <= error:
             late = float(times) * time
             break
-    drawn = [hardest(tires, space, random_of(tires.vehicle, time, seed)) for seed in range(RANDOM)]
+    drawn = [hardest(tires, space, random_of(tires.vehicle, time, seed)) for seed in range(_RANDOM)]
     first = _rated(tires, space, [slalom], time)._replace(name="slalom", catches_up=late)
     return first, _rated(tires, space, drawn, time)
 

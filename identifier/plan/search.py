@@ -28,18 +28,18 @@ from models.maneuvers import SampledSteer
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY
 
-POPULATION, GENERATIONS = 32, 100
-STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
+_POPULATION, GENERATIONS = 32, 100
+_STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
 SWING = 0.75  # sqrt(L/g): least mean duration of a change from angle to angle, 0.4 s in a sedan
-CHIRP = math.log(
+_CHIRP = math.log(
     3.0
 )  # largest ratio of the last to the mean duration, and of the mean to the first
 CALM = 0.5  # share of the grip that the rear axle may still need at the end of a pass
 REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
 OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
-HALF_WIDTH = 0.33  # wheelbases, of a car without a chassis
-WIDER = 1.12  # of the body over its track
-LARGEST_HEADING = math.radians(60.0)  # at the entry
+_HALF_WIDTH = 0.33  # wheelbases, of a car without a chassis
+_WIDER = 1.12  # of the body over its track
+_LARGEST_HEADING = math.radians(60.0)  # at the entry
 FEWEST, MOST = 3, 14  # changes of the angle; where a pass has more, they are driven mirrored
 
 
@@ -98,10 +98,10 @@ def body_of(tires: PlausibleTires) -> Body:
     """Return the size of the body of a car."""
     car = tires.vehicle
     over = OVERHANG * car.wheelbase
-    side = HALF_WIDTH * car.wheelbase
+    side = _HALF_WIDTH * car.wheelbase
     if car.chassis is not None:
         track = max(car.chassis.track_front, car.chassis.track_rear)
-        side = 0.5 * WIDER * track
+        side = 0.5 * _WIDER * track
     return Body(car.l_f + over, car.l_r + over, side)
 
 
@@ -223,7 +223,7 @@ class Search:
         """
         N, space = self.swings, self.space
         u, (chirp, place, heading) = numbers[:, : N - 1], numbers[:, N - 1 :].T
-        spans = np.exp(CHIRP * chirp[:, None] * np.linspace(-1.0, 1.0, N))
+        spans = np.exp(_CHIRP * chirp[:, None] * np.linspace(-1.0, 1.0, N))
         spans *= self.duration / self.repeats / spans.sum(axis=1, keepdims=True)
         angles = np.zeros((len(numbers), N + 1))
         angles[:, 1:N] = u * self.largest_angle
@@ -241,7 +241,7 @@ class Search:
         spans = np.tile(spans, self.repeats)
         times = np.column_stack([np.zeros(len(numbers)), np.cumsum(spans, axis=1)])
         body = body_of(self.tires)
-        psi = LARGEST_HEADING * heading
+        psi = _LARGEST_HEADING * heading
         free = 0.5 * space.width - space.margin - body.side
         X = space.margin + body.behind * np.cos(psi) + body.side * np.abs(np.sin(psi))
         return Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
@@ -294,11 +294,11 @@ class Search:
         2).
         """
         N = self.swings
-        size = np.exp(rng.uniform(math.log(0.05), 0.0, (POPULATION, 1)))
+        size = np.exp(rng.uniform(math.log(0.05), 0.0, (_POPULATION, 1)))
         sign = np.where(np.arange(N - 1) % 2 == 0, 1.0, -1.0)
-        u = size * sign * rng.uniform(-0.2, 1.0, (POPULATION, N - 1))
-        u *= rng.choice([-1.0, 1.0], (POPULATION, 1))
-        rest = rng.uniform(-1.0, 1.0, (POPULATION, 3)) * [1.0, 0.9, 0.3]
+        u = size * sign * rng.uniform(-0.2, 1.0, (_POPULATION, N - 1))
+        u *= rng.choice([-1.0, 1.0], (_POPULATION, 1))
+        rest = rng.uniform(-1.0, 1.0, (_POPULATION, 3)) * [1.0, 0.9, 0.3]
         return np.column_stack([u, rest])
 
     def best(
@@ -325,8 +325,8 @@ class Search:
         def after(*_: object) -> bool:
             if progress is not None:
                 progress(len(least) / GENERATIONS)
-            possible = least[-1] < 1.0 and len(least) > STALLED
-            return possible and least[-1] > (1.0 - GAIN) * least[-1 - STALLED]
+            possible = least[-1] < 1.0 and len(least) > _STALLED
+            return possible and least[-1] > (1.0 - GAIN) * least[-1 - _STALLED]
 
         found = differential_evolution(
             costs,

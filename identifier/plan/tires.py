@@ -28,7 +28,7 @@ SLIPS = np.linspace(0.0, 0.5, 501)[1:]  # rad, where curves are looked at
 FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it is reached
 
 
-def steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
+def _steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
     """Return the time constant from the angle asked for to that of the front wheels [s].
 
     Parameters
@@ -88,7 +88,7 @@ class PlausibleTires:
             (low * front, low * rear, low * friction, 1.0),
         )
         W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu, _ in cases]
-        lag = steering_lag_of(vehicle, steering_lag) * np.array([late for *_, late in cases])
+        lag = _steering_lag_of(vehicle, steering_lag) * np.array([late for *_, late in cases])
         P = prior.covariance(vehicle, ladder)
         own = prior.means(vehicle, ladder)[1]
         return cls(
@@ -112,7 +112,7 @@ class PlausibleTires:
             vehicle=model.vehicle,
             method=replace(AxleIdentifier.for_vehicle(model.vehicle), ladder=model.ladder),
             W=np.array([model.W, *(one.W for one in drawn)]),
-            steering_lag=steering_lag_of(model.vehicle, steering_lag) * late,
+            steering_lag=_steering_lag_of(model.vehicle, steering_lag) * late,
             own=model.own * [1.0, 1.0, 0.0],
             covariance=model.covariance,
             prior=model.prior_covariance,

@@ -20,7 +20,7 @@ from identifier.stability.margins import gain_margin
 from models.bicycle import BicycleParameters
 
 
-class Strongest(NamedTuple):
+class _Strongest(NamedTuple):
     """The moving sample of a run with the largest loop gain: its time [s], λ_max(G) and the sampled
     gain margin there [-].
     """
@@ -30,7 +30,7 @@ class Strongest(NamedTuple):
     margin: float
 
 
-def strongest_along(history: History, design: PaperIdentifier) -> Strongest:
+def strongest_along(history: History, design: PaperIdentifier) -> _Strongest:
     """Evaluate the loop at the regressors and weights of a run.
 
     The network's input is taken from the measured state, which the estimate follows closely.
@@ -55,4 +55,4 @@ def strongest_along(history: History, design: PaperIdentifier) -> Strongest:
         direction=direction_matrix(law, gains.matrix),
     )
     margin = gain_margin(loop, INTEGRATORS[design.integrator], design.dt).factor
-    return Strongest(float(recording.t[moving][at]), largest, margin)
+    return _Strongest(float(recording.t[moving][at]), largest, margin)

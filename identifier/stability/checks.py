@@ -19,11 +19,11 @@ from identifier.stability.margins import (
 from identifier.stability.operation import Operation, Proven
 from identifier.stability.printed import printed_bounds, trivial_bound
 
-ENOUGH_GAIN, ENOUGH_PHASE, ENOUGH_DAMPING = 2.0, 30.0, 0.2
-LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
+_ENOUGH_GAIN, _ENOUGH_PHASE, _ENOUGH_DAMPING = 2.0, 30.0, 0.2
+_LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
 
 
-CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, or lower eta_W"}
+_CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, or lower eta_W"}
 
 
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
@@ -34,7 +34,7 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     gains : of (8) to (12).
     """
     A_d = gains.matrix
-    poles = state_space_poles(A_d)
+    poles = _state_space_poles(A_d)
     step = float(np.abs(poles).max()) * operation.dt
     sampled = np.abs(operation.step(poles * operation.dt))
     slowest = -math.log(float(sampled.max())) / operation.dt
@@ -64,13 +64,14 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
             name="sampling",
             title="fastest pole of A_d times the sampling interval",
             value=step,
-            limit=LARGEST_STEP,
-            margin=LARGEST_STEP / step,
-            status=at_most(step, good=LARGEST_STEP, bad=None) if resolved else "fail",
+            limit=_LARGEST_STEP,
+            margin=_LARGEST_STEP / step,
+            status=at_most(step, good=_LARGEST_STEP, bad=None) if resolved else "fail",
             unit="-",
             advice=""
-            if step <= LARGEST_STEP and resolved
-            else f"slow A_d down or sample every {1e3 * operation.dt * LARGEST_STEP / step:.3g} ms",
+            if step <= _LARGEST_STEP and resolved
+            else f"slow A_d down or sample every "
+            f"{1e3 * operation.dt * _LARGEST_STEP / step:.3g} ms",
         ),
     ]
     if operation.input_feedback is not None:
@@ -95,8 +96,8 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
             "gain_continuous", "loop gain, continuous time", loop, operation, sampled=False
         ),
         _gain_check("gain_sampled", "loop gain, sampled", loop, operation, sampled=True),
-        _enough("phase_margin", "phase margin of the sampled loop", phase, ENOUGH_PHASE, "deg"),
-        _enough("damping", "damping ratio of the learning loop", damping, ENOUGH_DAMPING, "-"),
+        _enough("phase_margin", "phase margin of the sampled loop", phase, _ENOUGH_PHASE, "deg"),
+        _enough("damping", "damping ratio of the learning loop", damping, _ENOUGH_DAMPING, "-"),
     ]
 
 
@@ -110,7 +111,7 @@ def _enough(name: str, title: str, value: float, least: float, unit: str) -> Pro
         margin=value / least,
         status=at_least(value, good=least, bad=1e-9),
         unit=unit,
-        advice="" if value >= least else CALMER[name],
+        advice="" if value >= least else _CALMER[name],
     )
 
 
@@ -146,7 +147,7 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
     )
 
 
-def state_space_poles(A_d: Array) -> ComplexArray:
+def _state_space_poles(A_d: Array) -> ComplexArray:
     """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
 
     Parameters
@@ -214,10 +215,10 @@ def _gain_check(
 ) -> Property:
     found = gain_margin(loop, operation.step if sampled else exact, operation.dt)
     value = float(np.linalg.eigvalsh(loop.G)[-1])
-    status: Status = at_least(found.factor, good=ENOUGH_GAIN, bad=1.0)
+    status: Status = at_least(found.factor, good=_ENOUGH_GAIN, bad=1.0)
     advice = ""
     if status != "pass":
-        factor = found.factor / ENOUGH_GAIN
+        factor = found.factor / _ENOUGH_GAIN
         advice = f"multiply eta_W and eta_V by {factor:.2g}" if factor > 0.0 else "change A_d"
         if math.isfinite(found.frequency):
             advice += f"; at the limit it oscillates at {found.frequency / (2 * math.pi):.2g} Hz"
@@ -249,7 +250,7 @@ def _above_zero(name: str, title: str, value: float, advice: str) -> Property:
 
 # Properties that bound error and weights, beside the bound of an identifier without a network.
 
-CONDITION = (
+_CONDITION = (
     "it holds while slip, friction, speed, steering, yaw rate and noise are as declared, no sample "
     "is left out as impossible, and the first weights keep it (resumed ones too)"
 )
@@ -314,9 +315,9 @@ def _stated(proven: Proven) -> list[Property]:
                 "proven bound of |xi - xi_hat| by the leakage",
                 proven.leakage.xi_tilde,
                 "U s",
-                CONDITION,
+                _CONDITION,
             ),
-            statement("weight_bound", "proven bound of |W|", proven.leakage.W, "U", CONDITION),
+            statement("weight_bound", "proven bound of |W|", proven.leakage.W, "U", _CONDITION),
         ]
     if proven.projection is not None:
         entries.append(
@@ -325,7 +326,7 @@ def _stated(proven: Proven) -> list[Property]:
                 "proven bound of |xi - xi_hat| by the projection",
                 proven.projection.xi_tilde,
                 "U s",
-                CONDITION,
+                _CONDITION,
             )
         )
     if not math.isfinite(proven.xi_tilde):
@@ -338,7 +339,7 @@ def _stated(proven: Proven) -> list[Property]:
             )
         )
     if math.isfinite(proven.V):
-        entries.append(statement("V_bound", "proven bound of |V|", proven.V, "-", CONDITION))
+        entries.append(statement("V_bound", "proven bound of |V|", proven.V, "-", _CONDITION))
     else:
         entries.append(
             _unproven(

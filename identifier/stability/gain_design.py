@@ -32,7 +32,7 @@ from identifier.stability.sampled_bound import (
 )
 from models.rules import require_positive
 
-LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
+_LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
 FASTEST = 0.2  # largest a dt
 
 
@@ -110,7 +110,7 @@ def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
     bandwidth : highest frequency of steering that matters [Hz].
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
-    return max(LAG_RULE * 2.0 * math.pi * bandwidth, 1.5 * minimal_decay)
+    return max(_LAG_RULE * 2.0 * math.pi * bandwidth, 1.5 * minimal_decay)
 
 
 def design_gains(
@@ -162,7 +162,7 @@ def design_gains(
         raise DesignError(
             f"a dt must not pass {FASTEST}, it is {a * dt:.3g}: sample every "
             f"{1e3 * FASTEST / a:.3g} ms, or ask for a bandwidth of "
-            f"{FASTEST / (LAG_RULE * 2.0 * math.pi * dt):.3g} Hz"
+            f"{FASTEST / (_LAG_RULE * 2.0 * math.pi * dt):.3g} Hz"
         )
     lam, A_d = a, diagonal(a)
     g = gain_for_phase_margin(

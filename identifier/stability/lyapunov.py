@@ -152,7 +152,7 @@ def peak_gain(A_d: ArrayLike) -> float:
     raise ArithmeticError(f"the integral of |exp(A_d t)| did not converge for {A_d.tolist()}")
 
 
-def transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
+def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
     """|exp(A_d t)| of a 2x2 matrix in closed form, exp(m t + asinh(k S(t))), t > 0.
 
     m = tr A_d/2, k = |the symmetric part of A_d - m I|, S = sinh(q t)/q, q² = m² - det A_d: the
@@ -226,4 +226,4 @@ def _quadrature(A_d: Array, edges: Array) -> float:
     nodes, weights = np.polynomial.legendre.leggauss(12)
     half = np.diff(edges)[:, None] / 2.0
     t = (edges[:-1, None] + edges[1:, None]) / 2.0 + half * nodes
-    return float(np.sum(half * weights * transition_norm(A_d, t)))
+    return float(np.sum(half * weights * _transition_norm(A_d, t)))

@@ -29,12 +29,12 @@ from identifier.stability.lyapunov import require_hurwitz
 if TYPE_CHECKING:
     pass
 
-LARGEST_FACTOR = 1e6
+_LARGEST_FACTOR = 1e6
 AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GainMargin:
+class _GainMargin:
     """Where the loop turns unstable.
 
     Parameters
@@ -47,7 +47,7 @@ class GainMargin:
     frequency: float
 
 
-def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> GainMargin:
+def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> _GainMargin:
     """Find the smallest factor on the gain at which the loop is unstable, with its frequency.
 
     Any A_d, any law, any input source: factors from 1e-6 to 1e6 are searched (150 a decade) for
@@ -62,14 +62,14 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
     def growth_at(log_factors: Array) -> Array:
         return growth_rate(scaled_matrices(loop, np.exp(log_factors)), integrator, dt)
 
-    span = np.log(LARGEST_FACTOR)
+    span = np.log(_LARGEST_FACTOR)
     crossing = _first_crossing(growth_at, np.linspace(-span, span, 1801), 1e-11 * _rate(loop))
     if crossing is None:
-        return GainMargin(factor=np.inf, frequency=np.nan)
+        return _GainMargin(factor=np.inf, frequency=np.nan)
     if crossing == -span:
-        return GainMargin(factor=0.0, frequency=np.nan)
+        return _GainMargin(factor=0.0, frequency=np.nan)
     factor = float(np.exp(crossing))
-    return GainMargin(factor=factor, frequency=_frequency(loop.scaled(factor), integrator, dt))
+    return _GainMargin(factor=factor, frequency=_frequency(loop.scaled(factor), integrator, dt))
 
 
 def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> float:

@@ -161,7 +161,7 @@ class Proven:
         return [found for found in (self.leakage, self.projection) if found is not None]
 
 
-NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, leakage_step_V=0.0)
+_NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, leakage_step_V=0.0)
 
 
 def proven_bounds(
@@ -176,7 +176,7 @@ def proven_bounds(
     """
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
     if not operation.resolves(A_d):
-        return NOTHING
+        return _NOTHING
     error = error_gains(A_d, operation.integrator, dt)
     learning = output_layer(gains, law, direction, n_h=n_h, integrator=operation.integrator, dt=dt)
     acting = operation.disturbance
@@ -435,7 +435,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     )
 
 
-def largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
+def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
     """Bound on |x_bar| [-], noise of the sensors in it."""
     signals, slow = declared_signals(vehicle, driving), (1.0 - SPEED_SPREAD) * driving.v_x
     sideways = driving.noise_v_y + vehicle.wheelbase * driving.noise_r
@@ -496,7 +496,7 @@ def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
         bandwidth=driving.bandwidth,
         disturbance=found,
         needed_force=expected / design.force_unit,
-        x_bar_max=largest_input(design, vehicle, driving),
+        x_bar_max=_largest_input(design, vehicle, driving),
         V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
         input_feedback=feedback if estimated else None,
         input_per_error=input_per_error(design, vehicle, driving) if estimated else 0.0,

@@ -147,7 +147,7 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UltimateBound:
+class _UltimateBound:
     """The largest |ξ̃| of the sublevel set of L that contains the whole set L' >= 0.
 
     Parameters
@@ -160,7 +160,7 @@ class UltimateBound:
     worst_y: float
 
 
-def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float) -> UltimateBound:
+def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float) -> _UltimateBound:
     """Return the true ultimate bound of the instantaneous law, at least b of (14).
 
     b_UUB² = max over 0 <= y <= w_b of [λ_max(P) x(y)² + y²/ρ_W]/λ_min(P), with
@@ -185,7 +185,7 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     candidates = candidates[x(candidates) >= -1e-12 * b]
     values = p[1] * np.maximum(x(candidates), 0.0) ** 2 + candidates**2 / rho_W
     worst = int(np.argmax(values))
-    return UltimateBound(
+    return _UltimateBound(
         xi_tilde=math.sqrt(float(values[worst]) / p[0]), worst_y=float(candidates[worst])
     )
 
@@ -208,7 +208,7 @@ def printed_bounds(
     gains : of (8) to (12), with leakage.
     trivial : bound of an identifier without a network [U s].
     """
-    pair, tight_pair = best_pair(gains, operation), _tight_pair(gains, operation)
+    pair, tight_pair = _best_pair(gains, operation), _tight_pair(gains, operation)
     W_M, n_h, w_bar = operation.W_M, operation.n_h, operation.w_bar
     eta_W, rho_W = gains.eta_W, gains.rho_W
     k_b = printed_k_b(pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
@@ -236,7 +236,7 @@ def printed_bounds(
     ]
 
 
-def best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
+def _best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
     """Return P and Q = q I with |P| = W_M/√n_h + (η/ρ) |A_d⁻¹|, where the printed b is smallest.
 
     Parameters
@@ -253,7 +253,7 @@ def _tight_pair(gains: Gains, operation: Operation) -> LyapunovPair:
     try:
         return canceling_pair(gains.matrix, eta_W=gains.eta_W, rho_W=gains.rho_W)
     except LyapunovError:
-        return best_pair(gains, operation)
+        return _best_pair(gains, operation)
 
 
 def _with_V(gains: Gains, operation: Operation, pair: LyapunovPair, k_b: float) -> float | None:

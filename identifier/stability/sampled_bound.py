@@ -68,7 +68,7 @@ class Disturbance:
                 raise ValueError(f"{name} must not be negative, it is {value}")
 
 
-NEWTON_STEPS = 100
+_NEWTON_STEPS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,7 +254,7 @@ def by_leakage(
         return *_error(error, A_d, acting, forces), W
 
     X = around(0.0)[1]
-    for _ in range(NEWTON_STEPS):
+    for _ in range(_NEWTON_STEPS):
         if not math.isfinite(X):
             return None
         here, ahead = around(X)[1], around(X * (1.0 + 1e-7))[1]

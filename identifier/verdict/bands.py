@@ -38,7 +38,7 @@ from models.recordings import Recording
 from models.recordings.portion import portion
 
 SHARED = 10.0  # windows of all ranges that count in each, so that few windows decide nothing
-INDEPENDENT = 0.5  # of the windows, which overlap by half
+_INDEPENDENT = 0.5  # of the windows, which overlap by half
 ELSEWHERE = (1.65, 0.68, 0.93, 1.1, 1.22, 1.35)
 # of an instant of another drive, over a window of a part left out, by range of slip: means hide
 # errors of quick passes through zero; chosen on 256 random cars, seeds 100 to 131 and 200 to 231
@@ -195,7 +195,7 @@ def quantile(values: Array, share: Array) -> float:
     order = np.argsort(values)
     count = np.cumsum(share[order])
     total = float(count[-1]) if count.size else 0.0
-    needed = LEVEL * (total + 1.0 / INDEPENDENT)  # as if one more window were farther out than all
+    needed = LEVEL * (total + 1.0 / _INDEPENDENT)  # as if one more window were farther out than all
     at = int(np.searchsorted(count, needed))
     return float(values[order[at]]) if at < values.size else float("inf")
 

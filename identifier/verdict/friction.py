@@ -31,18 +31,18 @@ from models.recordings.portion import portion
 LEAST, MOST, COUNT = 0.2, 2.5, 26  # of the grid of frictions, and how many beside 1
 SPREAD = 0.7  # standard deviation of ln μ of another road
 LASTS = 60.0  # s: a road, on average
-AS_TAUGHT = 0.5  # probability that the drive begins on the road that taught
+_AS_TAUGHT = 0.5  # probability that the drive begins on the road that taught
 UNEXPLAINED = 0.02  # of p₀, that no friction explains the force
 BESIDE = 0.02  # static axle loads: error of curves beside the band,
-OF_FORCE = 0.07  # and over the force
-OF_ESTIMATE = 0.05  # static axle loads: by a v_y that was estimated with that model
-ZERO = 0.015  # rad: by so much the slip of another drive is off, as the zero of its steering is
-ANYTHING = 0.3  # static axle loads: of forces that no friction explains
-OVERLAP = 0.5  # of a window is new
-ANOTHER = 0.25  # |ln μ| from which a road counts as another
+_OF_FORCE = 0.07  # and over the force
+_OF_ESTIMATE = 0.05  # static axle loads: by a v_y that was estimated with that model
+_ZERO = 0.015  # rad: by so much the slip of another drive is off, as the zero of its steering is
+_ANYTHING = 0.3  # static axle loads: of forces that no friction explains
+_OVERLAP = 0.5  # of a window is new
+_ANOTHER = 0.25  # |ln μ| from which a road counts as another
 SURE, LIKELY = 0.99, 0.5  # probability from which that is told, and as long as it goes on
-TWO_SIGMA = 2.0  # of its doubt: a friction nearer to that which taught is not told
-SIMILAR = 0.1  # of ln μ: by so much roads of a tire are not similar
+_TWO_SIGMA = 2.0  # of its doubt: a friction nearer to that which taught is not told
+_SIMILAR = 0.1  # of ln μ: by so much roads of a tire are not similar
 
 
 class Road(NamedTuple):
@@ -96,8 +96,8 @@ class RoadFriction(NamedTuple):
             first = begin + int(np.argmax(sure))
             ln, sd = np.log(self.ratio[first:past]), self.sd[first:past]
             mean = float(np.average(ln, weights=1.0 / sd**2))
-            doubt = math.hypot(float(np.median(sd)), SIMILAR * mean)
-            if abs(mean) > TWO_SIGMA * doubt:
+            doubt = math.hypot(float(np.median(sd)), _SIMILAR * mean)
+            if abs(mean) > _TWO_SIGMA * doubt:
                 ends = float(self.t[first]), float(self.t[past - 1])
                 found.append(Road(*ends, math.exp(mean), math.exp(mean) * doubt))
         return tuple(found)
@@ -140,8 +140,8 @@ def road_friction(
         away[k] = found.measured - modelled_force(tires, asked.recording, windows)
         slope[k] = windows.mean(tires.slope_over(asked.recording))
     sd = windows.mean(band / np.array(model.vehicle.axle_loads)) / normal_quantile(LEVEL)
-    beside = BESIDE if recording.logged_v_y is not None else math.hypot(BESIDE, OF_ESTIMATE)
-    variance = sd**2 + found.noise + beside**2 + (OF_FORCE * found.measured) ** 2
+    beside = BESIDE if recording.logged_v_y is not None else math.hypot(BESIDE, _OF_ESTIMATE)
+    variance = sd**2 + found.noise + beside**2 + (_OF_FORCE * found.measured) ** 2
     t = recording.t[asked.samples[windows.starts + windows.n]]
     return filtered(t, grid, away, slope, variance)
 
@@ -160,23 +160,23 @@ def filtered(t: Array, grid: Array, away: Array, slope: Array, variance: Array) 
     same = int(np.argmin(np.abs(grid)))
     likely = np.exp(-0.5 * (grid / SPREAD) ** 2)
     other = np.append((1.0 - UNEXPLAINED) * likely / likely.sum(), UNEXPLAINED)
-    now = (1.0 - AS_TAUGHT) * other
-    now[same] += AS_TAUGHT
-    zero, doubt = np.zeros((grid.size, 2)), np.full((grid.size, 2), ZERO**2)
+    now = (1.0 - _AS_TAUGHT) * other
+    now[same] += _AS_TAUGHT
+    zero, doubt = np.zeros((grid.size, 2)), np.full((grid.size, 2), _ZERO**2)
     p = np.empty((t.size, now.size))
     for k, h in enumerate(1.0 - np.exp(-np.diff(t, prepend=t[0]) / LASTS)):
         stays = (1.0 - h) * now
         before = stays + h * other
         zero, doubt = _mixed(now, zero, doubt, (stays / before)[:-1, None])
         off, wide = away[:, k] - slope[:, k] * zero, slope[:, k] ** 2 * doubt + variance[k]
-        anything = variance[k] + ANYTHING**2
+        anything = variance[k] + _ANYTHING**2
         told = off**2 / wide + np.log(wide)
         chance = away[same, k] ** 2 / anything + np.log(anything)
-        log = -0.5 * OVERLAP * np.append(told.sum(axis=1), chance.sum())
+        log = -0.5 * _OVERLAP * np.append(told.sum(axis=1), chance.sum())
         now = before * np.exp(log - log.max())
         now = now / now.sum()
         p[k] = now
-        gain = doubt * slope[:, k] / (wide + (1.0 / OVERLAP - 1.0) * variance[k])
+        gain = doubt * slope[:, k] / (wide + (1.0 / _OVERLAP - 1.0) * variance[k])
         zero, doubt = zero + gain * off, doubt * (1.0 - gain * slope[:, k])
     return _of(t, grid, p)
 
@@ -199,5 +199,5 @@ def _of(t: Array, grid: Array, p: NDArray[np.float64]) -> RoadFriction:
     of_friction = p[:, :-1] / np.maximum(1.0 - p[:, -1:], 1e-12)
     mean, cell = of_friction @ grid, float(np.diff(grid).max()) / math.sqrt(12.0)
     spread = np.sqrt(np.maximum(of_friction @ grid**2 - mean**2, 0.0))
-    another = p[:, :-1] @ (np.abs(grid) > ANOTHER)
+    another = p[:, :-1] @ (np.abs(grid) > _ANOTHER)
     return RoadFriction(t, np.exp(mean), np.hypot(spread, cell), another, p[:, -1])

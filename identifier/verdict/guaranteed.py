@@ -32,11 +32,11 @@ from identifier.verdict.motion import FEWEST, WINDOW, Windows, brisk_from, impul
 from identifier.verdict.parts import asked_run
 from models.recordings import Recording
 
-OVERLAPPING = 4  # moments that begin within the length of one
+_OVERLAPPING = 4  # moments that begin within the length of one
 RESERVE = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
-OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
+_OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
 SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
-OVER_LATENESS = Regression().lateness  # s, added before the reserve
+_OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
 class BoundViolatedError(TireidError, ValueError):
@@ -57,7 +57,7 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     if recording.logged_v_y is None or not isinstance(model, AxleModel):
         return None
     drives = recording.v_x >= brisk_from(model)
-    windows = Windows.where(drives, recording, WINDOW, OVERLAPPING)
+    windows = Windows.where(drives, recording, WINDOW, _OVERLAPPING)
     if len(windows) < FEWEST:
         return None
     units, doubt = model.signals_of(recording)
@@ -133,7 +133,7 @@ def guaranteed(
         strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))
     if strips is None or len(strips.t) < FEWEST:
         return carries
-    chosen = estimated_bound(strips, box) if told is None else told
+    chosen = _estimated_bound(strips, box) if told is None else told
     corners = []
     for axle in range(2):
         found = possible_weights(strips, axle, chosen, box)
@@ -158,12 +158,12 @@ def fastest(strips: Strips) -> tuple[float, float]:
     return float(front), float(rear)
 
 
-def estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:
+def _estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:
     """Return the bound that a drive tells: the least that any curve keeps, with a reserve."""
     (e_f, tau_f), (e_r, tau_r) = (least_bound(strips, axle, box) for axle in range(2))
     return ForceBound(
-        error=(RESERVE * (e_f + OVER_ERROR), RESERVE * (e_r + OVER_ERROR)),
-        lateness=(RESERVE * (tau_f + OVER_LATENESS), RESERVE * (tau_r + OVER_LATENESS)),
+        error=(RESERVE * (e_f + _OVER_ERROR), RESERVE * (e_r + _OVER_ERROR)),
+        lateness=(RESERVE * (tau_f + _OVER_LATENESS), RESERVE * (tau_r + _OVER_LATENESS)),
     )
 
 

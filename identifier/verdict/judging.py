@@ -37,7 +37,7 @@ from models.recordings import Recording
 from models.recordings.portion import Portion, portion
 from models.vehicle import GRAVITY
 
-SECANT = 0.01  # rad, to which the slope of a curve is taken: play makes none at zero
+_SECANT = 0.01  # rad, to which the slope of a curve is taken: play makes none at zero
 ROADS = 3  # segments of another friction that are listed one by one
 
 
@@ -280,7 +280,7 @@ def _unsure(asked: Asked) -> Iterator[Objection]:
 
 def _no_tire(asked: Asked) -> Iterator[Objection]:
     loads = np.array(asked.model.vehicle.axle_loads)
-    stiffness = asked.model.force_at(np.array([SECANT]))[0] / SECANT
+    stiffness = asked.model.force_at(np.array([_SECANT]))[0] / _SECANT
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:

@@ -22,8 +22,8 @@ WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones n
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
 STRETCH = 0.3  # share of the windows that may be missed in one piece
-REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
-CONFINED = 0.6  # and of what is missed with the piece
+_REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
+_CONFINED = 0.6  # and of what is missed with the piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,12 +201,12 @@ class Evidence:
         One stretch may be missed, as before a sensor has settled, where all the rest is explained:
         it is left out. None is where all is explained, or more than one stretch is missed.
         """
-        if (self.missed <= REST_MISSED).all():
+        if (self.missed <= _REST_MISSED).all():
             return self, None
         first, last = self.worst_stretch(STRETCH)
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
-        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * self.missed.max())).all()
+        confined = (rest.missed <= np.minimum(_REST_MISSED, _CONFINED * self.missed.max())).all()
         if len(rest.windows) >= FEWEST and confined:
             return rest, (first, last)
         return self, None
@@ -270,12 +270,12 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
 # A frozen model against measured motion, without true forces: the mean of (F_f + F_r)/m is the
 # lateral acceleration, that of (l_f F_f - l_r F_r)/I_z the yaw acceleration.
 
-MOMENT = 0.2  # s, over which both are meant
+_MOMENT = 0.2  # s, over which both are meant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionError:
-    """What forces miss of the measured motion, root mean square of means over `MOMENT`.
+    """What forces miss of the measured motion, root mean square of means over `_MOMENT`.
 
     The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
     small the forces are right, where it is large they need not be wrong.
@@ -308,7 +308,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """
-    windows = Windows.where(counted, recording, MOMENT, round(MOMENT / recording.dt))
+    windows = Windows.where(counted, recording, _MOMENT, round(_MOMENT / recording.dt))
     if not len(windows):
         return None
     m, I_z, l_f, l_r = vehicle.bicycle[:4]

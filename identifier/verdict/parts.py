@@ -17,10 +17,10 @@ from models.recordings.portion import Portion, portion
 from models.vehicle import Vehicle
 
 PARTS = 4  # of the drive, each of which is left out once
-Teach = Callable[[Recording], TireModel]
+_Teach = Callable[[Recording], TireModel]
 
 
-class AskedRun(NamedTuple):
+class _AskedRun(NamedTuple):
     """A run whose frozen model is asked about a portion of its drive, k samples.
 
     model : frozen.   history : the run.   portion : of its recording.   end : time of the freeze
@@ -40,7 +40,7 @@ class AskedRun(NamedTuple):
         return learn(recording, vehicle, self.history.design, self.history.start, self.until)
 
 
-def asked_run(history: History, t: float | None = None) -> AskedRun:
+def asked_run(history: History, t: float | None = None) -> _AskedRun:
     """Return what of a run is asked.
 
     Parameters
@@ -62,15 +62,15 @@ def asked_run(history: History, t: float | None = None) -> AskedRun:
     until = None if n == len(asked.recording) else float(asked.recording.t[n])
     roads = _felt.setdefault(history, {})
     if frozen not in roads:
-        roads[frozen] = road_felt(history, asked)
-    return AskedRun(model, history, asked, end, until, roads[frozen])
+        roads[frozen] = _road_felt(history, asked)
+    return _AskedRun(model, history, asked, end, until, roads[frozen])
 
 
 # What is felt takes as long as learning: it is found once of each run and sample of the freeze.
 _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 
-def road_felt(history: History, asked: Portion) -> Array | None:
+def _road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
     if history.design.needs_v_y == (asked.recording.logged_v_y is None):
         return None  # it was learnt of another motion than that which is asked
@@ -86,7 +86,7 @@ def road_felt(history: History, asked: Portion) -> Array | None:
 
 
 def taught_elsewhere(
-    teach: Teach, recording: Recording, found: Evidence
+    teach: _Teach, recording: Recording, found: Evidence
 ) -> Iterator[tuple[NDArray[np.bool_], TireModel | None]]:
     """Yield which windows are left out (m,), and the model taught without them; None: none came.
 

@@ -23,8 +23,8 @@ UNITS: Mapping[str, float] = {"deg": 180.0 / math.pi, "km/h": 3.6, "g": 1.0 / GR
 
 KINDS = ("stuck", "zero", "lost", "flipped", "scaled", "biased", "drifting", "noisy", "spiking")
 SIZED = KINDS[4:]
-SPIKE_EVERY = 0.13  # s
-SPIKE_LASTS = 0.0098  # s: one sample at 100 Hz
+_SPIKE_EVERY = 0.13  # s
+_SPIKE_LASTS = 0.0098  # s: one sample at 100 Hz
 
 
 class FaultError(TireidError, ValueError):
@@ -78,7 +78,7 @@ class SensorFault:
     ----------
     kind : one of `KINDS`: holds its value; shows 0; shows no number (NaN); has the other sign; is
         multiplied by the size; is off by the size; runs away by the size each second; has white
-        noise of the size; shows the size beside the truth for one sample in `SPIKE_EVERY`.
+        noise of the size; shows the size beside the truth for one sample in `_SPIKE_EVERY`.
     start : when it begins [s].
     duration : how long it lasts [s]; infinite for ever.
     size : in the unit of the channel, or a factor; only for the kinds of `SIZED`.
@@ -145,7 +145,7 @@ class SensorFault:
                 return value + self.size * since
             case "noisy":
                 return value + self.size * noise
-        return value + self.size * (np.mod(since + 0.5 * SPIKE_LASTS, SPIKE_EVERY) < SPIKE_LASTS)
+        return value + self.size * (np.mod(since + 0.5 * _SPIKE_LASTS, _SPIKE_EVERY) < _SPIKE_LASTS)
 
     def apply(self, recording: Recording) -> Recording:
         """Return what the log of the same drive holds with the fault.

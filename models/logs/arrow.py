@@ -21,7 +21,7 @@ from models.logs.table import Kind, Words
 
 WORTH = 1 << 22  # bytes of a text from which on importing pyarrow takes less than it saves
 ODD_NAN = re.compile(rb"(?i)nan\(")  # a number to pyarrow alone
-NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]
+_NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]
 
 
 def is_installed() -> bool:
@@ -80,7 +80,7 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
             pyarrow.csv.ConvertOptions(
                 column_types=kinds,
                 include_columns=list(kinds),
-                null_values=NULLS,
+                null_values=_NULLS,
                 strings_can_be_null=False,
                 decimal_point=layout.decimal,
             ),

@@ -25,8 +25,8 @@ CLEAR = 3.0  # times that the speed is larger than what is measured across it
 SURE, LIKELY = 0.7, 0.4  # correlations
 GRAVITY = FACTORS[ACCELERATION]["g"]
 NEAR = 0.25  # share of gravity by which a mean of it may be off
-TILT = 0.4  # share of it along another axis from which a box lies oblique
-STEMS = {  # what stands before a letter in one word, or beside it, by quantity
+_TILT = 0.4  # share of it along another axis from which a box lies oblique
+_STEMS = {  # what stands before a letter in one word, or beside it, by quantity
     SPEED: "v vel velocity speed",
     ACCELERATION: "a acc accel acceleration accelerometer g gforce",
     RATE: "w gyro gyr gyroscope omega rot rotation rate angular angularvelocity av angrate ang",
@@ -77,7 +77,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
             continue
         letter, rest = split
         stems = {word for word in rest if word != "?"}
-        likely = [one for one in (RATE, ACCELERATION, SPEED) if stems & set(STEMS[one].split())]
+        likely = [one for one in (RATE, ACCELERATION, SPEED) if stems & set(_STEMS[one].split())]
         if is_told(units[name]):
             told = quantities(units[name])
             likely = [one for one in (RATE, ACCELERATION, SPEED) if one in told]
@@ -93,7 +93,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
 
 def _letter(listed: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     """Return the letter of an axis in a name, and its words without; None where it has none."""
-    stems = {word for some in STEMS.values() for word in some.split()}
+    stems = {word for some in _STEMS.values() for word in some.split()}
     for k in range(len(listed) - 1, -1, -1):
         word = listed[k]
         if word in LETTERS or (word[-1] in LETTERS and word[:-1] in stems):
@@ -239,7 +239,7 @@ def _up(means: Mapping[str, float]) -> tuple[str, float]:
         return "", 0.0
     best = max(means, key=lambda letter: abs(means[letter]))
     rest = math.sqrt(max(size * size - means[best] ** 2, 0.0))
-    return (best if rest < TILT * size else "?"), math.copysign(1.0, means[best])
+    return (best if rest < _TILT * size else "?"), math.copysign(1.0, means[best])
 
 
 def _of_a_box(

@@ -38,11 +38,11 @@ from models.logs.magic import MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
 from models.schema import require_few
 
-NS = 1e9  # in a second
-OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
+_NS = 1e9  # in a second
+_OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
 PROBED = 20  # messages that a rate is taken from
 TOGETHER, BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
-STAMPS = ("header.stamp.", "stamp.")
+_STAMPS = ("header.stamp.", "stamp.")
 TIME = ("sec", "nanosec")
 
 # Messages that cars tell their motion by and that are in no distribution of ROS.
@@ -114,8 +114,8 @@ class _Moving(NamedTuple):
 
 
 _Place = tuple[_Topic, Field] | tuple[_Moving, int]  # where a channel is
-TF = "tf2_msgs/msg/TFMessage"
-OF_TF = tuple(
+_TF = "tf2_msgs/msg/TFMessage"
+_OF_TF = tuple(
     f"{a}.{b}" for a, some in (("translation", "xyz"), ("rotation", "xyzw")) for b in some
 )
 
@@ -129,10 +129,10 @@ def open_(path: Path) -> GroupedLog[_Place]:
     first = min((int(one.t[0]) for one in moving), default=0)
     zero = min((topic.zero for topic in topics if topic.stamp), default=first)
     found: list[tuple[str, Listed, _Place]] = [
-        (TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
-                    rate=typical_rate((one.t - one.t[0]) / NS)), (one, k))
+        (_TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
+                    rate=typical_rate((one.t - one.t[0]) / _NS)), (one, k))
         for one in moving
-        for k, field in enumerate(OF_TF)
+        for k, field in enumerate(_OF_TF)
     ]  # fmt: skip
     for topic in topics:
         for field in topic.fields:
@@ -165,7 +165,7 @@ def _samples(
             frames.setdefault(moving.name, (moving, {}))[1][listed.name] = moving.values[:, k]
         else:
             fields.setdefault(place[0], {})[listed.name] = place[1]
-    done = [Samples(one.name, (one.t - zero) / NS, values) for one, values in frames.values()]
+    done = [Samples(one.name, (one.t - zero) / _NS, values) for one, values in frames.values()]
     readings = {
         topic.name: _Reading(path, definitions, topic, some) for topic, some in fields.items()
     }
@@ -179,7 +179,7 @@ def _moving(path: Path, bag: Any) -> list[_Moving]:
     """Return the frames of /tf that move."""
     found: dict[str, tuple[list[int], list[tuple[float, ...]]]] = {}
     count = 0
-    for connection, _, raw in bag.messages([c for c in bag.connections if c.msgtype == TF]):
+    for connection, _, raw in bag.messages([c for c in bag.connections if c.msgtype == _TF]):
         for name, ns, values in _transforms(raw):
             times, rows = found.setdefault(f"{connection.topic}/{name}", ([], []))
             times.append(ns)
@@ -296,7 +296,7 @@ def _topics(
             continue
         try:
             fields = tuple(fields_of(definitions, kind))
-            stamp = next((one for one in STAMPS if _has_time(fields, one)), None)
+            stamp = next((one for one in _STAMPS if _has_time(fields, one)), None)
             kept = tuple(one for one in fields if stamp is None or not one.path.startswith(stamp))
             if not kept:
                 continue
@@ -320,7 +320,7 @@ def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
     stamped = [topic.zero for topic, _ in found if topic.stamp is not None]
     received = [first for _, first in found]
     apart = any(
-        abs(topic.zero - first) > OTHER_CLOCK * NS
+        abs(topic.zero - first) > _OTHER_CLOCK * _NS
         for topic, first in found
         if topic.stamp is not None
     )
@@ -356,7 +356,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
         raise CdrError("it holds no message")
     first = stamps[0] if stamps else 0
     times = np.array(stamps if first else received, dtype=np.int64)
-    return received[0], first or None, typical_rate((times - times[0]) / NS)
+    return received[0], first or None, typical_rate((times - times[0]) / _NS)
 
 
 def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, bytes]]:
@@ -416,7 +416,7 @@ class _Reading:
                 f"{self.path}: {self.topic.name} must have {self.topic.messages} messages, it has "
                 f"{len(self.clock)}; was the bag cut off?"
             )
-        t = (self.clock.finished() - self.topic.zero) / NS
+        t = (self.clock.finished() - self.topic.zero) / _NS
         values = {name: one.finished() for name, one in self.parts.items()}
         return Samples(self.topic.name, t, values)
 

@@ -17,8 +17,8 @@ from models.logs.log import RecordingError
 from models.logs.magic import BAG_METADATA
 from models.schema import CHUNK, most_unpacked, read_text, require_dense, require_few
 
-Unpack = Callable[[bytes, int], bytes]
-DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
+_Unpack = Callable[[bytes, int], bytes]
+_DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 
 
 @contextmanager
@@ -49,7 +49,7 @@ def bounded(path: Path) -> Iterator[None]:
         _require(path, len(message), len(data))
         return message
 
-    table: dict[str, Unpack] = mcap.DECOMPRESSORS
+    table: dict[str, _Unpack] = mcap.DECOMPRESSORS
     before = dict(table)
     table.update(zstd=of_zstd, lz4=of_lz4)
     reader.zstd = SimpleNamespace(open=zstd.open, decompress=of_message)
@@ -74,7 +74,7 @@ def _require_shallow(path: Path) -> None:
         deepest = max(deepest, depth)
     indent = max((len(line) - len(line.lstrip()) for line in text.splitlines()), default=0) // 2
     require_few(RecordingError, str(path), max(deepest, indent), "depth", "levels of metadata")
-    if DEEP.search(text):
+    if _DEEP.search(text):
         raise RecordingError(f"{path}: must not hold lists in lists")
 
 

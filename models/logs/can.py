@@ -23,17 +23,17 @@ from models.logs.magic import HEAD, frames_in
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME, read_bytes
 
-FLOATS = (16, 32, 64)  # bits of a signal that is a float
-LONGEST_SIGNAL = 64  # bits
+_FLOATS = (16, 32, 64)  # bits of a signal that is a float
+_LONGEST_SIGNAL = 64  # bits
 # Names that a DBC gives to values that are no numbers.
-NO_NUMBER = re.compile(
+_NO_NUMBER = re.compile(
     r"\b(?:sna|snv|invalid|ung(?:ue|ü)ltig|not[ _]?(?:avail\w*|valid)|unavailable|undefined|error"
     r"|fault|failure|fehler|init\w*|n/?a)\b",
     re.I,
 )
 
 
-Selectors = tuple[tuple[Any, tuple[int, ...]], ...]
+_Selectors = tuple[tuple[Any, tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -201,9 +201,9 @@ def _read_dbc(path: Path) -> _Dbc:
 
 def _fault(message: Any, signal: Any) -> str:
     """Return the rule that a signal breaks, with the value; "" where it breaks none."""
-    sizes = FLOATS if signal.is_float else range(1, LONGEST_SIGNAL + 1)
+    sizes = _FLOATS if signal.is_float else range(1, _LONGEST_SIGNAL + 1)
     if signal.length not in sizes:
-        allowed = "16, 32 or 64" if signal.is_float else f"1 to {LONGEST_SIGNAL}"
+        allowed = "16, 32 or 64" if signal.is_float else f"1 to {_LONGEST_SIGNAL}"
         return f"must have {allowed} bits, it has {signal.length}"
     _, end = _bytes_of(signal)
     return "" if end <= message.length else f"lies beyond its frame of {message.length} bytes"
@@ -222,7 +222,7 @@ def _first_bit(signal: Any) -> int:
     return start if signal.byte_order == "little_endian" else 8 * (start // 8) + 7 - start % 8
 
 
-def _selectors(message: Any, signal: Any) -> Selectors:
+def _selectors(message: Any, signal: Any) -> _Selectors:
     """Return the signals that say whether a signal is sent, with the values that do."""
     named = {one.name: one for one in message.signals}
     result: list[tuple[Any, tuple[int, ...]]] = []
@@ -233,7 +233,7 @@ def _selectors(message: Any, signal: Any) -> Selectors:
     return tuple(result)
 
 
-def _sent(frames: Frames, selectors: Selectors) -> NDArray[np.intp] | None:
+def _sent(frames: Frames, selectors: _Selectors) -> NDArray[np.intp] | None:
     """Return which frames hold a signal, None where all do: of multiplexed ones not all do."""
     if not selectors:
         return None
@@ -254,7 +254,7 @@ def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     raw = raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
     states = [
-        value for value, name in (signal.choices or {}).items() if NO_NUMBER.search(_words(name))
+        value for value, name in (signal.choices or {}).items() if _NO_NUMBER.search(_words(name))
     ]
     values[np.isin(raw, states)] = np.nan
     return values

@@ -24,7 +24,7 @@ NUMBERS = {
     **{"float32": "f4", "float64": "f8"},
 }
 SIZES = {name: int(kind[1]) for name, kind in NUMBERS.items()} | {"bool": 1, "byte": 1, "char": 1}
-BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
+_BASE, NAME, ARRAY, _SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
 
 # By name of a type: its constants, and name and node of each field.
 Definitions = Mapping[str, tuple[Any, list[tuple[str, Any]]]]
@@ -74,9 +74,9 @@ def fields_of(
         number, value = _kind(node), node[1]
         if number == NAME:
             yield from fields_of(definitions, value, f"{prefix}{name}.", inner)
-        elif number == BASE and value[0] in NUMBERS:
+        elif number == _BASE and value[0] in NUMBERS:
             yield Field(prefix + name, inner, NUMBERS[value[0]])
-        elif number in (ARRAY, SEQUENCE) and _kind(value[0]) == NAME:
+        elif number in (ARRAY, _SEQUENCE) and _kind(value[0]) == NAME:
             for _ in fields_of(definitions, value[0][1], "", inner):  # it must be known, too
                 pass
 
@@ -141,7 +141,7 @@ class _Walk:
         for name, node in _fields(self.definitions, kind):
             path = None if prefix is None else prefix + name
             number, value = _kind(node), node[1]
-            if number in (BASE, NAME):
+            if number in (_BASE, NAME):
                 self.one(node, path, depth)
             else:
                 count = value[1] if number == ARRAY else self.length()
@@ -152,7 +152,7 @@ class _Walk:
         number, value = _kind(node), node[1]
         if number == NAME:
             self.message(value, None if path is None else f"{path}.", depth + 1)
-        elif number != BASE:
+        elif number != _BASE:
             raise CdrError("a definition has arrays of arrays")
         elif value[0] == "string":
             length = self.length()  # moves the place, too
@@ -169,7 +169,7 @@ class _Walk:
         """Go through the values of an array or a sequence."""
         if count > len(self.raw):
             raise CdrError("a message is cut off")
-        if _kind(node) == BASE and node[1][0] != "string":
+        if _kind(node) == _BASE and node[1][0] != "string":
             if count:
                 size = self.align(node[1][0])  # moves the place, too
                 self.place += count * size

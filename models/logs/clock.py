@@ -22,10 +22,10 @@ from models.logs.log import Channel, RecordingError
 from models.logs.stamps import CALENDAR, not_rising, since
 
 LONGEST_GAP = 0.1  # [s]
-GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
+_GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
 SLOWEST = 0.11  # [s]: longest typical interval of a channel, 10 Hz with jitter
-OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
-ON_STEP = 0.01  # share of a step within which an instant is that of a sample
+_OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
+_ON_STEP = 0.01  # share of a step within which an instant is that of a sample
 
 
 class Stretch(NamedTuple):
@@ -54,7 +54,7 @@ def holes(channel: Channel) -> NDArray[np.intp]:
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
     """
     empty = np.flatnonzero(np.isnan(channel.values))
-    return empty if empty.size < OWN_CLOCK * channel.values.size else empty[:0]
+    return empty if empty.size < _OWN_CLOCK * channel.values.size else empty[:0]
 
 
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
@@ -85,7 +85,7 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     t : rising time stamps [s], (n,).
     longest : time without a sample that is none yet [s].
     """
-    limit = max(longest * (1.0 + 1e-6), GAP_INTERVALS * typical_step(t))
+    limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
     found = [part.start + 1 + np.flatnonzero(steps > limit) for part, steps in _steps(t)]
     return np.concatenate([np.zeros(0, dtype=np.intp), *found])
 
@@ -173,7 +173,7 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
     for t in times:
         cuts = gaps(t, longest)
         first = t[np.concatenate([[0], cuts])]
-        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - ON_STEP) * _interval(t)
+        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
         own = list(zip(first.tolist(), last.tolist(), strict=True))
         spans = _intersection(spans, own)
     return spans
@@ -210,14 +210,14 @@ def sampled(raw: Raw, grid: Array, dt: float) -> Array:
 
 def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     """Return the same at some instants, of a signal with a typical interval [s]."""
-    last = np.searchsorted(raw.t, grid + ON_STEP * dt, side="right") - 1
+    last = np.searchsorted(raw.t, grid + _ON_STEP * dt, side="right") - 1
     if interval < dt / 1.5:
-        first = np.searchsorted(raw.t, grid - dt + ON_STEP * dt, side="right")
+        first = np.searchsorted(raw.t, grid - dt + _ON_STEP * dt, side="right")
         return _mean_since(raw.values, last, np.minimum(first, last))
     before = np.maximum(last - 1, 0)
     now, step = raw.values[last], raw.t[last] - raw.t[before]
     ahead = np.maximum(grid - raw.t[last], 0.0)
-    goes_on = (last > 0) & (step <= GAP_INTERVALS * interval) & (ahead > ON_STEP * dt)
+    goes_on = (last > 0) & (step <= _GAP_INTERVALS * interval) & (ahead > _ON_STEP * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)
 

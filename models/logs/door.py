@@ -28,8 +28,8 @@ OPENERS = {
     "can": "models.logs.can:open_",
     "text": "models.logs.text:open_text",
 }
-JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
-RATED = ("text", "parquet", "matlab")  # which may lack a time
+_JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
+_RATED = ("text", "parquet", "matlab")  # which may lack a time
 
 
 def open_log(
@@ -68,10 +68,10 @@ def open_log(
             for one in sorted(path.iterdir()):
                 if one.is_file() and one.name.lower().endswith(ENDINGS):
                     inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
-            joined: LogFile = _function(JOINED)(path, inside)
+            joined: LogFile = _function(_JOINED)(path, inside)
             return joined
         format = "can" if told else format
-        if rate and format not in RATED:
+        if rate and format not in _RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
         told += (rate,) * (format == "matlab")
         opened: Any = _function(OPENERS[format])(path, *told)

@@ -24,9 +24,9 @@ from codegen.escape import shown
 from models.extras import needs
 from models.logs.log import RecordingError
 
-LONGEST_REASON = 160  # characters
+_LONGEST_REASON = 160  # characters
 FULL = (errno.ENOSPC, errno.EDQUOT)
-LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
+_LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 
 def need(path: Path, module: str, format: str, extra: str) -> Any:
@@ -83,16 +83,16 @@ def _reason(error: Exception) -> str:
     if not text:
         return type(error).__name__
     return (
-        shown(text[:LONGEST_REASON]).strip("'\"")
+        shown(text[:_LONGEST_REASON]).strip("'\"")
         if not text.isprintable()
-        else (text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]}...")
+        else (text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]}...")
     )
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Say nothing that a library says: on the screen, in warnings, in logs or when it is freed."""
-    loggers = [logging.getLogger(name) for name in LOGGERS]
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
     before = [logger.disabled for logger in loggers]
     hook = sys.unraisablehook
     sys.unraisablehook = lambda _: None

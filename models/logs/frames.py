@@ -31,16 +31,16 @@ from models.logs.stamps import CALENDAR, nanoseconds, since
 from models.schema import require_few
 
 FRAME = "CAN_DataFrame"  # of MDF
-NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
+_NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
 TOGETHER = 1 << 16  # frames that are stored at a time
 SHORT = 0x7FF  # largest identifier of 11 bits
 EXTENDED = 1 << 31  # marks an identifier of 29 bits
 IDENTIFIER = (1 << 29) - 1
-INFLATION = 1032  # most bytes that deflate makes of one
+_INFLATION = 1032  # most bytes that deflate makes of one
 OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
-CONTAINER, DEFLATED = 10, 2
+_CONTAINER, DEFLATED = 10, 2
 METHOD = struct.Struct("<H14x")  # of a container, before its data
-FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
+_FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
 Key = tuple[str, int]  # bus, identifier with EXTENDED
 FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
@@ -292,7 +292,7 @@ def _require_whole_blf(path: Path) -> None:
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(144)
-        told = FILE_SIZE.unpack_from(head, 16)[0]
+        told = _FILE_SIZE.unpack_from(head, 16)[0]
         if told > size:
             raise RecordingError(f"{path}: is cut off, it has {size} of {told} bytes")
         file.seek(struct.unpack_from("<I", head, 4)[0])
@@ -301,7 +301,7 @@ def _require_whole_blf(path: Path) -> None:
             if signature != b"LOBJ" or length < OBJECT.size or length > size:
                 return  # the reader says so
             body = length - OBJECT.size
-            if kind == CONTAINER and body * INFLATION > most:
+            if kind == _CONTAINER and body * _INFLATION > most:
                 data = file.read(body)
                 size_of = len(data) - METHOD.size
                 if size_of > 0 and METHOD.unpack_from(data)[0] == DEFLATED:
@@ -347,7 +347,7 @@ def _has_data(group: Any) -> bool:
 def _what(group: Any) -> str:
     """Return what the frames of a group are, that are no data frames."""
     kinds = {name.partition(".")[0] for name in _names(group)}
-    return "error and remote" if kinds & set(NO_DATA) else "other"
+    return "error and remote" if kinds & set(_NO_DATA) else "other"
 
 
 class _Part(NamedTuple):

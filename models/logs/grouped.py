@@ -28,7 +28,7 @@ from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
 from models.schema import require_few
 
-MOST_NOTED = 5  # names that a note lists
+_MOST_NOTED = 5  # names that a note lists
 
 P = TypeVar("P")
 
@@ -230,7 +230,7 @@ def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
     """
     if not names:
         return ()
-    return (f"{what}: {some(names, MOST_NOTED)}",)
+    return (f"{what}: {some(names, _MOST_NOTED)}",)
 
 
 def require_room(path: Path, samples: float, width: float) -> None:

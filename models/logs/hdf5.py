@@ -18,7 +18,7 @@ from models.logs.tree import Leaf, Tree, Unread
 from models.schema import require_few, swells
 
 OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
-LONGEST_TEXT, MOST_TEXTS = 1_000_000, 10_000  # bytes of all texts of a dataset, how many they are
+_LONGEST_TEXT, _MOST_TEXTS = 1_000_000, 10_000  # bytes of all texts of a dataset, how many they are
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
@@ -108,14 +108,14 @@ class _Reader:
     def text(self, node: Any, is_numbers: bool) -> Tree:
         """Return a text, or a list of them."""
         read_at_once = max(node.size, _chunk(node)) * node.dtype.itemsize
-        if read_at_once > LONGEST_TEXT or (not is_numbers and node.size > MOST_TEXTS):
+        if read_at_once > _LONGEST_TEXT or (not is_numbers and node.size > _MOST_TEXTS):
             return Unread("a long text")
         if is_numbers:
             codes = np.asarray(node[()])
             rows = [codes] if codes.ndim < 2 else list(codes.T)
             words: list[Tree] = ["".join(chr(int(one)) for one in row) for row in rows]
         else:
-            words, left = [], LONGEST_TEXT
+            words, left = [], _LONGEST_TEXT
             for place in np.ndindex(node.shape):  # many may refer to one that is long
                 one = node[place]
                 words.append(

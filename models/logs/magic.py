@@ -8,15 +8,15 @@ from pathlib import Path
 
 HEAD = 1 << 12  # bytes that tell a format
 GZIP = b"\x1f\x8b"
-PARQUET = b"PAR1"
+_PARQUET = b"PAR1"
 MDF = (b"MDF     ", b"UnFinMF ")
-HDF5, HDF5_PLACES = b"\x89HDF\r\n\x1a\n", (0, 512)  # MATLAB puts a header before
-MATLAB, MATLAB_ORDERS = b"MATLAB", (b"IM", b"MI")
+HDF5, _HDF5_PLACES = b"\x89HDF\r\n\x1a\n", (0, 512)  # MATLAB puts a header before
+MATLAB, _MATLAB_ORDERS = b"MATLAB", (b"IM", b"MI")
 SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
 BAG_METADATA = "metadata.yaml"  # in the folder of a bag
-NUMPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"  # an .npz is a ZIP file of .npy
+NUMPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"  # an .npz is a ZIP file of .npy
 BLF = b"LOGG"
-FRAMES_IN_TEXT = {
+_FRAMES_IN_TEXT = {
     "ASC": re.compile(
         rb"\s*(?://[^\n]*\n\s*)*date\s[^\n]*\n\s*(?://[^\n]*\n\s*)*base\s+(?:hex|dec)\b", re.I
     ),
@@ -36,17 +36,17 @@ FRAMES_IN_TEXT = {
 
 def is_hdf5(head: bytes) -> bool:
     """Whether a file is HDF5, as MATLAB 7.3 writes it or others do."""
-    return any(head[k : k + len(HDF5)] == HDF5 for k in HDF5_PLACES)
+    return any(head[k : k + len(HDF5)] == HDF5 for k in _HDF5_PLACES)
 
 
 def is_numpy(head: bytes) -> bool:
     """Whether a file is an array of NumPy, or an archive of them."""
-    return head.startswith(NUMPY) or (head.startswith(ZIP) and b".npy" in head[:300])
+    return head.startswith(NUMPY) or (head.startswith(_ZIP) and b".npy" in head[:300])
 
 
 def is_mat5(head: bytes) -> bool:
     """Whether a file begins as one of MATLAB 5 to 7; those of 7.3 do too, and are HDF5."""
-    return head.startswith(MATLAB) and head[126:128] in MATLAB_ORDERS
+    return head.startswith(MATLAB) and head[126:128] in _MATLAB_ORDERS
 
 
 def frames_in(head: bytes) -> str:
@@ -55,7 +55,7 @@ def frames_in(head: bytes) -> str:
         return "BLF"
     if head.startswith(MDF):
         return "MDF4"
-    return next((name for name, form in FRAMES_IN_TEXT.items() if form.match(head)), "")
+    return next((name for name, form in _FRAMES_IN_TEXT.items() if form.match(head)), "")
 
 
 def format_of(path: Path, head: bytes) -> str:
@@ -67,7 +67,7 @@ def format_of(path: Path, head: bytes) -> str:
     """
     if path.is_dir():
         return "bag" if (path / BAG_METADATA).is_file() else "folder"
-    if head.startswith(PARQUET) or path.suffix.lower() == ".parquet":
+    if head.startswith(_PARQUET) or path.suffix.lower() == ".parquet":
         return "parquet"
     if head.startswith(MDF):
         return "mdf"

@@ -22,7 +22,7 @@ from models.logs.tree import Leaf, Tree, Unread
 from models.schema import most_unpacked, require_dense, require_few, swells
 
 HEADER = 128  # bytes
-MATRIX, COMPRESSED = 14, 15  # types of an element
+MATRIX, _COMPRESSED = 14, 15  # types of an element
 NUMBERS = {
     1: "i1",
     2: "u1",
@@ -36,11 +36,11 @@ NUMBERS = {
     13: "u8",
 }
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-CELL, STRUCT, OBJECT, CHAR, SPARSE, OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
-NUMERIC = range(6, 16)
-COMPLEX = 0x0800  # flag
-BEGINNING = 4096  # bytes that hold what a variable of numbers says of itself
-LARGEST_DIMENSION = 2**40
+_CELL, _STRUCT, OBJECT, _CHAR, _SPARSE, _OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
+_NUMERIC = range(6, 16)
+_COMPLEX = 0x0800  # flag
+_BEGINNING = 4096  # bytes that hold what a variable of numbers says of itself
+_LARGEST_DIMENSION = 2**40
 
 Load = Callable[[], memoryview]
 
@@ -94,14 +94,14 @@ def read_tree(path: Path) -> dict[str, Tree]:
             place += 8
             if length > size - place:
                 raise DamagedError(f"the variable at byte {place - 8} is cut off")
-            if kind in (MATRIX, COMPRESSED):
-                variable = _Variable(path, place, length, kind == COMPRESSED, order)
+            if kind in (MATRIX, _COMPRESSED):
+                variable = _Variable(path, place, length, kind == _COMPRESSED, order)
                 if (found := variable.tree()) is not None:
                     result[found.name] = found.tree
                     held, packed = held + found.held, packed + (length if found.held else 0)
                 require_dense(RecordingError, str(path), held, packed, "structs and cells")
                 require_few(RecordingError, str(path), len(result), "columns", "variables")
-            place += length + (0 if kind == COMPRESSED else -length % 8)
+            place += length + (0 if kind == _COMPRESSED else -length % 8)
     return result
 
 
@@ -137,15 +137,15 @@ class _Variable(NamedTuple):
 
     def tree(self) -> "_Read | None":
         """Return its name and what it holds, None of what MATLAB keeps for itself."""
-        begin = _beginning(self.data(BEGINNING), self.order)
+        begin = _beginning(self.data(_BEGINNING), self.order)
         if not begin.name or begin.name.startswith("__"):
             return None
-        if begin.kind in NUMERIC and not begin.is_complex and begin.dimensions == 2:
+        if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
             count = math.prod(begin.shape)
             if swells(8 * count, self.length):
                 return _Read(begin.name, Unread(f"{count} numbers in {self.length} bytes"), 0)
             return _Read(begin.name, Leaf(shape=begin.shape, load=self._load), 0)
-        if begin.kind not in (CELL, STRUCT, CHAR):
+        if begin.kind not in (_CELL, _STRUCT, _CHAR):
             return _Read(begin.name, _unread(begin), 0)
         data = self.data()
         return _Read(begin.name, _tree(self.path, data, self.order, 0), len(data))
@@ -190,7 +190,7 @@ def _beginning(data: memoryview, order: str) -> _Beginning:
         raise DamagedError("a variable has no flags")
     flags = struct.unpack(order + "I", parts[0].data[:4])[0]
     kind = flags & 0xFF
-    if kind == OPAQUE:  # it has no dimensions: name, system, class
+    if kind == _OPAQUE:  # it has no dimensions: name, system, class
         words = [bytes(one.data).decode("latin-1") for one in parts[1:]]
         return _Beginning(kind, False, (0, 0), 0, words[0], data[:0])
     if len(parts) < 3:
@@ -200,12 +200,12 @@ def _beginning(data: memoryview, order: str) -> _Beginning:
     if len(dimensions) < 2 or min(dimensions) < 0:
         raise DamagedError("a variable has no dimensions")
     shape = dimensions[0], math.prod(dimensions[1:])
-    if math.prod(shape) > LARGEST_DIMENSION:
+    if math.prod(shape) > _LARGEST_DIMENSION:
         raise DamagedError("a variable is too large")
     place = _after(data, order, 3)
     return _Beginning(
         kind,
-        bool(flags & COMPLEX),
+        bool(flags & _COMPLEX),
         shape,
         len(dimensions),
         bytes(parts[2].data).decode("latin-1"),
@@ -242,19 +242,19 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
     """Return what a variable holds."""
     require_few(RecordingError, str(path), depth, "depth", "levels of structs and cells")
     begin = _beginning(data, order)
-    if begin.kind in NUMERIC and not begin.is_complex and begin.dimensions == 2:
+    if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
         return Leaf(shape=begin.shape, load=lambda: _load(path, begin, order))
-    if begin.kind == CHAR:
+    if begin.kind == _CHAR:
         return _words(begin, order)
     count = begin.shape[0] * begin.shape[1]
     require_few(RecordingError, str(path), count, "values", "cells")
     elements = _elements(begin.rest, order)
-    if begin.kind == CELL:
+    if begin.kind == _CELL:
         cells: list[Tree] = [
             _tree(path, one.data, order, depth + 1) for one in _take(elements, count)
         ]
         return cells
-    if begin.kind != STRUCT:
+    if begin.kind != _STRUCT:
         return _unread(begin)
     head = [next(elements, None), next(elements, None)]
     if head[0] is None or head[1] is None or len(head[0].data) < 4:
@@ -306,7 +306,7 @@ def _words(begin: _Beginning, order: str) -> Tree:
 def _unread(begin: _Beginning) -> Unread:
     if begin.is_complex:
         return Unread("complex numbers")
-    kinds = {OPAQUE: "a table, timeseries or other object", OBJECT: "an object", SPARSE: "sparse"}
-    if begin.kind in NUMERIC:
+    kinds = {_OPAQUE: "a table, timeseries or other object", OBJECT: "an object", _SPARSE: "sparse"}
+    if begin.kind in _NUMERIC:
         return Unread(f"an array of {begin.dimensions} dimensions")
     return Unread(kinds.get(begin.kind, f"class {begin.kind}"))

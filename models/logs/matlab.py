@@ -16,7 +16,7 @@ from models.logs.stamps import find_clock, typical_rate
 from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
 from models.logs.units import PER_SECOND
 
-REMEDY = (
+_REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
     "save('log.mat', '-struct', 's'); or --rate HZ gives the samples per second"
 )
@@ -76,7 +76,7 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
         said,
         partial(_samples, times),
         missing="signal with a time",
-        remedy=REMEDY if said else f"there is no vector of numbers; {REMEDY}",
+        remedy=_REMEDY if said else f"there is no vector of numbers; {_REMEDY}",
     )
 
 

@@ -21,11 +21,11 @@ from models.logs.mdf_blocks import is_bus, opened
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME
 
-NUMERIC_4, NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
-WORDS_4, WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
-FORMULA_4, FORMULA_3 = 3, 10  # kinds of conversion
+_NUMERIC_4, _NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
+_WORDS_4, _WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
+_FORMULA_4, _FORMULA_3 = 3, 10  # kinds of conversion
 # A formula is computed only where it is one: numbers, x, operators and functions.
-FORMULA = re.compile(
+_FORMULA = re.compile(
     r"(?:[\s\d.+\-*/(),]|\d[eE][+-]?\d|\b[xX]1?\b|\b(?:sin|cos|tan|asin|acos|atan|sinh|cosh|tanh"
     r"|exp|log|log10|abs|sqrt|pow)\b)*"
 )
@@ -183,7 +183,7 @@ def _kind(group: Any, index: int, is_4: bool) -> str:
         return "array"
     if is_4 and int(channel.channel_type) not in VALUES:
         return "word"
-    if channel.data_type not in (NUMERIC_4 if is_4 else NUMERIC_3):
+    if channel.data_type not in (_NUMERIC_4 if is_4 else _NUMERIC_3):
         return "word"
     return _kind_of_conversion(channel.conversion, is_4)
 
@@ -192,9 +192,9 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
     if conversion is None:
         return "number"
     kind = int(conversion.conversion_type)
-    if kind == (FORMULA_4 if is_4 else FORMULA_3):
-        return "number" if FORMULA.fullmatch(_text(conversion.formula)) else "formula"
-    if kind not in (WORDS_4 if is_4 else WORDS_3):
+    if kind == (_FORMULA_4 if is_4 else _FORMULA_3):
+        return "number" if _FORMULA.fullmatch(_text(conversion.formula)) else "formula"
+    if kind not in (_WORDS_4 if is_4 else _WORDS_3):
         return "number"
     # Words: all of its values are, or some beside a default that is a conversion of its own.
     inner = getattr(conversion, "referenced_blocks", None) or {}

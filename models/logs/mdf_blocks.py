@@ -16,13 +16,13 @@ from models.logs.foreign import need
 from models.logs.log import RecordingError
 from models.schema import require_dense, require_few
 
-MOST_BLOCKS = 1_000_000  # of data
-BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
+_MOST_BLOCKS = 1_000_000  # of data
+_BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 
 
 def is_bus(group: Any) -> bool:
     """Whether a group of channels of an MDF4 file holds frames of a bus."""
-    return bool(int(group.channel_group.flags) & BUS_EVENT)
+    return bool(int(group.channel_group.flags) & _BUS_EVENT)
 
 
 class _Form(NamedTuple):
@@ -118,7 +118,7 @@ def _require_fitting(path: Path, group: Any, is_4: bool) -> None:
         require_dense(RecordingError, str(path), total, packed, "groups of channels")
         here = group.data_location == 0
         if (
-            number > MOST_BLOCKS
+            number > _MOST_BLOCKS
             or total > 1e6 * limits().megabytes
             or (here and int(block.address) + stored > file_size)
         ):

@@ -16,7 +16,7 @@ from models.logs.units import TIME, to_si
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
 EVEN = "(even)"  # a time that a rate makes
-NANOSECONDS = 1e9  # of a second
+_NANOSECONDS = 1e9  # of a second
 
 
 class ArrayLog:
@@ -177,7 +177,7 @@ def _since_first(stamps: NDArray[Any]) -> Array:
     seconds = np.full(stamps.size, np.nan)
     if there.size:
         since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
-        seconds[~np.isnat(stamps)] = since / NANOSECONDS
+        seconds[~np.isnat(stamps)] = since / _NANOSECONDS
     return seconds
 
 

@@ -49,19 +49,19 @@ from models.logs.units import (
 )
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
-STANDARD, KNOWN, WORDS, VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
+_STANDARD, KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
 HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
-NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
-FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
+_NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
+_FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
 STILL = 0.25  # of confidence that is left to a channel that never changes
 APART = 0.04  # of confidence: nearer ones are equal
 HAND = "steering wheel"  # an angle that wants a ratio
-LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
-LOOKED_AT = 20_000  # samples at most, in telling contents apart
-SPIKES = 1e-3  # share of samples that say nothing of the unit
+_LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
+_LOOKED_AT = 20_000  # samples at most, in telling contents apart
+_SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is told, "" SI.
 UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
-OBLIQUE = "its box lies oblique: no axis of it is one of the car"
+_OBLIQUE = "its box lies oblique: no axis of it is one of the car"
 SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
@@ -102,7 +102,7 @@ def _rule(one: Mapping[str, Any]) -> Rule:
 
 
 RULES: Mapping[str, Rule] = {name: _rule(one) for name, one in TABLES["signals"].items()}
-PER_WHEEL, HINTS = TABLES["per_wheel"], {k: tuple(v.split()) for k, v in TABLES["hints"].items()}
+_PER_WHEEL, _HINTS = TABLES["per_wheel"], {k: tuple(v.split()) for k, v in TABLES["hints"].items()}
 SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in TABLES["sides"].items()}
 # German words are written together: "Querbeschl", "Lenkradwinkel", "Sollgierrate".
 _FIRST = "soll|ist|fahrzeug|fahr|quer|laengs|gier|vertikal|hoch|radlenk|lenkrad|lenk|schwimm|rad"
@@ -112,9 +112,9 @@ _PARTS = re.compile(f"{_FIRST}|{_LAST}")
 # CarSim says left or right and the number of the axle: "Steer_L1", "Fy_R2".
 _SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
 _SPIN = re.compile(r"(?<![A-Za-z])AV[xyz](?![A-Za-z])")  # and "AVy_L1" of the spin of a wheel
-CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
-GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
-UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
+_CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
+_GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
                          "δ": "delta", "ω": "omega"})  # fmt: skip
 
 
@@ -122,8 +122,8 @@ _WHEELS = TABLES["wheels"]
 PLACES = {
     name: [frozenset(way.split()) for way in _WHEELS[name].split(",")] for name in WHEELS[:-1]
 }
-ANYWHERE = frozenset(word for ways in PLACES.values() for way in ways for word in way)
-WHEEL, TURNING, SPEEDS, BOTH, ENCODER, OTHERS = (
+_ANYWHERE = frozenset(word for ways in PLACES.values() for way in ways for word in way)
+WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
     frozenset(_WHEELS[name].split())
     for name in ("wheel", "turns", "speeds", "both", "encoder", "others")
 )
@@ -132,7 +132,7 @@ WHEEL, TURNING, SPEEDS, BOTH, ENCODER, OTHERS = (
 def _with_corner(word: str) -> tuple[str, ...]:
     """Return a word, or what it is made of where a corner of the car is written with it."""
     for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
-        if corner in CORNERS and stem in BOTH:
+        if corner in CORNERS and stem in _BOTH:
             return stem, corner
     return (word,)
 
@@ -148,13 +148,13 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
     if listed & OTHERS:
         return False
     if signal == WHEELS[-1]:
-        turns = listed & ENCODER or (listed & WHEEL and listed & TURNING) or listed == {signal}
-        return bool(turns and not listed & ANYWHERE)
+        turns = listed & _ENCODER or (listed & WHEEL and listed & TURNING) or listed == {signal}
+        return bool(turns and not listed & _ANYWHERE)
     for place in PLACES[signal]:
         rest = listed - place
-        if listed >= place and not rest & ANYWHERE:
+        if listed >= place and not rest & _ANYWHERE:
             return bool(
-                rest & BOTH
+                rest & _BOTH
                 or (rest & WHEEL and (rest & TURNING or rest <= WHEEL))
                 or (rest <= SPEEDS and rest)
             )
@@ -231,15 +231,15 @@ class Proposal:
 
 def words_of(name: str) -> tuple[str, ...]:
     """Return a name as small words: "Car.YawRate" is car, yaw, rate."""
-    plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
+    plain = unicodedata.normalize("NFC", name).translate(_UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
     plain = re.sub(r"\(([xyzXYZ])\)", r" \1 ", plain)  # "G(x)"
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
     plain = _SPIN.sub(lambda found: f" {found[0].lower()} ", plain)
-    plain = _SIDE_AND_AXLE.sub(lambda found: CORNER_OF_AXLE[found[0]], plain)
+    plain = _SIDE_AND_AXLE.sub(lambda found: _CORNER_OF_AXLE[found[0]], plain)
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
-    return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(UMLAUTS)))
+    return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(_UMLAUTS)))
 
 
 def _with_parts(words: Sequence[str]) -> frozenset[str]:
@@ -253,7 +253,7 @@ def _field(name: str) -> str:
     if not name.startswith("/"):
         return name
     topic, _, field = name.rpartition("/")
-    return topic.rpartition("/")[2] if field.lower() in GENERIC else field
+    return topic.rpartition("/")[2] if field.lower() in _GENERIC else field
 
 
 def _matches(group: str, words: frozenset[str]) -> bool:
@@ -270,11 +270,11 @@ def name_confidence(signal: str, name: str) -> float:
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
-        return STANDARD
+        return _STANDARD
     listed = words_of(name)
     if signal in WHEELS:
         return WORDS if wheel_words(signal, listed) else 0.0
-    while name.startswith("/") and len(listed) > 1 and listed[-1] in GENERIC:
+    while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = RULES[signal], _with_parts(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
@@ -289,16 +289,16 @@ def name_confidence(signal: str, name: str) -> float:
         len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
     ):  # the R of "M_Mtr_D2_R" is a side, or anything
         ends = [end for end in ends if len(end) > 1]
-    loss = FILTERED_LOSS if words & FILTERED else 0.0
+    loss = _FILTERED_LOSS if words & FILTERED else 0.0
     if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
         return WORDS - loss
-    return VAGUE if rule.vague & set(ends) else 0.0
+    return _VAGUE if rule.vague & set(ends) else 0.0
 
 
 def _is_hint(signal: str, one: Heading) -> bool:
     """Return whether a word of a name and its unit let a channel be what no rule knows."""
     words = _with_parts(words_of(_field(one.name)))
-    starts = HINTS.get(signal, ())
+    starts = _HINTS.get(signal, ())
     fits = is_told(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
     return fits and named and not words & RULES[signal].never
@@ -375,7 +375,7 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     some = whole[measured[0]]
     sure = KNOWN if len(measured) == 1 else HINT
     why = "" if len(measured) == 1 else "there are several poses"
-    lost = NO_UNIT_LOSS if measured[0] and not is_told(some["x"].unit) else 0.0
+    lost = _NO_UNIT_LOSS if measured[0] and not is_told(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
     turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
     channels = {"x": [some["x"].name], "y": [some["y"].name], "heading": turned}
@@ -442,7 +442,7 @@ def _along_axes(
     units = {one.name: _with_told_unit(one).unit.strip() for one in headings}
     mended = {
         name: [
-            replace(_said(one, OBLIQUE), confidence=min(one.confidence, HINT))
+            replace(_said(one, _OBLIQUE), confidence=min(one.confidence, HINT))
             if found.oblique & set(one.channel)
             else one
             for one in some
@@ -451,7 +451,7 @@ def _along_axes(
         for name, some in candidates.items()
     }
     for one in found.axes:
-        near = KNOWN if is_told(units[one.name]) else KNOWN - NO_UNIT_LOSS
+        near = KNOWN if is_told(units[one.name]) else KNOWN - _NO_UNIT_LOSS
         guess = Guess(
             channel=(one.name,),
             confidence=near,
@@ -532,7 +532,7 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
         elif _is_hint(signal, one):
             unit, why = one.unit.strip(), "by a word of its name and its unit"
             found.append(Guess(channel=(one.name,), confidence=HINT, unit=unit, why=why))
-    if signal in PER_WHEEL and all(one.hand or one.confidence < WORDS for one in found):
+    if signal in _PER_WHEEL and all(one.hand or one.confidence < WORDS for one in found):
         found += _pairs(signal, listed)
     return found
 
@@ -546,9 +546,9 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     """Return a guess by what the unit says of it."""
     quantity = quantity_of(signal, one.unit)
     if not is_told(one.unit):
-        if guess.confidence == STANDARD:  # names of ours are in SI, as the documents say
+        if guess.confidence == _STANDARD:  # names of ours are in SI, as the documents say
             return guess
-        loss = guess.confidence - NO_UNIT_LOSS
+        loss = guess.confidence - _NO_UNIT_LOSS
         return replace(guess, confidence=loss, why="no unit in the file")
     told, unit = quantities(one.unit), one.unit.strip()
     if quantity in told:
@@ -585,7 +585,7 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     for (corner, rest), left in by_corner.items():
         for first, second in SIDES[signal]:
             right = by_corner.get((second, rest))
-            named = any(_matches(group, rest) for group in PER_WHEEL[signal])
+            named = any(_matches(group, rest) for group in _PER_WHEEL[signal])
             if corner == first and right is not None and named:
                 guess = Guess(channel=(left.name, right.name), confidence=WORDS)
                 why = "sum of two wheels" if QUANTITIES[signal] == FORCE else "mean of two wheels"
@@ -605,22 +605,22 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
             return replace(guess, confidence=0.0)
         values = seen[name].values
         finite = values[np.isfinite(values)]
-        finite = finite[:: max(1, finite.size // LOOKED_AT)]
+        finite = finite[:: max(1, finite.size // _LOOKED_AT)]
         if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
-            unlikely = STILL * guess.confidence if guess.confidence < STANDARD else STANDARD
+            unlikely = STILL * guess.confidence if guess.confidence < _STANDARD else _STANDARD
             return replace(_said(guess, "it never changes"), confidence=unlikely)
         size = max(size, float(np.abs(finite).max()))
         usual = max(usual, _usual(finite))
-    if guess.confidence == STANDARD or signal in WHEELS:
+    if guess.confidence == _STANDARD or signal in WHEELS:
         return guess
     if not guess.unit:
         return _by_range(signal, guess, size, usual)
-    if QUANTITIES[signal] == RATE and guess.confidence <= VAGUE:
+    if QUANTITIES[signal] == RATE and guess.confidence <= _VAGUE:
         return _slow_enough(guess, usual * to_si(guess.unit, RATE, signal))
     if QUANTITIES[signal] != ANGLE:
         return guess
     largest = size * to_si(guess.unit, ANGLE, signal)
-    if signal != BETA and largest > LARGEST_ROAD and not guess.hand:
+    if signal != BETA and largest > _LARGEST_ROAD and not guess.hand:
         why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
         return replace(_said(guess, why), hand=True)
     return guess
@@ -639,14 +639,14 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     A name that may mean hand or road wheels, as "steer", means these where it stays as near.
     """
     quantity = QUANTITIES[signal]
-    vague = max(name_confidence(HAND, name) for name in guess.channel) <= VAGUE
+    vague = max(name_confidence(HAND, name) for name in guess.channel) <= _VAGUE
     if guess.hand and vague and not unit_of_range(quantity, usual):
         return _said(replace(guess, hand=False), f"goes to {size:.3g}, as road wheels do in rad")
     if quantity == ACCELERATION:
         return guess  # `_beside_turning` sets it beside v_x and r
     unit = unit_of_range(HAND_WHEEL if guess.hand else quantity, usual)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
-        hand = usual * to_si(unit, quantity, signal) > LARGEST_ROAD
+        hand = usual * to_si(unit, quantity, signal) > _LARGEST_ROAD
         guess = replace(guess, hand=hand)
     if not unit:
         return _said(guess, f"goes to {size:.3g}") if quantity in (ANGLE, SPEED) else guess
@@ -690,7 +690,7 @@ def _channel_of(there: Mapping[str, Guess], name: str) -> tuple[str, ...]:
 
 def _is_told(guess: Guess) -> bool:
     """Return whether the unit of a guess is known; names of ours are in SI."""
-    return bool(guess.unit) or guess.confidence == STANDARD
+    return bool(guess.unit) or guess.confidence == _STANDARD
 
 
 def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
@@ -717,7 +717,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
 def _usual(values: Array) -> float:
     """Return how far the finite ones go from zero, but for spikes."""
     finite = values[np.isfinite(values)]
-    return float(np.quantile(np.abs(finite), 1.0 - SPIKES)) if finite.size else 0.0
+    return float(np.quantile(np.abs(finite), 1.0 - _SPIKES)) if finite.size else 0.0
 
 
 def _root_mean_square(values: Array) -> float:

@@ -15,7 +15,7 @@ from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import require_dense, require_few
 
-LONGEST_TEXTS = 1_000_000  # bytes of names of columns
+_LONGEST_TEXTS = 1_000_000  # bytes of names of columns
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
@@ -27,15 +27,15 @@ def read_tree(path: Path) -> dict[str, Tree]:
         require_few(RecordingError, str(path), len(members), "columns", "arrays")
         for one in members:
             require_dense(
-                RecordingError, str(path), one.file_size, one.compress_size, shown_name(one)
+                RecordingError, str(path), one.file_size, one.compress_size, _shown_name(one)
             )
         found: dict[str, Tree] = {}
         for one in members:
-            found |= _top(path, one.filename, shown_name(one))
+            found |= _top(path, one.filename, _shown_name(one))
     return found
 
 
-def shown_name(member: zipfile.ZipInfo) -> str:
+def _shown_name(member: zipfile.ZipInfo) -> str:
     """Return what an array of an archive is called."""
     return member.filename.removesuffix(".npy")
 
@@ -56,7 +56,7 @@ def _tree(path: Path, member: str) -> Tree:
     require_room(path, size, dtype.itemsize)
     if dtype.names:
         return {name: _leaf(path, member, shape, dtype[name], name) for name in dtype.names}
-    if dtype.kind in "US" and size * dtype.itemsize <= LONGEST_TEXTS:
+    if dtype.kind in "US" and size * dtype.itemsize <= _LONGEST_TEXTS:
         words = [str(one) for one in np.atleast_1d(_load(path, member)).ravel().tolist()]
         return list(words) if shape else words[0]
     return _leaf(path, member, shape, dtype, "")

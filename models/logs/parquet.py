@@ -37,12 +37,12 @@ def open_parquet(path: Path) -> TableLog:
             unpacked, packed = one.total_uncompressed_size, one.total_compressed_size
             what = f"the cells of {shown(one.path_in_schema)}"
             require_dense(RecordingError, str(path), unpacked, packed, what)
-        table = ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
+        table = _ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
         return TableLog(table=table)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParquetTable:
+class _ParquetTable:
     """A table in a Parquet file.
 
     Parameters

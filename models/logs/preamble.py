@@ -25,14 +25,14 @@ from models.logs.stamps import nanoseconds
 from models.logs.units import PER_SECOND, quantities, time_unit
 from models.schema import require_few
 
-HEAD, LINES = 1 << 18, 1500  # bytes and lines that are looked at
+HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
 ROWS = 400  # of data that tell what columns are
 TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
-PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
-ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
+_PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
+_ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
 MANY = 300  # cells of a line that tell how all are written
 CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
@@ -59,8 +59,8 @@ RATES = (1.0, 1e5)  # [Hz]
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
-LONGEST_INSTANT = 60  # characters
-LONGEST_CELL = csv.field_size_limit()  # characters
+_LONGEST_INSTANT = 60  # characters
+_LONGEST_CELL = csv.field_size_limit()  # characters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +136,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     if not any(line.strip() for line in lines):
         raise RecordingError(f"{path}: is empty")
     begun = next(k for k, line in enumerate(lines) if line.strip())
-    lines = lines[: begun + LINES]
+    lines = lines[: begun + _LINES]
     if lines[begun].startswith(_PI_TOOLBOX):
         _require_one_block(path, lines)
     section = _sections(lines)
@@ -217,7 +217,7 @@ def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
     """
     if delimiter == BLANKS:
         line = " ".join(line.split())
-    if line and len(line) <= LONGEST_CELL and not _QUOTED.search(line):
+    if line and len(line) <= _LONGEST_CELL and not _QUOTED.search(line):
         return tuple(cell.strip() for cell in line.split(delimiter))
     try:
         return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), []))
@@ -239,7 +239,7 @@ def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
 
 
 def _is_instant(cell: str) -> bool:
-    maybe = len(cell) < LONGEST_INSTANT and _MAYBE_INSTANT.fullmatch(cell) is not None
+    maybe = len(cell) < _LONGEST_INSTANT and _MAYBE_INSTANT.fullmatch(cell) is not None
     return maybe and nanoseconds(cell) is not None
 
 
@@ -278,7 +278,7 @@ def _numbers_in(line: _Line, way: _Way) -> int:
 
 def _is_data(line: _Line, way: _Way) -> bool:
     """Return whether a line is of numbers, at least half of its cells that are filled."""
-    if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(ONES):
+    if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
     filled = [cell for cell in cells[:MANY] if cell]
@@ -367,7 +367,7 @@ def _told_rate(preamble: Sequence[str]) -> float:
 
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
-    above = [k for k, line in enumerate(lines) if line.text.strip(PADDING)]
+    above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
     full = sorted(_numbers_in(lines[k], way) for k in above[-TAIL:])[len(above[-TAIL:]) // 2]
     first = None
     zone: list[int] = []

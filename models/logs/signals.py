@@ -69,7 +69,7 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
     }
 )
 SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
-LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
+_LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
 def told_by(signals: Iterable[str]) -> set[str]:
@@ -139,10 +139,10 @@ class Signal:
             raise RecordingError(f"factor must be finite and not zero, it is {self.factor}")
         if not math.isfinite(self.offset):
             raise RecordingError(f"offset must be finite, it is {self.offset}")
-        if not 1.0 / LARGEST_RATIO <= self.ratio <= LARGEST_RATIO:
+        if not 1.0 / _LARGEST_RATIO <= self.ratio <= _LARGEST_RATIO:
             raise RecordingError(
-                f"ratio must be hand wheel over road wheel, within {1.0 / LARGEST_RATIO:g} and "
-                f"{LARGEST_RATIO:g}, it is {self.ratio}"
+                f"ratio must be hand wheel over road wheel, within {1.0 / _LARGEST_RATIO:g} and "
+                f"{_LARGEST_RATIO:g}, it is {self.ratio}"
             )
         if self.table and self.ratio != 1.0:
             raise RecordingError("ratio and table say the same: give one of them")

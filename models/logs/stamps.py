@@ -27,14 +27,14 @@ MISSING = -(2**63)  # an instant that is not there, in ns
 DAY = 86400.0
 NAMES: tuple[str, ...] = tuple(TABLES["clock"]["names"].split())
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
-EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
+_EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 CALENDAR = 1e8  # [s]: times above count from 1970
-MICROSECONDS = 1e6
+_MICROSECONDS = 1e6
 FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
-COARSEST = 1.0  # between stamps without a unit: more than that are no seconds
+_COARSEST = 1.0  # between stamps without a unit: more than that are no seconds
 TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
 WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
-MOST_STEPS = 100_000  # samples that a rate is taken from
+_MOST_STEPS = 100_000  # samples that a rate is taken from
 SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
 JITTER, WINDOW = 1.2, 50  # steps that stamps of an even clock may lie apart, samples of a mean
 PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
@@ -42,11 +42,11 @@ BACK, FEWEST = 1.0, 10  # [s], samples: what goes back so far and lasts so long 
 
 REPEATED = 0.2  # share of stamps of a column that repeat, of which another may be finer
 WAYS = TABLES["clock"]["ways"].split()
-COUNTERS = tuple(TABLES["clock"]["counters"].split())
+_COUNTERS = tuple(TABLES["clock"]["counters"].split())
 
-MENDING = '--mend-clock (in Python LogMap(order="mend"))'
+_MENDING = '--mend-clock (in Python LogMap(order="mend"))'
 
-OTHER_RATE, NEAR = 0.2, 60.0  # share of a step, [s]: of a clock that another column has for itself
+_OTHER_RATE, NEAR = 0.2, 60.0  # share of a step, [s]: of a clock that another column has for itself
 
 _DATE = re.compile(
     r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d))(?:[T, ]+(.+))?"
@@ -175,7 +175,7 @@ def _counts(name: str, cells: Sequence[str]) -> bool:
     steps = np.diff(np.array(values, dtype=np.float64))
     one = float(steps[0])
     word = re.sub("[^a-z]", "", name.lower())
-    called = word.endswith(COUNTERS) or not word
+    called = word.endswith(_COUNTERS) or not word
     return one > 0.0 and one.is_integer() and bool((steps == one).all()) and (one == 1.0 or called)
 
 
@@ -227,7 +227,7 @@ def _is_beside(
     if _plain(clock.name) == _plain(first.name):
         return not np.array_equal(times[0], times[1])
     steps = [float(np.median(np.diff(t))) for t in times]
-    return abs(steps[0] / steps[1] - 1.0) > OTHER_RATE
+    return abs(steps[0] / steps[1] - 1.0) > _OTHER_RATE
 
 
 def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
@@ -309,12 +309,12 @@ def _unit(t: Array, told: str) -> tuple[str, bool]:
     """Return the unit of times and whether they count from 1970, by what is told or by steps."""
     finite = t[np.isfinite(t)]
     largest = float(np.abs(finite).max()) if finite.size else 0.0
-    for unit, (low, high) in EPOCHS.items():
+    for unit, (low, high) in _EPOCHS.items():
         if low < largest < high and told in ("", unit) and _step(finite, unit) <= 10.0:
             return unit, True
     if told:
         return told, False
-    if not _step(finite, "s") < COARSEST:
+    if not _step(finite, "s") < _COARSEST:
         for unit in ("ms", "us", "ns"):
             if FASTEST <= _step(finite, unit) <= SLOWEST:
                 return unit, False
@@ -463,7 +463,7 @@ def seconds(
         t = _past_midnight(t)
         fall = _first_step(t, lambda step: step < 0.0)
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
-    even = None if fall is not None else even_clock(t)
+    even = None if fall is not None else _even_clock(t)
     if even is not None:
         return Stamps(even.t, (f"{clock.name} {even.words}",))
     if fall is None and repeat is None:
@@ -556,7 +556,7 @@ def typical_rate(t: Array) -> float:
     ----------
     t : times [s], (n,).
     """
-    steps = np.diff(t[:MOST_STEPS])
+    steps = np.diff(t[:_MOST_STEPS])
     step = float(np.median(steps)) if steps.size else 0.0
     return 1.0 / step if step > 0.0 else math.nan
 
@@ -569,7 +569,7 @@ def since(t: Array, first: float) -> Array:
     t : times since 1970 [s], (n,).
     first : instant since 1970 [s].
     """
-    return filled(t.size, lambda part: np.round((t[part] - first) * MICROSECONDS) / MICROSECONDS)
+    return filled(t.size, lambda part: np.round((t[part] - first) * _MICROSECONDS) / _MICROSECONDS)
 
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
@@ -636,7 +636,7 @@ def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
 # Rounded stamps of an even clock.
 
 
-class Even(NamedTuple):
+class _Even(NamedTuple):
     """An even clock: time [s], (n,), and what was mended, after the name of the column."""
 
     t: Array
@@ -644,7 +644,7 @@ class Even(NamedTuple):
 
 
 @np.errstate(all="ignore")
-def even_clock(t: Array) -> Even | None:
+def _even_clock(t: Array) -> _Even | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
 
     Parameters
@@ -672,7 +672,7 @@ def even_clock(t: Array) -> Even | None:
     return _fitted(t, tick)
 
 
-def _unjittered(t: Array) -> Even | None:
+def _unjittered(t: Array) -> _Even | None:
     """Return the even clock of stamps that jitter so far that some are there twice; or None.
 
     They must wander about it by less than a step, and not drift by half of one: then none is lost.
@@ -688,7 +688,7 @@ def _unjittered(t: Array) -> Even | None:
         return None
     begin = float(off.max() + off.min()) / 2.0
     even = np.round(begin + dt * np.arange(t.size), 9)
-    return Even(even, f"jitters, some stamps are there twice: taken as even at {1.0 / dt:.6g} Hz")
+    return _Even(even, f"jitters, some stamps are there twice: taken as even at {1.0 / dt:.6g} Hz")
 
 
 def _tick(t: Array) -> float | None:
@@ -702,7 +702,7 @@ def _tick(t: Array) -> float | None:
     return None
 
 
-def _fitted(t: Array, tick: float) -> Even | None:
+def _fitted(t: Array, tick: float) -> _Even | None:
     """Return the even clock of which every stamp is less than a tick away, lost samples aside."""
     steps = np.diff(t)
     usual = float(np.median(steps[steps > 0.0]))
@@ -724,7 +724,7 @@ def _fitted(t: Array, tick: float) -> Even | None:
         even[first:end] = start + dt * (lost + k)
     if not (np.diff(even) > 0.0).all():
         return None
-    return Even(
+    return _Even(
         np.round(even, 9),
         f"is rounded to {tick:g} s, its samples were put on the even clock of {dt:.9g} s that "
         "explains every stamp",
@@ -772,9 +772,9 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
         if _starts_again(t[0], t[k], t[k + 1]):
             return said + (
                 "the clock starts again: several runs in one file need a column run, or "
-                f"{MENDING}, which learns on them as one drive"
+                f"{_MENDING}, which learns on them as one drive"
             )
-        return said + f"samples are out of order: {MENDING} sorts them by time"
+        return said + f"samples are out of order: {_MENDING} sorts them by time"
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])
     moves = int(np.count_nonzero(steps > 0.0))
     if k == 0 and not moves:
@@ -784,4 +784,4 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "
             "explains them: export time with more digits"
         )
-    return said + f"a sample is there twice: {MENDING} leaves one of them out"
+    return said + f"a sample is there twice: {_MENDING} leaves one of them out"

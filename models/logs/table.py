@@ -39,7 +39,7 @@ from models.schema import LONGEST_NAME, limits, require_few
 
 RUN = "run"
 LONG = 8  # columns at most of a table with a row for each value
-MOST_WORDS = 10_000  # names of runs in one log
+_MOST_WORDS = 10_000  # names of runs in one log
 
 
 class Kind(Enum):
@@ -185,10 +185,10 @@ class Gathered:
                     f"characters, {self._place} {row} has {shown(word.strip())}"
                 )
         new = [codes.setdefault(word.strip(), len(codes)) for word in words.names]
-        if len(codes) > MOST_WORDS:
+        if len(codes) > _MOST_WORDS:
             raise RecordingError(
                 f"{self._path}: {self._names[column]} must name runs, it has more than "
-                f"{MOST_WORDS} different words"
+                f"{_MOST_WORDS} different words"
             )
         coded: NDArray[np.int32] = np.array(new, dtype=np.int32)[words.codes]
         return coded

@@ -28,8 +28,8 @@ from models.logs.table import Cells, Gathered, Kind, TableLog, Words
 from models.schema import pieces, require_few
 
 BLOCK, SMALL_BLOCK = 1 << 22, 1 << 19  # bytes of text that are read at once: pyarrow, Python
-QUOTES = 8  # that may stand before the end of a block and not close
-LARGEST_LINE = 1 << 23  # bytes: 10 000 columns of 800
+_QUOTES = 8  # that may stand before the end of a block and not close
+_LARGEST_LINE = 1 << 23  # bytes: 10 000 columns of 800
 _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
@@ -154,9 +154,9 @@ def _blocks(path: Path, layout: Layout, size: int) -> Iterator[tuple[int, bytes]
                 yield line, _plain(path, layout, line, rest[:cut])
                 line += rest.count(b"\n", 0, cut)
                 rest, reach = rest[cut:], size
-            elif reach >= LARGEST_LINE:
+            elif reach >= _LARGEST_LINE:
                 raise RecordingError(
-                    f"{path}: line {line} is longer than {LARGEST_LINE} bytes, or opens a quote "
+                    f"{path}: line {line} is longer than {_LARGEST_LINE} bytes, or opens a quote "
                     "that is never closed"
                 )
             else:
@@ -183,7 +183,7 @@ def _in_utf8(path: Path, encoding: str) -> Iterator[bytes]:
 def _whole_lines(text: bytes) -> int:
     """Return where the last whole line ends that does not end within quotes; 0 if none is near."""
     cut = text.rfind(b"\n") + 1
-    for _ in range(QUOTES):
+    for _ in range(_QUOTES):
         if not (cut and text.count(b'"', 0, cut) % 2):
             return cut
         cut = text.rfind(b"\n", 0, text.rfind(b'"', 0, cut)) + 1

@@ -19,7 +19,7 @@ from models.logs.stamps import NAMES
 
 # Of a variable: a name that a clock has, and the unit that may follow it.
 CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
-OTHER_CLOCKS = ("tout", "timestep")
+_OTHER_CLOCKS = ("tout", "timestep")
 HEAD = 200  # times by which a clock is known
 DATA = ("data", "values", "value", "samples", "raw")
 NAME = ("name", "label", "signalname", "blockname")
@@ -27,8 +27,8 @@ UNIT = ("unit", "units")
 COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
 RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq")
 STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
-LEAST_RATE, MOST_RATE = 1.0, 1e5  # [Hz]
-MOST_COLUMNS = 1000  # of a matrix that is a table of signals
+_LEAST_RATE, _MOST_RATE = 1.0, 1e5  # [Hz]
+_MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +134,7 @@ def _line(values: Array, place: int, leaf: Leaf) -> Array:
     return values[:, place] if leaf.shape[0] >= leaf.shape[1] else values[place]
 
 
-Clockless = tuple[str, str, Leaf, tuple[list[str], list[str]] | None]
+_Clockless = tuple[str, str, Leaf, tuple[list[str], list[str]] | None]
 
 
 class _Walk:
@@ -142,7 +142,7 @@ class _Walk:
 
     def __init__(self) -> None:
         self.signals: list[Signal] = []
-        self.clockless: dict[str, Clockless] = {}
+        self.clockless: dict[str, _Clockless] = {}
         self.unread: list[str] = []
         self.rate = 0.0
 
@@ -201,7 +201,7 @@ class _Walk:
             if samples not in leaf.shape:
                 continue
             along = 0 if rows == samples else 1
-            if leaf.shape[1 - along] > MOST_COLUMNS:
+            if leaf.shape[1 - along] > _MOST_COLUMNS:
                 break
             for signal in _lines(leaf, name, unit, along, clock, columns):
                 self.signals.append(signal)
@@ -220,7 +220,7 @@ class _Walk:
         if word in RATES + STEPS and leaf.shape == (1, 1):
             value = float(leaf.load()[0, 0])
             rate = value if word in RATES or not value else 1.0 / value
-            self.rate = rate if LEAST_RATE <= rate <= MOST_RATE else self.rate
+            self.rate = rate if _LEAST_RATE <= rate <= _MOST_RATE else self.rate
 
 
 def _lines(
@@ -287,12 +287,12 @@ def _unit_of_clock(name: str) -> str | None:
     if found is None:
         return None
     word = re.sub("[^a-z]", "", found[1])
-    return (found[2] or "") if word in NAMES or word in OTHER_CLOCKS else None
+    return (found[2] or "") if word in NAMES or word in _OTHER_CLOCKS else None
 
 
 def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     """Return the first column of a matrix, or row of a wide one, where it rises as a clock does."""
-    if min(leaf.shape) < 2 or min(leaf.shape) > MOST_COLUMNS or max(leaf.shape) < 3:
+    if min(leaf.shape) < 2 or min(leaf.shape) > _MOST_COLUMNS or max(leaf.shape) < 3:
         return None
     clock = Clock(name, leaf, 0, "")
     steps = np.diff(times_of(clock))

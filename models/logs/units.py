@@ -32,7 +32,7 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
     for quantity, rows in TABLES["factors"].items()
 }
 OTHERS = {name: tuple(some.split()) for name, some in TABLES["others"].items()}
-NO_UNIT = ("", *OTHERS.pop("none"))
+_NO_UNIT = ("", *OTHERS.pop("none"))
 PER_SECOND = {  # exact
     unit: 1.0 / factor if factor > 1.0 else float(round(1.0 / factor))
     for unit, factor in FACTORS[TIME].items()
@@ -50,7 +50,9 @@ FARTHEST = {
     HAND_WHEEL: (3.0 * math.pi, "deg"),
     RATE: (2.0 * math.pi, "deg/s"),
 }
-SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire, so it is in g
+_SMALLEST_ACCELERATION = (
+    2.5  # [m/s²]: a drive that does not reach it teaches no tire, so it is in g
+)
 
 
 def _plain(unit: str) -> str:
@@ -81,7 +83,7 @@ def quantities(unit: str) -> tuple[str, ...]:
 def is_known(unit: str) -> bool:
     """Return whether a spelling is a unit of anything that cars log, or stands for none."""
     plain = _plain(unit)
-    return plain in NO_UNIT or any(
+    return plain in _NO_UNIT or any(
         plain in known for known in (*FACTORS.values(), *OTHERS.values())
     )
 
@@ -103,7 +105,7 @@ def are_same(one: str, other: str) -> bool:
 
 def is_told(unit: str) -> bool:
     """Whether a unit is written at all; "-" and the like tell none."""
-    return _plain(unit) not in NO_UNIT
+    return _plain(unit) not in _NO_UNIT
 
 
 def unit_of_range(quantity: str, largest: float) -> str:
@@ -115,7 +117,7 @@ def unit_of_range(quantity: str, largest: float) -> str:
     largest : how far the numbers go from zero.
     """
     if quantity == ACCELERATION:
-        return "g" if largest < SMALLEST_ACCELERATION else ""
+        return "g" if largest < _SMALLEST_ACCELERATION else ""
     limit, unit = FARTHEST.get(quantity, (math.inf, ""))
     return unit if largest > limit else ""
 
@@ -129,7 +131,7 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     quantity : of the signal, one of `SI`.
     """
     plain = _plain(unit)
-    if plain in NO_UNIT:
+    if plain in _NO_UNIT:
         return 1.0
     if plain in FACTORS[quantity]:
         return FACTORS[quantity][plain]

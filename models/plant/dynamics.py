@@ -26,9 +26,9 @@ from models.vehicle import Vehicle, load_ratio
 # The tires of the two sides mirror each other: what a tire does at zero slip (conicity, ply steer)
 # pulls both inwards or both outwards and cancels straight ahead.
 
-LEAST_SPEED = 1.0  # below this wheel speed slip decays as if at it [m/s]
-LEAST_LOAD = 1.0  # a tire is asked at this load or more, and its force scaled down below it [N]
-LARGEST_KAPPA = 0.1  # about where a passenger tire has its largest longitudinal force [-]
+_LEAST_SPEED = 1.0  # below this wheel speed slip decays as if at it [m/s]
+_LEAST_LOAD = 1.0  # a tire is asked at this load or more, and its force scaled down below it [N]
+_LARGEST_KAPPA = 0.1  # about where a passenger tire has its largest longitudinal force [-]
 
 
 class Wheel(NamedTuple):
@@ -90,7 +90,7 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     v_x, v_y = velocity
     along = v_x * ca.cos(delta) + v_y * ca.sin(delta)
     aside = v_y * ca.cos(delta) - v_x * ca.sin(delta)
-    return (-aside - ca.fmax(ca.fabs(along), LEAST_SPEED) * slip) / length
+    return (-aside - ca.fmax(ca.fabs(along), _LEAST_SPEED) * slip) / length
 
 
 def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
@@ -104,11 +104,11 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
     load : vertical load [N].
     mu : friction over the tire's own [-].
     """
-    floored = ca.fmax(load, LEAST_LOAD)
+    floored = ca.fmax(load, _LEAST_LOAD)
     # A tire may push at zero slip (its shifts); a free wheel then slips to where it does not.
     at_rest = tire.forces(0.0, 0.0, 0.0, floored, mu)[0]
     kappa = (drive - at_rest) / tire.slip_stiffness(floored)
-    kappa = ca.fmin(ca.fmax(kappa, -LARGEST_KAPPA), LARGEST_KAPPA)
+    kappa = ca.fmin(ca.fmax(kappa, -_LARGEST_KAPPA), _LARGEST_KAPPA)
     F_x, F_y = tire.forces(ca.atan(slip), kappa, camber, floored, mu)
     return ca.vertcat(F_x, F_y) * (load / floored)
 
@@ -213,12 +213,12 @@ class Driver:
 
 
 N_STATES = 18
-LOAD_LAG = 0.01  # unsprung mass on the tire spring, about 15 Hz [s]
+_LOAD_LAG = 0.01  # unsprung mass on the tire spring, about 15 Hz [s]
 
 OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "acceleration": 2}
 
 
-def rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
+def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
     """Return the components of a wheel-frame vector in the body frame.
 
     Parameters
@@ -267,7 +267,7 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
         of_tire = tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
         F_x.append(of_tire[0])
         F_y.append(of_tire[1])
-        forward, sideward = rotate(of_tire[0], of_tire[1], angle)
+        forward, sideward = _rotate(of_tire[0], of_tire[1], angle)
         force += forward
         axle_force[axle] += sideward
         moment -= wheel.y * forward
@@ -278,7 +278,7 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     # center itself, and the weight of the leaning body.
     restoring = c.roll_stiffness * roll + c.roll_damping * roll_rate
     roll_acceleration = (m * h * a_y + vehicle.weight * h * roll - restoring) / c.roll_inertia
-    X_dot, Y_dot = rotate(v_x, v_y, psi)
+    X_dot, Y_dot = _rotate(v_x, v_y, psi)
     x_dot = ca.vertcat(
         a_x + v_y * r,
         a_y + slope + wind - v_x * r,
@@ -290,8 +290,8 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
         r,
         *slip_dot,
         (command - delta) / c.steering_lag,
-        (ca.vertcat(*axle_force) - F_lagged) / LOAD_LAG,
-        (a_x - a_x_lagged) / LOAD_LAG,
+        (ca.vertcat(*axle_force) - F_lagged) / _LOAD_LAG,
+        (a_x - a_x_lagged) / _LOAD_LAG,
         integral_dot,
     )
     outputs = [ca.vertcat(*v) for v in (F_x, F_y)] + [F_z]

@@ -131,7 +131,7 @@ class PlantRun:
         return sensors.apply(exact, rng)
 
 
-OverTime = float | Callable[[Array], Array]  # a number, or a function of the times (n,) [s]
+_OverTime = float | Callable[[Array], Array]  # a number, or a function of the times (n,) [s]
 
 
 class PlantError(TireidError, ArithmeticError):
@@ -143,7 +143,7 @@ class PlantError(TireidError, ArithmeticError):
 FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
 
 
-class CompiledLoop(NamedTuple):
+class _CompiledLoop(NamedTuple):
     """A plant over time: the library of all cars that are built alike, and the numbers of this one.
 
     scan : of one step of the integration.
@@ -155,9 +155,9 @@ class CompiledLoop(NamedTuple):
 
 
 @cache
-def compiled_loop(
+def _compiled_loop(
     vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt: float
-) -> CompiledLoop:
+) -> _CompiledLoop:
     """Return the compiled loop of a plant over time, built once.
 
     Parameters
@@ -167,12 +167,12 @@ def compiled_loop(
     car, constants = lifted(dynamics(vehicle, tires, driver))
     step = runge_kutta(car, dt)
     over = ("command", "v_ref", "mu", "aside")
-    return CompiledLoop(Scan(step, carry=("x",), over=over, flags=FLAGS), constants)
+    return _CompiledLoop(Scan(step, carry=("x",), over=over, flags=FLAGS), constants)
 
 
 LEAST, MOST = 0.5, 500.0  # stiffness over load [1/rad or -]: about 20 of real tires
 LEAST_GRIP, MOST_GRIP = 0.05, 10.0  # largest side force over load: about 1
-GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
+_GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 
 def tire_of(vehicle: Vehicle) -> MagicFormula:
@@ -196,7 +196,7 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
     tire = MagicFormula.from_tir(path)
     for axle, load in zip(("front", "rear"), vehicle.axle_loads, strict=True):
         F_z = ca.DM(0.5 * load)
-        grip = ca.mmax(tire.forces(ca.DM(GRIP_SLIPS), 0.0, 0.0, F_z).F_y)
+        grip = ca.mmax(tire.forces(ca.DM(_GRIP_SLIPS), 0.0, 0.0, F_z).F_y)
         for what, force, least, most in (
             ("cornering stiffness", tire.cornering_stiffness(F_z), LEAST, MOST),
             ("slip stiffness", tire.slip_stiffness(F_z), LEAST, MOST),
@@ -246,10 +246,10 @@ class Plant:
         self,
         maneuver: Maneuver,
         *,
-        speed: OverTime,
+        speed: _OverTime,
         friction: Friction | None = None,
-        bank: OverTime = 0.0,
-        wind: OverTime = 0.0,
+        bank: _OverTime = 0.0,
+        wind: _OverTime = 0.0,
         dt: float = 1e-3,
         sample_time: float = 0.01,
         name: str | None = None,
@@ -308,17 +308,17 @@ class Plant:
         t = t[::every]
         return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
 
-    def loop(self, dt: float) -> CompiledLoop:
+    def loop(self, dt: float) -> _CompiledLoop:
         """Return the compiled loop over time.
 
         Parameters
         ----------
         dt : step of the integration [s].
         """
-        return compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
+        return _compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
 
 
-def _over_time(given: OverTime, t: Array) -> Array:
+def _over_time(given: _OverTime, t: Array) -> Array:
     return given(t) if callable(given) else np.full(t.size, float(given))
 
 

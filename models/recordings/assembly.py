@@ -51,7 +51,7 @@ from models.schema import require_few
 
 FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
 SHORTEST = 1.0  # [s]: a stretch of less teaches nothing, since learning waits half a second
-FIELDS = {
+_FIELDS = {
     "Fyf": "axle_force",
     "Fyr": "axle_force",
     BETA: "delta_f",
@@ -213,7 +213,7 @@ def _require_finite(label: str, name: str, channel: Channel) -> None:
 
 
 def _require_of_a_car(label: str, name: str, values: Array, channel: Channel) -> None:
-    most = LARGEST[FIELDS.get(name, name)]
+    most = LARGEST[_FIELDS.get(name, name)]
     bad = np.flatnonzero(np.abs(values) > most)
     if bad.size:
         raise RecordingError(
@@ -326,7 +326,7 @@ def _gap_notes(stretches: list[Stretch]) -> tuple[str, ...]:
     )
 
 
-LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
+_LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
 
 
 def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recording:
@@ -432,9 +432,9 @@ def _on_wheels(
 
 def _low_pass(name: str, signal: Array, cut_off: float, dt: float) -> Array:
     """Return a signal behind a Butterworth filter of second order that begins at its value."""
-    if not LEAST_LOW_PASS <= cut_off < 0.5 / dt:
+    if not _LEAST_LOW_PASS <= cut_off < 0.5 / dt:
         raise RecordingError(
-            f"{name}: low_pass of the map must be at least {LEAST_LOW_PASS:g} Hz and below half "
+            f"{name}: low_pass of the map must be at least {_LEAST_LOW_PASS:g} Hz and below half "
             f"the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
         )
     from scipy.signal import butter, lfilter, lfilter_zi  # takes longer than to read a short log

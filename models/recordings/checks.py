@@ -33,14 +33,14 @@ from models.recordings.evidence import (
 )
 from models.recordings.record import Recording, peak
 
-LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
+_LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
 LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
-LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
-SURE_PAIR, NO_PAIR = 0.9, 0.3  # correlations of two channels that are of one bend, or of none
-COPY = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
-LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
-SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
-LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
+_LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
+_SURE_PAIR, _NO_PAIR = 0.9, 0.3  # correlations of two channels that are of one bend, or of none
+_COPY = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
+_LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
+_SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
+_LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
 DOCTOR = "tireid doctor LOG --vehicle FILE says what else may be wrong, and repairs it"
 LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 
@@ -86,10 +86,10 @@ def _check_peaks(recording: Recording) -> str | None:
     """Answer with steering beyond 1.2 rad, speeds beyond 110 m/s, and cars that drive backwards."""
     for column in ("delta_f", "delta_r"):
         largest = peak(getattr(recording, column))
-        if largest > LARGEST_STEERING:
+        if largest > _LARGEST_STEERING:
             return (
                 f"{column} must be the road-wheel angle in rad, below "
-                f"{LARGEST_STEERING}, its peak is {largest:.4g}; degrees or a hand-wheel angle? "
+                f"{_LARGEST_STEERING}, its peak is {largest:.4g}; degrees or a hand-wheel angle? "
                 "convert it (degrees: multiply by pi/180)"
             )
     fastest = peak(recording.v_x)
@@ -170,7 +170,7 @@ def _check_turns(w: Means) -> str | None:
     factor = float(felt @ w.r) / max(float(w.r @ w.r), 1e-300)
     rest = felt - w.r * factor
     alike = 0.5 < factor / float(np.mean(w.v_x)) < 2.0
-    if float(rest @ rest) < COPY**2 * float(felt @ felt) and not alike:
+    if float(rest @ rest) < _COPY**2 * float(felt @ felt) and not alike:
         return (
             "ay must be an acceleration, it is r times a number: a copy of the yaw rate? "
             "leave it out"
@@ -195,9 +195,9 @@ def _check_turns(w: Means) -> str | None:
     if r_delta.sign < 0 and a_delta.sign >= 0 and r_a.sign > 0:
         return _check_two(r_delta)  # a_y says nothing of the steering
     if (
-        abs(a_delta.correlation) > SURE_PAIR
+        abs(a_delta.correlation) > _SURE_PAIR
         and a_delta.sign
-        and max(abs(r_a.correlation), abs(r_delta.correlation)) < NO_PAIR
+        and max(abs(r_a.correlation), abs(r_delta.correlation)) < _NO_PAIR
     ):
         return (
             "r must be the yaw rate, it goes neither with ay nor with the steering (correlations "
@@ -234,7 +234,7 @@ def _check_lateral_acceleration(w: Means) -> str | None:
         return None
     moved, felt = w.v_x_r[some], w.a_y[some]
     mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(moved))
-    alike = correlation(felt - np.mean(felt), moved - np.mean(moved)) > SURE_PAIR
+    alike = correlation(felt - np.mean(felt), moved - np.mean(moved)) > _SURE_PAIR
     if spread >= max(0.3, 0.5 * mean) or (alike and float(np.std(felt)) >= 0.3):
         X = np.column_stack([X, np.ones(w.r.size)])
     elif mean < 1.5:
@@ -243,7 +243,7 @@ def _check_lateral_acceleration(w: Means) -> str | None:
     slope, error = fit.theta[0], 4.0 * fit.error[0]
     dot, dot_error = _of_v_y(fit, w)
     law = f"must be v̇_y + v_x r (ISO axes), its slope on v_x r is {slope:.3g} instead of 1"
-    if slope + error < SLOPE[0] or (slope - error > SLOPE[1] and fit.r_squared > 0.5):
+    if slope + error < _SLOPE[0] or (slope - error > _SLOPE[1] and fit.r_squared > 0.5):
         return _blame(slope, law)
     if _turned(dot, dot_error, w) and slope - error > 0.0:
         return (
@@ -270,7 +270,7 @@ def _turned(dot: float, dot_error: float, w: Means) -> bool:
 
 
 # What a slope of a_y on v_x r says where it is the factor of a unit.
-BLAMED = {
+_BLAMED = {
     1 / 57.3: "r must be in rad/s: ay {}; degrees per second? multiply r by pi/180",
     1 / 9.81: "ay {}; ay in g? multiply it by 9.81",
     1 / 3.6: "vx must be in m/s: ay {}; km/h? divide vx by 3.6",
@@ -284,10 +284,10 @@ BLAMED = {
 def _blame(slope: float, law: str) -> str:
     """Name the column and unit whose factor lies nearest to the slope."""
     if slope > 0.0:
-        factor = min(BLAMED, key=lambda one: abs(np.log(slope / one)))
+        factor = min(_BLAMED, key=lambda one: abs(np.log(slope / one)))
         if abs(np.log(slope / factor)) < np.log(1.3):
-            return BLAMED[factor].format(law)
-    elif abs(slope) < LACKS:
+            return _BLAMED[factor].format(law)
+    elif abs(slope) < _LACKS:
         return (
             f"ay {law}; it lacks the centripetal part (the change of a body's velocity, as some "
             "simulators give?): add v_x r, or leave the column ay out"
@@ -298,9 +298,9 @@ def _blame(slope: float, law: str) -> str:
 def _check_v_x_r(w: Means) -> str | None:
     """Answer with a centripetal acceleration above 60 m/s^2 in 5 % of the moving windows."""
     largest = float(np.percentile(np.abs(w.v_x_r), 95))
-    if largest > LARGEST_V_X_R:
+    if largest > _LARGEST_V_X_R:
         return (
-            f"r must be in rad/s, |v_x r| below {LARGEST_V_X_R:g} m/s^2, it is "
+            f"r must be in rad/s, |v_x r| below {_LARGEST_V_X_R:g} m/s^2, it is "
             f"{largest:.4g}; degrees per second? multiply r by pi/180"
         )
     return None
@@ -399,7 +399,7 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
     small = onset(w)
     L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
     mass = float(total @ a) / float(a @ a)
-    if mass < LIGHTEST * min(L, LONGEST_WHEELBASE) ** 3:
+    if mass < LIGHTEST * min(L, _LONGEST_WHEELBASE) ** 3:
         return (
             f"Fyf and Fyr must be in N, they imply a mass of {mass:.3g} kg on "
             f"an effective wheelbase of {L:.3g} m; kN? multiply by 1000"

@@ -31,10 +31,10 @@ from models.logs.spelling import without_unit
 from models.logs.units import SI
 from models.recordings.map import LogMap
 
-INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
+_INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
 
-OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
+_OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
 
 
 class Reading(NamedTuple):
@@ -180,10 +180,10 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
             raise RecordingError(f"{log.path}: column {column} appears more than once")
         if column in names and name not in (BETA, *POSE):
             found[name] = Signal(channel=(column,))
-    if log.format in OF_STRUCTS and not found:
+    if log.format in _OF_STRUCTS and not found:
         found = _in_struct(names)
-    if not {"Fyf", "Fyr"} & set(names) and set(INVERSE) <= set(names):
-        found |= {ours: Signal(channel=(name,)) for name, ours in INVERSE.items()}
+    if not {"Fyf", "Fyr"} & set(names) and set(_INVERSE) <= set(names):
+        found |= {ours: Signal(channel=(name,)) for name, ours in _INVERSE.items()}
     require_fitting(found, f"{log.path}: ")
     return found
 

@@ -18,10 +18,10 @@ WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at
 STRIDE = 0.05  # [s], longer where a recording is: evenly over it, as many as of `LONG` samples
 SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
 TURNS = 0.2  # of what a channel reaches, beyond which the car turns
-ALIKE, BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
+ALIKE, _BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
 LEAST = 0.1  # [m/s^2], rms, below which nothing turns
 LONGEST = 8.0  # [m], wheelbase by which steering says how much it turns at least
-TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
+_TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
 class Means(NamedTuple):
@@ -53,7 +53,7 @@ class Means(NamedTuple):
         """Where the tail is not out, so that steering and turn go together, (k,)."""
         if self.v_y is None:
             return np.ones(self.r.size, dtype=np.bool_)
-        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > TAIL_OUT * self.v_x))
+        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > _TAIL_OUT * self.v_x))
 
     @property
     def acceleration(self) -> Array:
@@ -191,7 +191,7 @@ def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     x, y = (_less_offset(one, some) for one in (a, b))
     rho = correlation(x, y)
     chance = rho**2 * max(seconds - 2.0, 0.5) / max(1.0 - rho**2, 1e-9)
-    sure = abs(rho) > ALIKE and chance > BEYOND_CHANCE
+    sure = abs(rho) > ALIKE and chance > _BEYOND_CHANCE
     return Pair(rho, int(np.sign(rho)) if sure else 0, seconds)
 
 

@@ -41,10 +41,10 @@ from models.recordings.wheels import Wheels
 from models.schema import Table, read_toml
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
-REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
+_REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
 MEND = "mend"  # what may become of stamps that do not rise
 TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
-SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
+_SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,8 +86,8 @@ class LogMap:
     clock_unit: str = ""
     rate: float | None = None
     longest_gap: float = LONGEST_GAP
-    holes: str = REFUSE
-    order: str = REFUSE
+    holes: str = _REFUSE
+    order: str = _REFUSE
     low_pass: float | None = None
     wheels: Wheels = field(default_factory=Wheels)
     repair: Repair = field(default_factory=Repair)
@@ -104,10 +104,10 @@ class LogMap:
             raise RecordingError(f"rate must be positive and finite, in Hz, it is {self.rate}")
         if self.rate is not None and self.clock:
             raise RecordingError("rate stands in for a time: give it or the channel of the clock")
-        if self.holes not in (REFUSE, CUT):
-            raise RecordingError(f"holes must be {REFUSE} or {CUT}, not {shown(self.holes)}")
-        if self.order not in (REFUSE, MEND):
-            raise RecordingError(f"order must be {REFUSE} or {MEND}, not {shown(self.order)}")
+        if self.holes not in (_REFUSE, CUT):
+            raise RecordingError(f"holes must be {_REFUSE} or {CUT}, not {shown(self.holes)}")
+        if self.order not in (_REFUSE, MEND):
+            raise RecordingError(f"order must be {_REFUSE} or {MEND}, not {shown(self.order)}")
         if self.low_pass is not None and not 0.0 < self.low_pass < math.inf:
             raise RecordingError(f"low_pass must be positive and finite, it is {self.low_pass}")
         for name, signal in self.signals.items():
@@ -245,7 +245,7 @@ def _texts(table: Table, *keys: str) -> dict[str, str]:
 
 def _signal(table: Table, name: str) -> Signal:
     """Return how a document says that a signal is read."""
-    table.only(*SIGNAL_KEYS)
+    table.only(*_SIGNAL_KEYS)
     given: dict[str, Any] = {}
     if isinstance(table.value("channel"), str):
         given["channel"] = (table.text("channel"),)
@@ -271,7 +271,7 @@ def _signal_numbers(signal: Signal) -> dict[str, Any]:
     plain = Signal(channel=signal.channel)
     told = {
         key: getattr(signal, key)
-        for key in SIGNAL_KEYS[1:]
+        for key in _SIGNAL_KEYS[1:]
         if getattr(signal, key) != getattr(plain, key)
     }
     channel = signal.channel[0] if len(signal.channel) == 1 else signal.channel

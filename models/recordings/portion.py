@@ -15,7 +15,7 @@ STRETCH = 20.0  # s of one, where a quarter of the samples are enough for that
 STEPS = 4  # beginnings that a stretch may have in the time of one
 FEWEST = 4  # stretches, so that there are some on both sides of a middle
 REST = 0.6  # s that the car stands at the end of a stretch: a delay of that leaves the next alone
-HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a drive
+_HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a drive
 
 
 class Portion(NamedTuple):
@@ -73,7 +73,7 @@ def _power(recording: Recording, step: int) -> Array:
     n = len(recording)
     power = np.zeros(-(-n // step))
     for part in blocks(n):
-        turning = np.clip(recording.v_x[part] * recording.r[part], -HARDEST, HARDEST) ** 2
+        turning = np.clip(recording.v_x[part] * recording.r[part], -_HARDEST, _HARDEST) ** 2
         np.add.at(power, np.arange(part.start, part.stop) // step, turning)
     return power
 

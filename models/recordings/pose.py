@@ -19,17 +19,17 @@ from models.logs.clock import LONGEST_GAP, Raw, gaps, typical_step
 from models.logs.log import RecordingError
 from models.logs.signals import POSE, Signal
 
-NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
+_NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
 SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
 FEWEST = 30  # samples of a piece that is differentiated
-STANDS = 0.05  # [m/s], a pose that never goes faster does not move
+_STANDS = 0.05  # [m/s], a pose that never goes faster does not move
 MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
 ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
-ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
+_ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
 TURN = math.pi / 2.0
 LATEST, LATE = 0.3, 0.01  # [s] that a gyro may be late against a pose, that is taken out of it
 ALIKE = 0.9  # correlation of the two yaw rates from which that is known
-STRENGTHS = np.geomspace(1e-3, 1e9, 49)  # λ [-]
+_STRENGTHS = np.geomspace(1e-3, 1e9, 49)  # λ [-]
 
 
 def with_pose(
@@ -55,7 +55,7 @@ def with_pose(
         pose["heading"] = _of_quaternion(label, parts["heading"])
     motion = motion_of(label, pose)
     sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
-    if sideways < NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
+    if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
         raise RecordingError(
             f"{label}: the pose never leaves its heading, as one that is integrated from wheels: "
             "vy is not in it; tell the pose of another sensor, or leave it out"
@@ -207,7 +207,7 @@ def smoothed(z: Array) -> Smooth:
     line = z[0] + np.outer(np.arange(n) / (n - 1.0), z[-1] - z[0])
     power = np.sum(dct(z - line, axis=0, norm="ortho") ** 2, axis=1)
     stiff = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** 3  # of Δ³, for cosines
-    left = 1.0 - 1.0 / (1.0 + np.outer(STRENGTHS, stiff))
+    left = 1.0 - 1.0 / (1.0 + np.outer(_STRENGTHS, stiff))
     misses = np.sum(left**2 * power, axis=1) / np.sum(left, axis=1) ** 2
     best = int(np.argmin(misses))
     third = np.array([-1.0, 3.0, -3.0, 1.0])
@@ -216,7 +216,7 @@ def smoothed(z: Array) -> Smooth:
         products = third[: 4 - lag] * third[lag:]
         for k, product in enumerate(products):
             bands[3 - lag, k + lag : k + lag + n - 3] += product
-    bands *= STRENGTHS[best]
+    bands *= _STRENGTHS[best]
     bands[3] += 1.0
     values = np.asarray(solveh_banded(bands, z))
     freedom = float(np.sum(left[best])) * z.shape[1]
@@ -228,7 +228,7 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     """Return the headings, counted from x to y in rad, and what was done to them in words."""
     speeds = [np.hypot(*piece.rates.T) for piece in pieces]
     most = max(float(speed.max()) for speed in speeds)
-    if not most > STANDS:
+    if not most > _STANDS:
         raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
     fast = MOVES * most
     moving = [(piece, speed > fast) for piece, speed in zip(pieces, speeds, strict=True)]
@@ -238,7 +238,7 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     means = [np.mean(np.exp(1j * (travel - sign * unit * heading))) for sign, unit in ways]
     best = int(np.argmax(np.abs(means) > max(np.abs(means)) - 0.02))
     (sign, unit), mean = ways[best], means[best]
-    if not abs(mean) >= ALONG_ALL:
+    if not abs(mean) >= _ALONG_ALL:
         raise RecordingError(
             f"{label}: the heading must go along with the direction of travel of x and y, it does "
             "not: another channel, or other axes?"

@@ -17,7 +17,7 @@ from models.recordings.record import Recording
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
 
-NO_NAMES: Mapping[str, str] = {}
+_NO_NAMES: Mapping[str, str] = {}
 DT = 0.01  # [s], the sample time of every method
 Told = LogMap | str | PathLike[str] | None
 
@@ -29,7 +29,7 @@ def read_recording(
     *,
     name: str = "",
     check: bool = True,
-    columns: Mapping[str, str] = NO_NAMES,
+    columns: Mapping[str, str] = _NO_NAMES,
     log_map: Told = None,
 ) -> Recording:
     """Read one run of a log, a file or arrays in memory, and bring it to a uniform sample time.
@@ -91,7 +91,7 @@ def read_repaired(
     dt: float = DT,
     *,
     check: bool = True,
-    columns: Mapping[str, str] = NO_NAMES,
+    columns: Mapping[str, str] = _NO_NAMES,
     log_map: Told = None,
 ) -> tuple[Recording, Vehicle]:
     """Read one run of a log and take out what the map's repair says, of the log and of the car.

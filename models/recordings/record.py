@@ -30,7 +30,7 @@ JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share
 
 
 ALL = slice(None)
-OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
+_OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
 MISSING = {
     "v_y": "so slip angles are not known; tireid identify estimates it from ay",
     "a_y": "which is needed where vy is not measured",
@@ -117,7 +117,7 @@ class Recording:
         for name in SIGNALS:
             value = getattr(self, name)
             if value is None:
-                if name in OPTIONAL:
+                if name in _OPTIONAL:
                     continue
                 raise RecordingError(f"{self.name}: {name} is needed, it is None")
             array = _read_only(value)

@@ -34,7 +34,7 @@ PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the soo
 SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
-class Rolled(NamedTuple):
+class _Rolled(NamedTuple):
     """Forward speed of a stretch [m/s], (n,), and what of it is not what all wheels say.
 
     gated, held : samples at which a wheel was left out, and at which all were.
@@ -52,7 +52,7 @@ def rolled(
     delta_r: Array,
     wheels: Wheels,
     dt: float,
-) -> Rolled:
+) -> _Rolled:
     """Return the forward speed at the center of gravity; no sample looks at a later one.
 
     Parameters
@@ -93,7 +93,7 @@ def rolled(
         held += int(np.count_nonzero(record["held"] > 0.0))
         agree = np.abs(rows - v_x[part, None]) <= NOISE + SLIP * np.abs(v_x[part, None])
         gated += int(np.count_nonzero(~agree.all(axis=1)))
-    return Rolled(v_x, gated, held)
+    return _Rolled(v_x, gated, held)
 
 
 class Trust(NamedTuple):

@@ -17,8 +17,8 @@ from models.recordings.wheels import RADII, Wheels
 STRAIGHT = 0.05  # [rad/s], largest yaw rate
 EVEN = 0.5  # [m/s²], largest acceleration
 FAST = 0.3  # of the speed that 5 % of the samples exceed: slower ones do not count
-LONG_ENOUGH = 2.0  # [s] of such driving, at least
-AGREES = 0.02  # of the median: farther off, a wheel slips
+_LONG_ENOUGH = 2.0  # [s] of such driving, at least
+_AGREES = 0.02  # of the median: farther off, a wheel slips
 SPREAD = 0.05  # between quartiles, as a share of the median, beyond which nothing is learnt
 SPEEDS = (0.8, 1.25)  # speed over ground per speed of a wheel, of one that shows a speed
 MOST = 200_000  # samples that are looked at
@@ -112,16 +112,16 @@ def learnt_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, f
     even: NDArray[np.bool_] = np.abs(v_x[high] - v_x[low]) <= EVEN * (t[high] - t[low])
     fast = np.abs(v_x) > FAST * float(np.percentile(np.abs(v_x), 95))
     kept = even & fast & (np.abs(r) <= STRAIGHT) & np.isfinite(wheel) & (wheel != 0.0)
-    if np.count_nonzero(kept) * step < LONG_ENOUGH:
+    if np.count_nonzero(kept) * step < _LONG_ENOUGH:
         return None
     v, w = v_x[kept], wheel[kept]
     quarter, middle, other = np.percentile(v / w, [25, 50, 75])
     if abs(other - quarter) > SPREAD * abs(middle):
         return None
-    rolls = np.abs(v / w - middle) <= AGREES * abs(middle)
+    rolls = np.abs(v / w - middle) <= _AGREES * abs(middle)
     v, w = v[rolls], w[rolls]
     seconds = float(w.size * step)
-    return (float(v @ w) / float(w @ w), seconds) if seconds >= LONG_ENOUGH else None
+    return (float(v @ w) / float(w @ w), seconds) if seconds >= _LONG_ENOUGH else None
 
 
 def scale_text(scales: Mapping[str, Scale]) -> str:

@@ -11,8 +11,8 @@ from models.schema import Table
 from models.vehicle import Vehicle
 
 RADII = (0.01, 2.0)  # of a wheel [m], of model cars to dump trucks
-LENGTHS = (0.05, 20.0)  # of a track and a wheelbase [m]
-ACCELERATIONS = (0.5, 100.0)  # [m/s²]
+_LENGTHS = (0.05, 20.0)  # of a track and a wheelbase [m]
+_ACCELERATIONS = (0.5, 100.0)  # [m/s²]
 DRIVEN: Mapping[str, tuple[str, ...]] = {
     "front": AXLES[0],
     "rear": AXLES[1],
@@ -55,13 +55,13 @@ class Wheels:
             given = getattr(self, name)
             if len(given) not in sizes:
                 raise RecordingError(f"wheels: {name} must be {words}, not {len(given)} numbers")
-        for name, ends in (("radius", RADII), ("track", LENGTHS)):
+        for name, ends in (("radius", RADII), ("track", _LENGTHS)):
             for one in getattr(self, name):
                 require_within(RecordingError, *ends, **{f"wheels: {name}": one})
         if self.wheelbase is not None:
-            require_within(RecordingError, *LENGTHS, **{"wheels: wheelbase": self.wheelbase})
+            require_within(RecordingError, *_LENGTHS, **{"wheels: wheelbase": self.wheelbase})
         require_within(
-            RecordingError, *ACCELERATIONS, **{"wheels: acceleration": self.acceleration}
+            RecordingError, *_ACCELERATIONS, **{"wheels: acceleration": self.acceleration}
         )
         if self.driven and self.driven not in DRIVEN:
             raise RecordingError(

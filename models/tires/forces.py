@@ -102,8 +102,8 @@ def folded(alpha: Expression) -> Expression:
 #
 # σ = [κ, tan α]/(1 + κ): sliding over rolling speed (Pacejka, Tyre and Vehicle Dynamics, ch. 3).
 
-ROLLING_FLOOR = 1e-3  # 1 + κ of a locked wheel: slides in the same direction, divides by no zero
-COSINE_FLOOR = 1e-3  # |cos α| of a wheel that moves sideways
+_ROLLING_FLOOR = 1e-3  # 1 + κ of a locked wheel: slides in the same direction, divides by no zero
+_COSINE_FLOOR = 1e-3  # |cos α| of a wheel that moves sideways
 NO_FORCE = 1e-6  # N; rounds the root of a sum of squares at zero, so that its derivative exists
 
 
@@ -133,17 +133,17 @@ def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) 
     C_alpha : cornering stiffness [N/rad].
     C_kappa : longitudinal slip stiffness [N].
     """
-    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), COSINE_FLOOR)
+    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR)
     p_x = C_kappa * kappa
     p_y = C_alpha * tan_alpha
     size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
-    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, ROLLING_FLOOR))
+    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
 
 
 # The two slopes of a tire whose stiffness is the same at every load: methods of such tires.
 
 
-class ConstantStiffness(Protocol):
+class _ConstantStiffness(Protocol):
     """A tire with stiffnesses that do not depend on load."""
 
     @property
@@ -155,7 +155,7 @@ class ConstantStiffness(Protocol):
         """Longitudinal slip stiffness of one tire [N]."""
 
 
-def slip_stiffness(self: ConstantStiffness, F_z: Expression) -> Expression:
+def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
     """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
 
     Parameters
@@ -165,7 +165,7 @@ def slip_stiffness(self: ConstantStiffness, F_z: Expression) -> Expression:
     return self.C_kappa * (F_z > 0)
 
 
-def cornering_stiffness(self: ConstantStiffness, F_z: Expression) -> Expression:
+def cornering_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
     """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
 
     Parameters

@@ -14,10 +14,10 @@ from models.tires.tir import ValidRange, read_magic_formula
 #
 # Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49)-(4.52), (4.72).
 
-EPSILON = 1e-9  # N; keeps B = K/(C D) finite in the air and on ice, changes no force by 1e-8 N
+_EPSILON = 1e-9  # N; keeps B = K/(C D) finite in the air and on ice, changes no force by 1e-8 N
 
 
-class Shape(NamedTuple):
+class _Shape(NamedTuple):
     """Curve of a force over its slip at one load and camber, without E, which needs the slip.
 
     Attributes
@@ -33,7 +33,7 @@ class Shape(NamedTuple):
     S_V: Expression
 
 
-def magic_curve(
+def _magic_curve(
     x: Expression, B: Expression, C: Expression, D: Expression, E: Expression
 ) -> Expression:
     """D sin(C atan(B x - E (B x - atan B x))), (4.49) without shifts.
@@ -49,10 +49,10 @@ def magic_curve(
     return D * ca.sin(C * ca.atan(Bx - E * (Bx - ca.atan(Bx))))
 
 
-def magic_slope(
+def _magic_slope(
     x: Expression, B: Expression, C: Expression, D: Expression, E: Expression
 ) -> Expression:
-    """Derivative of `magic_curve` with respect to x, of its arguments; B C D at x = 0."""
+    """Derivative of `_magic_curve` with respect to x, of its arguments; B C D at x = 0."""
     Bx = B * x
     inner = Bx - E * (Bx - ca.atan(Bx))
     inner_slope = B * (1.0 - E * Bx**2 / (1.0 + Bx**2))
@@ -84,7 +84,7 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
 # 1).
 
 
-def lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> Shape:
+def _lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> _Shape:
     """All of the curve that does not depend on slip.
 
     Parameters
@@ -103,14 +103,14 @@ def lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expre
     D_y = positive(mu_y) * F_z  # (4.E22)
     K_y0 = c.PKY1 * F_z0 * ca.sin(2.0 * ca.atan(F_z / (c.PKY2 * F_z0))) * c.LKY
     K_y = K_y0 * (1.0 - c.PKY3 * ca.fabs(gamma_y))  # (4.E25)
-    B_y = K_y / (C_y * D_y + EPSILON)  # (4.E26)
+    B_y = K_y / (C_y * D_y + _EPSILON)  # (4.E26)
     S_Hy = (c.PHY1 + c.PHY2 * df_z) * c.LHY + c.PHY3 * gamma_y * c.LKYG  # (4.E27)
     S_Vyg = (c.PVY3 + c.PVY4 * df_z) * gamma_y * c.LKYG  # (4.E28), over F_z
     S_Vy = F_z * ((c.PVY1 + c.PVY2 * df_z) * c.LVY + S_Vyg) * LMUY  # (4.E29)
-    return Shape(B_y, C_y, D_y, S_Hy, S_Vy)
+    return _Shape(B_y, C_y, D_y, S_Hy, S_Vy)
 
 
-def lateral_curvature(
+def _lateral_curvature(
     c: Coefficients, alpha_y: Expression, gamma: Expression, F_z: Expression
 ) -> Expression:
     """E_y, at most 1.
@@ -140,10 +140,10 @@ def pure_lateral(
     F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
-    B_y, C_y, D_y, S_Hy, S_Vy = lateral_shape(c, gamma, F_z, mu)
+    B_y, C_y, D_y, S_Hy, S_Vy = _lateral_shape(c, gamma, F_z, mu)
     alpha_y = alpha + S_Hy  # (4.E20)
-    E_y = lateral_curvature(c, alpha_y, gamma, F_z)
-    return magic_curve(alpha_y, B_y, C_y, D_y, E_y) + S_Vy  # (4.E19)
+    E_y = _lateral_curvature(c, alpha_y, gamma, F_z)
+    return _magic_curve(alpha_y, B_y, C_y, D_y, E_y) + S_Vy  # (4.E19)
 
 
 def combined_lateral(
@@ -171,14 +171,14 @@ def combined_lateral(
     E_yk = ca.fmin(c.REY1 + c.REY2 * df_z, 1.0)  # (4.E64)
     S_Hyk = c.RHY1 + c.RHY2 * df_z  # (4.E65)
     G_yk = weight(kappa, S_Hyk, B_yk, C_yk, E_yk)  # (4.E59)-(4.E61)
-    mu_F_z = lateral_shape(c, gamma, F_z, mu).D  # μ_y F_z, camber included
+    mu_F_z = _lateral_shape(c, gamma, F_z, mu).D  # μ_y F_z, camber included
     D_Vyk = mu_F_z * (c.RVY1 + c.RVY2 * df_z + c.RVY3 * gamma)
     D_Vyk = D_Vyk * ca.cos(ca.atan(c.RVY4 * alpha))  # (4.E67)
     S_Vyk = D_Vyk * ca.sin(c.RVY5 * ca.atan(c.RVY6 * kappa)) * c.LVYKA  # (4.E66)
     return G_yk * pure_lateral(c, alpha, gamma, F_z, mu) + S_Vyk  # (4.E58)
 
 
-def lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
+def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0.
 
     Parameters
@@ -186,9 +186,9 @@ def lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
     c : coefficients of the tire file.
     F_z : wheel load, not negative [N].
     """
-    B_y, C_y, D_y, S_Hy, _ = lateral_shape(c, 0.0, F_z, 1.0)
-    E_y = lateral_curvature(c, S_Hy, 0.0, F_z)
-    return magic_slope(S_Hy, B_y, C_y, D_y, E_y)
+    B_y, C_y, D_y, S_Hy, _ = _lateral_shape(c, 0.0, F_z, 1.0)
+    E_y = _lateral_curvature(c, S_Hy, 0.0, F_z)
+    return _magic_slope(S_Hy, B_y, C_y, D_y, E_y)
 
 
 # Longitudinal force of the Magic Formula 5.2 (PAC2002), pure and combined slip.
@@ -198,9 +198,9 @@ def lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
 # the book's later form takes tan α and sin γ, and knows no turn slip (ζ = 1).
 
 
-def longitudinal_shape(
+def _longitudinal_shape(
     c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression
-) -> Shape:
+) -> _Shape:
     """All of the curve that does not depend on slip.
 
     Parameters
@@ -217,13 +217,13 @@ def longitudinal_shape(
     mu_x = (c.PDX1 + c.PDX2 * df_z) * (1.0 - c.PDX3 * gamma_x**2) * LMUX  # (4.E13)
     D_x = positive(mu_x) * F_z  # (4.E12)
     K_x = F_z * (c.PKX1 + c.PKX2 * df_z) * ca.exp(c.PKX3 * df_z) * c.LKX  # (4.E15)
-    B_x = K_x / (C_x * D_x + EPSILON)  # (4.E16)
+    B_x = K_x / (C_x * D_x + _EPSILON)  # (4.E16)
     S_Hx = (c.PHX1 + c.PHX2 * df_z) * c.LHX  # (4.E17)
     S_Vx = F_z * (c.PVX1 + c.PVX2 * df_z) * c.LVX * LMUX  # (4.E18)
-    return Shape(B_x, C_x, D_x, S_Hx, S_Vx)
+    return _Shape(B_x, C_x, D_x, S_Hx, S_Vx)
 
 
-def longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:
+def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:
     """E_x, at most 1.
 
     Parameters
@@ -237,7 +237,7 @@ def longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression
     return ca.fmin(E_0 * (1.0 - c.PEX4 * ca.sign(kappa_x)) * c.LEX, 1.0)  # (4.E14)
 
 
-def pure_longitudinal(
+def _pure_longitudinal(
     c: Coefficients, kappa: Expression, gamma: Expression, F_z: Expression, mu: Expression
 ) -> Expression:
     """F_x0 [N] of a wheel that runs straight, (4.E9).
@@ -250,13 +250,13 @@ def pure_longitudinal(
     F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
-    B_x, C_x, D_x, S_Hx, S_Vx = longitudinal_shape(c, gamma, F_z, mu)
+    B_x, C_x, D_x, S_Hx, S_Vx = _longitudinal_shape(c, gamma, F_z, mu)
     kappa_x = kappa + S_Hx  # (4.E10)
-    E_x = longitudinal_curvature(c, kappa_x, F_z)
-    return magic_curve(kappa_x, B_x, C_x, D_x, E_x) + S_Vx  # (4.E9)
+    E_x = _longitudinal_curvature(c, kappa_x, F_z)
+    return _magic_curve(kappa_x, B_x, C_x, D_x, E_x) + S_Vx  # (4.E9)
 
 
-def combined_longitudinal(
+def _combined_longitudinal(
     c: Coefficients,
     alpha: Expression,
     kappa: Expression,
@@ -271,10 +271,10 @@ def combined_longitudinal(
     E_xa = ca.fmin(c.REX1 + c.REX2 * df_z, 1.0)  # (4.E56)
     S_Hxa = c.RHX1  # (4.E57)
     G_xa = weight(alpha, S_Hxa, B_xa, C_xa, E_xa)  # (4.E51)-(4.E53)
-    return G_xa * pure_longitudinal(c, kappa, gamma, F_z, mu)  # (4.E50)
+    return G_xa * _pure_longitudinal(c, kappa, gamma, F_z, mu)  # (4.E50)
 
 
-def longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
+def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0.
 
     Parameters
@@ -282,9 +282,9 @@ def longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
     c : coefficients of the tire file.
     F_z : wheel load, not negative [N].
     """
-    B_x, C_x, D_x, S_Hx, _ = longitudinal_shape(c, 0.0, F_z, 1.0)
-    E_x = longitudinal_curvature(c, S_Hx, F_z)
-    return magic_slope(S_Hx, B_x, C_x, D_x, E_x)
+    B_x, C_x, D_x, S_Hx, _ = _longitudinal_shape(c, 0.0, F_z, 1.0)
+    E_x = _longitudinal_curvature(c, S_Hx, F_z)
+    return _magic_slope(S_Hx, B_x, C_x, D_x, E_x)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -349,17 +349,17 @@ class MagicFormula:
         c, load = self.coefficients, positive(F_z)
         alpha_iso = -folded(alpha)  # the file and its equations have the ISO sign
         return TireForces(
-            combined_longitudinal(c, alpha_iso, kappa, gamma, load, mu),
+            _combined_longitudinal(c, alpha_iso, kappa, gamma, load, mu),
             combined_lateral(c, alpha_iso, kappa, gamma, load, mu),
         )
 
     def slip_stiffness(self, F_z: Expression) -> Expression:
         """∂F_x/∂κ at zero slip and camber [N]; 0 in the air."""
-        return longitudinal_slope(self.coefficients, positive(F_z))
+        return _longitudinal_slope(self.coefficients, positive(F_z))
 
     def cornering_stiffness(self, F_z: Expression) -> Expression:
         """∂F_y/∂α at zero slip and camber, paper's sign: positive [N/rad]; 0 in the air."""
-        return -lateral_slope(self.coefficients, positive(F_z))
+        return -_lateral_slope(self.coefficients, positive(F_z))
 
     def mirrored(self) -> Self:
         """The same tire for the other side of the car.

@@ -13,7 +13,7 @@ from models.tires.forces import Expression
 
 ESSENTIAL = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 # Conicity and ply-steer: these change sign when the tire is mounted on the other side
-ASYMMETRIC = ("PHY1", "PHY2", "PVY1", "PVY2", "PEY3", "RHX1", "RBY3", "RVY1", "RVY2")
+_ASYMMETRIC = ("PHY1", "PHY2", "PVY1", "PVY2", "PEY3", "RHX1", "RBY3", "RVY1", "RVY2")
 LARGEST = 1e5  # of a coefficient: those of real tires reach about 100
 MOST = {"FNOMIN": 1e7, "PDX1": 100.0, "PDY1": 100.0}  # N, and frictions
 _POSITIVE = ("FNOMIN", "LFZO", "PKY2", "PDX1", "PDY1", "PKX1")
@@ -145,8 +145,8 @@ class Coefficients:
 
     def mirrored(self) -> Self:
         """The same tire on the other side of the car: conicity and ply-steer change sign."""
-        return replace(self, **{name: -getattr(self, name) for name in ASYMMETRIC})
+        return replace(self, **{name: -getattr(self, name) for name in _ASYMMETRIC})
 
     def symmetric(self) -> Self:
         """The same tire without conicity and ply-steer."""
-        return replace(self, **dict.fromkeys(ASYMMETRIC, 0.0))
+        return replace(self, **dict.fromkeys(_ASYMMETRIC, 0.0))

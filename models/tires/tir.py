@@ -22,10 +22,10 @@ from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 
 # Units of a tire property file: which keys have one, and what it is in SI.
 #
-# Only the keys of `DIMENSIONS` are converted. The coefficients of the Magic Formula (P.., R.., Q..,
-# L..) are dimensionless or in radian whatever [UNITS] says: their equations are written in SI.
+# Only the keys of `_DIMENSIONS` are converted. The coefficients of the Magic Formula (P.., R..,
+# Q.., L..) are dimensionless or in radian whatever [UNITS] says: their equations are in SI.
 
-DIMENSIONS: Mapping[str, Mapping[str, int]] = {
+_DIMENSIONS: Mapping[str, Mapping[str, int]] = {
     "FNOMIN": {"FORCE": 1},
     "FZMIN": {"FORCE": 1},
     "FZMAX": {"FORCE": 1},
@@ -82,7 +82,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 }  # fmt: skip
 
 
-def unit_in_si(dimension: str, unit: str) -> float:
+def _unit_in_si(dimension: str, unit: str) -> float:
     """One of the unit, in SI.
 
     Case and a plural s do not matter; from five letters on the beginning of a name will do,
@@ -171,7 +171,7 @@ class TirFile:
 
         Parameters
         ----------
-        key : in capitals; those of `DIMENSIONS` are converted from the units of the file.
+        key : in capitals; those of `_DIMENSIONS` are converted from the units of the file.
 
         Raises
         ------
@@ -221,7 +221,7 @@ class TirFile:
 
     def _unit(self, key: str) -> float:
         factor = 1.0
-        for dimension, exponent in DIMENSIONS.get(key, {}).items():
+        for dimension, exponent in _DIMENSIONS.get(key, {}).items():
             units, without_sign = (
                 [one for one in lines.get(dimension, ()) if one.section == "UNITS"]
                 for lines in (self.entries, self.without_sign)
@@ -229,7 +229,7 @@ class TirFile:
             unit = self._text(dimension, "", units, without_sign)
             if units:
                 try:
-                    factor *= unit_in_si(dimension, unit) ** exponent
+                    factor *= _unit_in_si(dimension, unit) ** exponent
                 except ValueError as error:
                     raise self.error(str(error)) from None
         return factor
@@ -308,23 +308,23 @@ def _unquoted(value: str) -> str:
 # MF-Tyre 6.x and the motorcycle's MF-MCTyre reuse most of the names in other equations, and their
 # files often keep an old label. So a file is judged by its coefficients as well as by its labels.
 
-FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
+_FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
 FORMATS = ("PAC2002", "MF05", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
 PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
 # No equation of 5.2 has these. Zero is how programs that list all names say "not used": a tire of
 # 6.1 is not hidden by it, with PKY4 = 0 it would have no cornering stiffness.
-MARKS_OF_OTHERS = (
+_MARKS_OF_OTHERS = (
     "PKY4", "PKY5", "PKY6", "PKY7", "PEY5", "PPY5", "RBX3", "RBY4", "PCY2", "NOMPRES", "INFLPRES",
 )  # fmt: skip
 # Of these, what changes no equation of a tire of 5.2: the pressures by their names of 6.x, and the
 # value of PKY4 at which K_y of 6.x is that of 5.2. PHY3 is what 6.x has no more: a file that calls
 # itself 5.2 and has it was extended for a program that asks for all names.
-PRESSURES_OF_OTHERS = ("INFLPRES", "NOMPRES")
-PKY4_OF_52 = 2.0
+_PRESSURES_OF_OTHERS = ("INFLPRES", "NOMPRES")
+_PKY4_OF_52 = 2.0
 
 # MF-Tyre 5.0 often fits a negative mu_y. Its sign is free: B = K/(C D) takes it too, and the curve
 # is the same in (-B, -D); D_Vyk = mu_y F_z (RVY1 + ...) is the only other place of mu_y.
-SIGNED_AS_FRICTION = ("PDY1", "PDY2", "RVY1", "RVY2", "RVY3")
+_SIGNED_AS_FRICTION = ("PDY1", "PDY2", "RVY1", "RVY2", "RVY3")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -359,7 +359,7 @@ class ValidRange:
         return all(low <= x <= high for (low, high), x in zip(limits, values, strict=True))
 
 
-class MagicFormulaFile(NamedTuple):
+class _MagicFormulaFile(NamedTuple):
     """What a file tells about its tire.
 
     Attributes
@@ -376,7 +376,7 @@ class MagicFormulaFile(NamedTuple):
     name: str
 
 
-def read_magic_formula(path: str | PathLike[str]) -> MagicFormulaFile:
+def read_magic_formula(path: str | PathLike[str]) -> _MagicFormulaFile:
     """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.
 
     Parameters
@@ -400,7 +400,7 @@ def read_magic_formula(path: str | PathLike[str]) -> MagicFormulaFile:
         raise tir.error(f"TYRESIDE must be LEFT, RIGHT or SYMMETRIC, it is {side!r}")
     if side == "SYMMETRIC":
         c = c.symmetric()
-    return MagicFormulaFile(
+    return _MagicFormulaFile(
         c, "right" if side == "RIGHT" else "left", _valid_range(tir), tir.path.stem
     )
 
@@ -409,7 +409,7 @@ def _require_mf52(tir: TirFile) -> None:
     """Refuse other models, whose coefficients have the same names and another meaning."""
     fittyp = tir.number("FITTYP")
     model = tir.text("PROPERTY_FILE_FORMAT", "")
-    if fittyp is not None and fittyp not in FITTYPS:
+    if fittyp is not None and fittyp not in _FITTYPS:
         what = "Magic Formula 6.x" if fittyp >= 60 else "an unknown model"
         raise tir.error(
             f"FITTYP = {fittyp:g} is {what}; its equations differ, only MF 5.2 and PAC2002 are read"
@@ -420,7 +420,7 @@ def _require_mf52(tir: TirFile) -> None:
             f"PROPERTY_FILE_FORMAT = {model!r} is another tire model; only PAC2002, MF_05 and "
             "MF 5.2 (MF-TYRE or USER with FITTYP 5, 6, 21 or 52) are read"
         )
-    found = {key: value for key in MARKS_OF_OTHERS if (value := tir.number(key))}
+    found = {key: value for key in _MARKS_OF_OTHERS if (value := tir.number(key))}
     if "PHY3" in tir and (model or fittyp is not None):
         found = {key: value for key, value in found.items() if not _changes_nothing(key, value)}
     if marks := [f"{key} = {value:g}" for key, value in found.items()]:
@@ -434,7 +434,7 @@ def _require_mf52(tir: TirFile) -> None:
 
 def _changes_nothing(key: str, value: float) -> bool:
     """Whether a coefficient of 6.x leaves the equations of 5.2 as they are."""
-    return key in PRESSURES_OF_OTHERS or (key == "PKY4" and value == PKY4_OF_52)
+    return key in _PRESSURES_OF_OTHERS or (key == "PKY4" and value == _PKY4_OF_52)
 
 
 def _coefficients(tir: TirFile) -> Coefficients:
@@ -446,7 +446,7 @@ def _coefficients(tir: TirFile) -> Coefficients:
         if value is not None:
             values[name] = value
     if values.get("PDY1", 0.0) < 0.0:
-        values |= {name: -values[name] for name in SIGNED_AS_FRICTION if name in values}
+        values |= {name: -values[name] for name in _SIGNED_AS_FRICTION if name in values}
     if missing := [name for name in ESSENTIAL if name not in values]:
         raise tir.error(f"lacks {', '.join(missing)}, without which there is no Magic Formula 5.2")
     try:
@@ -457,9 +457,9 @@ def _coefficients(tir: TirFile) -> Coefficients:
 
 def _inflated(c: Coefficients, tir: TirFile) -> Coefficients:
     """PAC2002's effect of inflation pressure, a constant of the file: scales eight coefficients."""
-    names = ("IP", "IP_NOM") if "IP" in tir else PRESSURES_OF_OTHERS
+    names = ("IP", "IP_NOM") if "IP" in tir else _PRESSURES_OF_OTHERS
     p, p_0 = (tir.number(name) for name in names)
-    if p is None or p_0 is None or (names == PRESSURES_OF_OTHERS and p == p_0 == 0.0):
+    if p is None or p_0 is None or (names == _PRESSURES_OF_OTHERS and p == p_0 == 0.0):
         return c
     if not (p > 0.0 and p_0 > 0.0):
         raise tir.error(f"{' and '.join(names)} must be positive, they are {p:g} and {p_0:g}")

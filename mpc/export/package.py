@@ -23,11 +23,11 @@ from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import PredictionTire
 from mpc.tires.tire import ALL
 
-Params = NDArray[np.void]
+_Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
 
 
-def initializers(params: Params) -> str:
+def _initializers(params: _Params) -> str:
     """Return the members of the C structure, one a line with its name."""
     return "".join(
         f"    /* {name} */ {MACROS.get(name) or _initializer(params[name])},\n"
@@ -35,7 +35,7 @@ def initializers(params: Params) -> str:
     )
 
 
-def plain_params(params: Params) -> dict[str, Any]:
+def _plain_params(params: _Params) -> dict[str, Any]:
     """Return the numbers by name, ready for JSON."""
     return {name: params[name].tolist() for name in params.dtype.names or ()}
 
@@ -50,7 +50,7 @@ def _initializer(value: NDArray[Any]) -> str:
 
 STEPS = 200
 SPEED = 20.0  # m/s
-HEAVIER = 1.08  # mass of the car that is driven, over that of the prediction
+_HEAVIER = 1.08  # mass of the car that is driven, over that of the prediction
 LATERAL = 4.0  # m/s^2, peak of what the path asks for
 LANE_CHANGE = 1.5  # s
 DIGITS = 9
@@ -121,7 +121,7 @@ class _Car:
         self.step, self.period, self.weights = build_stage(tire.structure), tracker.period, tire
         self.x = np.zeros(state_size(tire.structure))
         self.x[0] = 0.3
-        self.car = tire.car * np.array([HEAVIER, HEAVIER, 1.0, 1.0])
+        self.car = tire.car * np.array([_HEAVIER, _HEAVIER, 1.0, 1.0])
         self.on_the_way = deque([0.0] * round(tracker.delay / tracker.period))
 
     def advance(self, command: float, kappa: float, v_x: float) -> None:
@@ -187,7 +187,7 @@ class MpcPackage(NamedTuple):
     name: str
     tire: PredictionTire
     problem: Problem
-    params: Params
+    params: _Params
     files: Mapping[str, str]
     vectors: Vectors
     about: Values
@@ -211,7 +211,7 @@ def build_mpc_package(
     """
     packaging.check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
-    params: Params = tracker.params
+    params: _Params = tracker.params
     content = _ingredients(tracker, params, name, single=single)
     about = _summary(tracker, content)
     files = c_sources(
@@ -231,7 +231,7 @@ def build_mpc_package(
 
 
 def mpc_readme(package: MpcPackage, about_figures: str) -> str:
-    p = plain_params(package.params)
+    p = _plain_params(package.params)
     rows = "".join(
         f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD
     )
@@ -257,7 +257,7 @@ def _in_words(value: Any) -> str:
     return ", ".join(f"{number:.6g}" for number in values)
 
 
-def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -> dict[str, Any]:
+def _ingredients(tracker: Tracker, params: _Params, name: str, *, single: bool) -> dict[str, Any]:
     tire, problem = tracker.tire, tracker.problem
     structure = tire.structure
     numbers = (
@@ -272,7 +272,7 @@ def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -
         "problem": packaging.plain(asdict(problem)),
         "period_s": tracker.period,
         "delay_s": tracker.delay,
-        "params": packaging.plain(plain_params(params)),
+        "params": packaging.plain(_plain_params(params)),
         "statuses": {status.name: int(status) for status in Status},
     }
 
@@ -290,7 +290,7 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
     }
 
 
-def _tables(name: str, params: Params, about: Values) -> str:
+def _tables(name: str, params: _Params, about: Values) -> str:
     """Return the numbers of the export as C."""
     return packaging.header(
         f"{name}_tables.h",
@@ -301,6 +301,6 @@ def _tables(name: str, params: Params, about: Values) -> str:
             f"#if {name.upper()}_SINGLE\n"
             f"#define TOLERANCE R({SOLVER_TOLERANCE[True]!r}) /* the least that float comes to */\n"
             f"#else\n#define TOLERANCE R({float(params['tolerance'])!r})\n#endif\n",
-            f"static const {name}_params {name}_exported = {{\n{initializers(params)}}};\n",
+            f"static const {name}_params {name}_exported = {{\n{_initializers(params)}}};\n",
         ],
     )

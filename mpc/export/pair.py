@@ -21,7 +21,7 @@ from mpc.problem import Problem
 from mpc.tires import prediction_tire
 
 C = Path(__file__).parent / "pair"
-HANDOVER: Mapping[str, str] = {"tireid_handover.h": "include", "tireid_handover.c": "src"}
+_HANDOVER: Mapping[str, str] = {"tireid_handover.h": "include", "tireid_handover.c": "src"}
 EXAMPLES: Mapping[str, str] = dict.fromkeys(
     ("closed_loop.c", "simulated_car.c", "simulated_car.h", "lane_changes.c", "lane_changes.h"),
     "examples",
@@ -44,13 +44,13 @@ def frozen_start(package: Package) -> TireModel:
         model = specialized.method.frozen(specialized.vehicle, specialized.carry)
     except CannotFreezeError as error:
         raise NoHandoverError(f"no tire to hand over: {error}") from error
-    if model.kind not in HANDOVERS:
+    if model.kind not in _HANDOVERS:
         kind = type(model).__name__
         raise NoHandoverError(f"only networks and axle curves are handed over in C, not {kind}")
     return model
 
 
-def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
+def _handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
     """Return header and source by path.
 
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
@@ -58,7 +58,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
     specialized, model = identifier.specialized, frozen_start(identifier)
     name = specialized.name
     force = {"MAX_FORCE": (repr(round(specialized.limits.force, 1)), "of an axle [N]")}
-    numbers, arrays = HANDOVERS[model.kind](model, tracker)
+    numbers, arrays = _HANDOVERS[model.kind](model, tracker)
     text = header(
         f"{name}_handover_tables.h",
         f"Numbers of the handover.\n\n{generated(identifier.about)}",
@@ -73,7 +73,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
             ),
         ],
     )
-    return {**c_files(C, HANDOVER, {PREFIX: name}), f"src/{name}_handover_tables.h": text}
+    return {**c_files(C, _HANDOVER, {PREFIX: name}), f"src/{name}_handover_tables.h": text}
 
 
 Numbers = dict[str, tuple[object, str]]
@@ -162,10 +162,10 @@ def build_pair(
     }
     files = {path: filled(C / path, values) for path in ("CMakeLists.txt", "README.md")}
     files |= c_files(C, EXAMPLES, {PREFIX: specialized.name})
-    return Pair(identifier, tracker, files | handover_sources(identifier, tracker))
+    return Pair(identifier, tracker, files | _handover_sources(identifier, tracker))
 
 
-HANDOVERS: Mapping[str, Callable[[Any, MpcPackage], tuple[Numbers, Arrays]]] = {
+_HANDOVERS: Mapping[str, Callable[[Any, MpcPackage], tuple[Numbers, Arrays]]] = {
     AxleModel.kind: _of_curves,
     NetworkModel.kind: _of_network,
 }

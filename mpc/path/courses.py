@@ -19,7 +19,7 @@ from mpc.path.path import Path
 # Over the easing of a turn, κ goes from 0 to 1/R as 3 u² - 2 u³: dκ/ds is continuous. The turn of
 # the heading over an easing is half that of the same length at 1/R.
 
-SHORTEST_FREE = 1.0  # m, of a straight that closes a course
+_SHORTEST_FREE = 1.0  # m, of a straight that closes a course
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +135,7 @@ def close(sections: Sequence[Section], free: tuple[int, int]) -> list[Section]:
     closed = list(sections)
     for i, more in zip(free, missing, strict=True):
         length = closed[i].length + float(more)
-        if not (isinstance(closed[i], Straight) and length >= SHORTEST_FREE):
+        if not (isinstance(closed[i], Straight) and length >= _SHORTEST_FREE):
             raise PathError(f"section {i} cannot close the course with a length of {length:.4g} m")
         closed[i] = Straight(length=length)
     return closed

@@ -22,10 +22,10 @@ from mpc.path.path import Path
 from mpc.path.waypoints import sample
 
 DEGREE = 5
-PER_INTERVAL = 4  # places between two knots where limits hold
-GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
-CONE_SPACING = 3.0  # m
-OPTIONS: dict[str, Any] = {
+_PER_INTERVAL = 4  # places between two knots where limits hold
+_GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
+_CONE_SPACING = 3.0  # m
+_OPTIONS: dict[str, Any] = {
     "print_time": False,
     "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-9, "max_iter": 500},
 }
@@ -56,12 +56,12 @@ class Gate:
 
     def cones(self) -> Array:
         """Return X, Y of its cones [m], (k, 2), at most 3 m from one another."""
-        x = np.linspace(self.start, self.end, ceil((self.end - self.start) / CONE_SPACING) + 1)
+        x = np.linspace(self.start, self.end, ceil((self.end - self.start) / _CONE_SPACING) + 1)
         rows = [np.column_stack((x, np.full_like(x, y))) for y in (self.right, self.left)]
         return np.vstack([row for row in rows if np.isfinite(row).all()])
 
 
-def cones_of(gates: Sequence[Gate]) -> Array:
+def _cones_of(gates: Sequence[Gate]) -> Array:
     """Return X, Y of all cones [m], (k, 2)."""
     return np.vstack([gate.cones() for gate in gates])
 
@@ -125,7 +125,7 @@ def _coefficients(
     """Solve for the coefficients of the spline."""
     n = t.size - DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
-    x = np.linspace(inner[0], inner[-1], PER_INTERVAL * (inner.size - 1) + 1)
+    x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
     x = np.unique(np.concatenate((x, edges[(edges > x[0]) & (edges < x[-1])])))
     c, k = ca.MX.sym("c", n), ca.MX.sym("k")
     basis = [_basis(t, x, order) for order in range(4)]
@@ -145,9 +145,9 @@ def _coefficients(
     rows = ca.vertcat(y, ends, kappa - k, -kappa - k, easing * kappa_ds - k, -easing * kappa_ds - k)
     upper = np.concatenate((high, np.zeros(4 + 4 * x.size)))
     lower = np.concatenate((low, np.zeros(4), np.full(4 * x.size, -np.inf)))
-    cost = k + GENTLY * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
+    cost = k + _GENTLY * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
     problem = {"x": ca.vertcat(c, k), "f": cost, "g": rows}
-    solver: Any = ca.nlpsol("line", "ipopt", problem, OPTIONS)
+    solver: Any = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
     guess = np.append(np.linspace(start[1], end[1], n), 0.05)
     solution = solver(x0=guess, lbg=lower, ubg=upper)
     if not solver.stats()["success"]:
@@ -175,13 +175,13 @@ def _basis(t: Array, x: Array, order: int) -> Any:
 # The offset of part 1 is taken between right cones. The standard leaves the line to the driver;
 # ours is the one of smallest peak curvature, see the gates above.
 
-CAR_WIDTH = 1.8  # m
+_CAR_WIDTH = 1.8  # m
 NARROWEST, WIDEST = 1.0, 2.6  # m, of a car
 
 
 def iso_3888_1(
     *,
-    car_width: float = CAR_WIDTH,
+    car_width: float = _CAR_WIDTH,
     margin: float = 0.05,
     run_in: float = 40.0,
     run_out: float = 40.0,
@@ -215,7 +215,7 @@ def iso_3888_1(
 
 def iso_3888_2(
     *,
-    car_width: float = CAR_WIDTH,
+    car_width: float = _CAR_WIDTH,
     margin: float = 0.05,
     run_in: float = 40.0,
     run_out: float = 40.0,
@@ -275,10 +275,10 @@ def _path(
         easing=easing,
         spacing=spacing,
     )
-    return Path.from_line(line, name=name, cones=cones_of(gates))
+    return Path.from_line(line, name=name, cones=_cones_of(gates))
 
 
-EASING = 6.0  # m
+_EASING = 6.0  # m
 
 
 def slalom(
@@ -318,4 +318,4 @@ def slalom(
     places = [(i * gap, *sides[i % 2]) for i in range(cones)]
     gates = [Gate(start=x, end=x, right=right, left=left) for x, right, left in places]
     half, runs = 0.5 * car_width + margin, (run_in, run_out)
-    return _path("slalom", gates, half, EASING, runs, spacing)
+    return _path("slalom", gates, half, _EASING, runs, spacing)

@@ -65,8 +65,8 @@ def line_from_heading(
     return Line(s, place[0], place[1], psi[::4], kappa[::4])
 
 
-LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
-DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
+_LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
+_DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
 
 
 def check_line(line: Line, name: str, closed: bool) -> None:
@@ -78,9 +78,9 @@ def check_line(line: Line, name: str, closed: bool) -> None:
     if not (h > 0.0 and np.abs(s - h * np.arange(s.size)).max() <= 1e-6 * h):
         raise PathError(f"{name}: s must rise from 0 in equal steps")
     turn = float(h * np.abs(kappa).max())
-    if turn > LARGEST_TURN:
+    if turn > _LARGEST_TURN:
         raise PathError(
-            f"{name}: a step may turn by at most {LARGEST_TURN} rad, one turns by {turn:.3g}; "
+            f"{name}: a step may turn by at most {_LARGEST_TURN} rad, one turns by {turn:.3g}; "
             f"sample it finer than {h:.3g} m"
         )
     middle = 0.5 * (psi[:-1] + psi[1:])
@@ -90,7 +90,7 @@ def check_line(line: Line, name: str, closed: bool) -> None:
     turned = np.diff(psi) - 0.5 * h * (kappa[:-1] + kappa[1:])
     wrong = np.maximum(np.abs(along - 1.0), np.maximum(np.abs(across), np.abs(turned)))
     worst = int(wrong.argmax())
-    if wrong[worst] > DISAGREEMENT + 0.25 * turn**2:
+    if wrong[worst] > _DISAGREEMENT + 0.25 * turn**2:
         raise PathError(
             f"{name}: X, Y, psi and kappa must be one curve over s, at s = {s[worst]:.4g} m they "
             f"disagree by {wrong[worst]:.2g} of a step"
@@ -132,8 +132,8 @@ class Ends(NamedTuple):
         (psi_0, psi_1), (kappa_0, kappa_1) = self.psi, self.kappa
         cos_0, cos_1, sin_0, sin_1 = cos(psi_0), cos(psi_1), sin(psi_0), sin(psi_1)
         return (
-            quintic(u, h, self.X, (cos_0, cos_1), (-kappa_0 * sin_0, -kappa_1 * sin_1)),
-            quintic(u, h, self.Y, (sin_0, sin_1), (kappa_0 * cos_0, kappa_1 * cos_1)),
+            _quintic(u, h, self.X, (cos_0, cos_1), (-kappa_0 * sin_0, -kappa_1 * sin_1)),
+            _quintic(u, h, self.Y, (sin_0, sin_1), (kappa_0 * cos_0, kappa_1 * cos_1)),
             cubic(u, h, self.psi, self.kappa),
             kappa_0 + u * (kappa_1 - kappa_0),
         )
@@ -149,7 +149,7 @@ def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
     return p[0] + u * chord + u * (1.0 - u) * ((1.0 - u) * bend_0 + u * bend_1)
 
 
-def quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
+def _quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
     """Return the quintic that has values, slopes and second derivatives given at both ends.
 
     u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.

@@ -25,10 +25,10 @@ from mpc.path.waypoints import line_through, read_waypoints
 # is zero; dg/ds = -(1 - κ e_y), so that s += g/(1 - κ e_y) is Newton's step.
 
 # s [m] -> X, Y [m], ψ [rad], κ [1/m]
-PointOf: TypeAlias = Callable[[float], tuple[float, float, float, float]]
+_PointOf: TypeAlias = Callable[[float], tuple[float, float, float, float]]
 
 LONGEST_STEP = 1.0  # m; shorter than any turn that a car can drive, so that no step skips a bend
-SMALLEST_SLOPE = 0.3  # of 1 - κ e_y: near the center of a turn every s is as close as the next
+_SMALLEST_SLOPE = 0.3  # of 1 - κ e_y: near the center of a turn every s is as close as the next
 TOLERANCE = 1e-9  # m
 STEPS = 200
 
@@ -55,8 +55,8 @@ class Projection(NamedTuple):
         return math.remainder(psi - self.psi, 2.0 * math.pi)
 
 
-def walk_to_foot(
-    point_of: PointOf, X: float, Y: float, near: float, search_distance: float
+def _walk_to_foot(
+    point_of: _PointOf, X: float, Y: float, near: float, search_distance: float
 ) -> Projection:
     """Walk from `near` towards the car until the path passes square beside it.
 
@@ -73,7 +73,7 @@ def walk_to_foot(
         cos_psi, sin_psi = math.cos(psi), math.sin(psi)
         along = (X - X_s) * cos_psi + (Y - Y_s) * sin_psi
         e_y = (Y - Y_s) * cos_psi - (X - X_s) * sin_psi
-        step = along / max(1.0 - kappa * e_y, SMALLEST_SLOPE)
+        step = along / max(1.0 - kappa * e_y, _SMALLEST_SLOPE)
         step = min(max(step, -LONGEST_STEP), LONGEST_STEP)
         goal = min(max(s + step, near - search_distance), near + search_distance)
         if abs(goal - s) < TOLERANCE:
@@ -322,15 +322,15 @@ class Path:
         if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
             raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")
         if near is not None:
-            return walk_to_foot(self._point, X, Y, near, search_distance)
+            return _walk_to_foot(self._point, X, Y, near, search_distance)
         nearest = int(np.argmin((self.X - X) ** 2 + (self.Y - Y) ** 2))
         start = float(self.s[nearest])
         if nearest in (0, self.s.size - 1) and not self.closed:  # perhaps far beyond an end
             psi = float(self.psi[nearest])
             start += (X - self.X[nearest]) * math.cos(psi) + (Y - self.Y[nearest]) * math.sin(psi)
-        found = walk_to_foot(self._point, X, Y, start, 2.0 * self.step)
+        found = _walk_to_foot(self._point, X, Y, start, 2.0 * self.step)
         if self.closed and not 0.0 <= found.s < self.length:
-            return walk_to_foot(self._point, X, Y, found.s % self.length, 2.0 * self.step)
+            return _walk_to_foot(self._point, X, Y, found.s % self.length, 2.0 * self.step)
         return found
 
     def _point(self, s: float) -> tuple[float, float, float, float]:

@@ -69,14 +69,14 @@ def _roughness(points: Array, closed: bool) -> Any:
     return (D.T @ sparse.diags(np.where(np.isfinite(span), span, 0.0) / 3.0) @ D).tocsc()
 
 
-FITS = 4
+_FITS = 4
 FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
 SAME = 1e-6  # of the median gap: way-points as near as this are one
 PIECES = 8  # of every interval between knots, for its length
-LOBES, SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
+_LOBES, SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
 
 
-class Waypoints(NamedTuple):
+class _Waypoints(NamedTuple):
     """Points in driving order, X and Y [m], (k,)."""
 
     X: Array
@@ -140,7 +140,7 @@ def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     # Quadrature needs pieces over which the speed changes little, even between far way-points.
     t = np.interp(np.arange(PIECES * (knots.size - 1) + 1) / PIECES, np.arange(knots.size), knots)
     half = 0.5 * np.diff(t)
-    nodes = t[:-1, None] + half[:, None] * (1.0 + LOBES)
+    nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)
     length_at_t = np.append(0.0, np.cumsum(half * (_norm(velocity(nodes)) @ SHARES)))
     try:
         s = uniform_grid(float(length_at_t[-1]), spacing)
@@ -159,7 +159,7 @@ def _times(velocity: Any, t: Array, length_at_t: Array, s: Array) -> Array:
     at = t[i] + np.diff(t)[i] * rest / np.diff(length_at_t)[i]
     for _ in range(20):
         half = 0.5 * (at - t[i])
-        nodes = t[i][:, None] + half[:, None] * (1.0 + LOBES)
+        nodes = t[i][:, None] + half[:, None] * (1.0 + _LOBES)
         error = half * (_norm(velocity(nodes)) @ SHARES) - rest
         at = np.clip(at - error / _norm(velocity(at)), t[i], t[i + 1])
         if np.abs(error).max() < 1e-12 * s[-1]:
@@ -213,22 +213,22 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
 def _fit(points: Array, closed: bool) -> Any:
     """Interpolate by a C2 spline over its own arc length."""
     t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
-    for _ in range(FITS):
+    for _ in range(_FITS):
         spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
         half = 0.5 * np.diff(t)
-        nodes = t[:-1, None] + half[:, None] * (1.0 + LOBES)
+        nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)
         lengths = half * (_norm(spline.derivative()(nodes)) @ SHARES)
         t = np.append(0.0, np.cumsum(lengths))
     return spline
 
 
-X_NAMES, Y_NAMES = ("x_m", "x", "x [m]"), ("y_m", "y", "y [m]")
+_X_NAMES, _Y_NAMES = ("x_m", "x", "x [m]"), ("y_m", "y", "y [m]")
 # Read way-points from a CSV with a header: X_m, Y_m or x, y, in meters.
 
-ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
+_ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
 
 
-def read_waypoints(file: Path) -> Waypoints:
+def read_waypoints(file: Path) -> _Waypoints:
     """Read X and Y [m]; other columns, and lines that start with "#" below the header, are ignored.
 
     file : the CSV; names in its header may be of either case, and the header may start with "#".
@@ -240,10 +240,10 @@ def read_waypoints(file: Path) -> Waypoints:
     if not points:
         raise PathError(f"{file}: there is a header but no way-point")
     columns = []
-    for axis, names in (("X", X_NAMES), ("Y", Y_NAMES)):
+    for axis, names in (("X", _X_NAMES), ("Y", _Y_NAMES)):
         column = _find(file, axis, names, header)
         columns.append(_numbers(file, header[column], column, points))
-    return Waypoints(*columns)
+    return _Waypoints(*columns)
 
 
 def _rows(file: Path) -> list[tuple[int, list[str]]]:
@@ -280,7 +280,7 @@ def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> i
         raise PathError(f"{file}: cells must be separated by commas, found {listing!r}")
     lower = {name.lower() for name in header}
     hint = ""
-    if lower & ON_THE_GLOBE:
+    if lower & _ON_THE_GLOBE:
         hint = "; convert latitude and longitude to meters in a plane"
     elif unit := [name for name in header if name.lower().startswith(f"{axis.lower()}_")]:
         hint = f"; {unit[0]} is not in meters, convert and rename it"

@@ -17,7 +17,7 @@ from mpc.tires.tire import DOUBT_STEP, Car, Point, PredictionTire, curve_slopes
 N_GRIPS = 9
 LEAST_GRIP = 0.25  # of the friction that a tire was learnt on: ice, after a dry road
 SURPRISE = 8.0  # -2 ln of how likely a road is to change, as a supervisor has it
-FORCE_ERROR = 0.045  # static axle loads, of 0.2 s of motion: noise, load transfer, transients
+_FORCE_ERROR = 0.045  # static axle loads, of 0.2 s of motion: noise, load transfer, transients
 GRIPS: Array = LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 
 
@@ -31,17 +31,17 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
             f"caution must be 0 for a car with downforce, whose bands are of static loads, it is "
             f"{caution:g}"
         )
-    can = offers_friction(tire)
+    can = _offers_friction(tire)
     params["caution"] = caution
     params["grips"] = GRIPS if can else 1.0
     params["surprise"] = SURPRISE
     params["doubt"], params["doubt_step"] = tire.doubt_or_told(), DOUBT_STEP
-    params["force_error"] = FORCE_ERROR * np.array(tire.vehicle.axle_loads)
+    params["force_error"] = _FORCE_ERROR * np.array(tire.vehicle.axle_loads)
     params["stiffness"] = np.maximum(curve_slopes(tire)[0, 0], 0.1 * params["force_error"][0])
     params["prior"] = np.where(GRIPS < 1.0, SURPRISE, 0.0) if can else 0.0
 
 
-def offers_friction(tire: PredictionTire) -> bool:
+def _offers_friction(tire: PredictionTire) -> bool:
     """Return whether the tire can be told for another friction."""
     numbers = Car(*tire.car)
     return tire.structure.similar(Point(0.0, 0.0, 0.0, 1.0, numbers, tire.weights), 1.0) is not None

@@ -20,11 +20,11 @@ SPEEDS = np.round(np.geomspace(2.0, 100.0, 8), 3)  # m/s; the C takes what lies 
 N_SPEEDS = SPEEDS.size
 STEERING = 0.2  # rad that cost as much as `e_y`, where the car hardly moves
 DIGITS = 9  # of what is exported: other digits depend on the machine
-DOUBLINGS = 40  # at most; ten are usual
+_DOUBLINGS = 40  # at most; ten are usual
 ENOUGH = 1e-13  # change of the cost, in parts
 
 
-class FallBack(NamedTuple):
+class _FallBack(NamedTuple):
     """Rows by speed [m/s] (k,): gains of x, then steering [rad m] and v_y [m²/s] a curvature.
 
     Read only: every tracker of the same car and times has the same.
@@ -37,7 +37,7 @@ class FallBack(NamedTuple):
 @lru_cache(maxsize=32)
 def fall_back(
     vehicle: Vehicle, *, period: float, delay: float, e_y: float, acceleration: float
-) -> FallBack:
+) -> _FallBack:
     """Return the table that the tracker steers by where it has no plan.
 
     Minimizes Σ (e_y/`e_y`)² + (a/`acceleration`)² + (u/0.2 rad)², where a [m/s²] is the lateral
@@ -56,7 +56,7 @@ def fall_back(
         Q = np.diag([1.0 / e_y**2, 0.0, 0.0, 0.0, 0.0])
         R = np.array([[1.0 / STEERING**2 + (per_steering / acceleration) ** 2]])
         rows.append([*feedback(A_d, B_d, Q, R).ravel(), turn, drift])
-    table = FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
+    table = _FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
     for numbers in table:
         numbers.flags.writeable = False
     return table
@@ -108,7 +108,7 @@ def _solved(M: Array, right: Array) -> Array:
 def _riccati(A: Array, G: Array, Q: Array) -> Array:
     """Return P of the cost behind 1, 2, 4, … samples, until it stays; G = B R⁻¹ B'."""
     P, eye = Q, np.eye(len(A))
-    for _ in range(DOUBLINGS):
+    for _ in range(_DOUBLINGS):
         W = _solved(eye + G @ P, np.hstack([A, G]))
         A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
         step: Array = A.T @ P @ A_1

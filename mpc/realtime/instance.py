@@ -71,9 +71,9 @@ class Command(NamedTuple):
 # in place.
 
 N_COMMANDS = 32  # of the past, which a delay may reach back
-STRUCTURE = re.compile(r"typedef struct \{([^}]*)\} tireid_mpc_(\w+);")
-MEMBER = re.compile(r"(\w+)\s+(\w+)((?:\[[^]]+\])*);")
-MACRO = re.compile(r"#define TIREID_MPC_(\w+) (\d+)U\b")
+_STRUCTURE = re.compile(r"typedef struct \{([^}]*)\} tireid_mpc_(\w+);")
+_MEMBER = re.compile(r"(\w+)\s+(\w+)((?:\[[^]]+\])*);")
+_MACRO = re.compile(r"#define TIREID_MPC_(\w+) (\d+)U\b")
 
 
 @cache
@@ -82,7 +82,7 @@ def c_types(
 ) -> dict[str, np.dtype[np.void]]:
     """Return the types of `params`, `input` and `state`."""
     text = re.sub(r"/\*.*?\*/", "", (C / "tireid_mpc.h").read_text(encoding="utf-8"), flags=re.S)
-    sizes = {f"TIREID_MPC_{name}": int(value) for name, value in MACRO.findall(text)}
+    sizes = {f"TIREID_MPC_{name}": int(value) for name, value in _MACRO.findall(text)}
     sizes |= {f"TIREID_MPC_{key}": n for key, (n, _) in c_sizes(structure, horizon).items()}
     kinds = {"tireid_mpc_real": np.float32 if single else np.float64, "uint32_t": np.uint32}
 
@@ -94,10 +94,10 @@ def c_types(
 
     return {
         name: np.dtype(
-            [(member, kinds[kind], shape(of)) for kind, member, of in MEMBER.findall(members)],
+            [(member, kinds[kind], shape(of)) for kind, member, of in _MEMBER.findall(members)],
             align=True,
         )
-        for members, name in STRUCTURE.findall(text)
+        for members, name in _STRUCTURE.findall(text)
         if name in ("params", "input", "state")
     }
 

@@ -40,7 +40,7 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
     raise TypeError(f"no prediction tire can be made of {type(source).__name__}")
 
 
-def curve_tire(model: CurveModel) -> PredictionTire:
+def _curve_tire(model: CurveModel) -> PredictionTire:
     plain = _plain_curve(model)
     if not (model.lagged or model.offset.any()):
         return plain
@@ -74,7 +74,7 @@ MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
     NetworkModel.kind: network_tire,
     AxleModel.kind: axle_tire,
     FittedModel.kind: fit_tire,
-    CurveModel.kind: curve_tire,
+    CurveModel.kind: _curve_tire,
     OnnxModel.kind: onnx_tire,
 }
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {

@@ -21,8 +21,8 @@ from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, load_ratio
 from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
-N_COMMON = 3
-N_AXLE = 2  # beside the w_j
+_N_COMMON = 3
+_N_AXLE = 2  # beside the w_j
 
 
 class Axle(NamedTuple):
@@ -63,7 +63,7 @@ class LadderAxles(TireStructure):
 
     @property
     def _static(self) -> int:
-        return N_COMMON + self.units + 2 * (N_AXLE + self.units)
+        return _N_COMMON + self.units + 2 * (_N_AXLE + self.units)
 
     def slip(self, at: Point) -> Pair:
         """Return the slip angles, errors of the sensors taken off [rad]."""
@@ -97,9 +97,9 @@ class LadderAxles(TireStructure):
     def at_friction(self, weights: Array, ratio: float) -> Array:
         """Return `weights` (n_weights,) of another friction: 1/α_j over it, W times it."""
         w, n = weights.copy(), self.units
-        w[N_COMMON : N_COMMON + n] /= ratio  # 1/α_j
-        axles = w[N_COMMON + n : self._static].reshape(2, -1)  # a view
-        axles[:, N_AXLE:] *= ratio
+        w[_N_COMMON : _N_COMMON + n] /= ratio  # 1/α_j
+        axles = w[_N_COMMON + n : self._static].reshape(2, -1)  # a view
+        axles[:, _N_AXLE:] *= ratio
         return w
 
     def similar(self, at: Point, ratio: Any) -> Point:
@@ -115,10 +115,10 @@ class LadderAxles(TireStructure):
         return front, rear
 
     def _weights(self, w: Any) -> tuple[Any, tuple[Axle, Axle]]:
-        n, size = self.units, N_AXLE + self.units
-        start = N_COMMON + n
+        n, size = self.units, _N_AXLE + self.units
+        start = _N_COMMON + n
         front, rear = (w[start + i * size : start + (i + 1) * size] for i in (0, 1))
-        return w[N_COMMON:start], (
+        return w[_N_COMMON:start], (
             Axle(front[0], front[1], front[2:]),
             Axle(rear[0], rear[1], rear[2:]),
         )

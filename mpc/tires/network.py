@@ -82,7 +82,7 @@ def network_tire(model: NetworkModel) -> PredictionTire:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OnnxAxles(SmallSlip):
+class _OnnxAxles(SmallSlip):
     """Axle forces of a static network of signals; w: its constants, one after another.
 
     Parameters
@@ -117,7 +117,7 @@ def _loaded(program: str) -> ca.Function:
 def onnx_tire(model: OnnxModel) -> PredictionTire:
     """Return the prediction tire of a user's network."""
     network, weights = _lifted(model.content, model.inputs)
-    structure = OnnxAxles(
+    structure = _OnnxAxles(
         program=network.serialize(),
         inputs=model.signals,
         slip_sign=model.slip_sign,

@@ -213,13 +213,13 @@ def believed_force(
     """
     there = structure.similar(at, grip)
     if there is None:
-        return extrapolated_force(structure, slip, at, max_slip, rise)
+        return _extrapolated_force(structure, slip, at, max_slip, rise)
     per_grip = 1 / grip
     shared = slip[0] * per_grip, slip[1] * per_grip
-    return grip * extrapolated_force(structure, shared, there, max_slip, rise)
+    return grip * _extrapolated_force(structure, shared, there, max_slip, rise)
 
 
-def extrapolated_force(
+def _extrapolated_force(
     structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).

@@ -21,8 +21,8 @@ from tireid.progress import say
 RATE = 10.0  # frames a second; a GIF counts in hundredths of a second
 MOST = 120  # frames: what stays small and quick to draw
 HOLD = 12  # frames for which the last picture stays
-DOTS = 150  # an inch
-QUALITY = 45  # of a WebP, to 100
+_DOTS = 150  # an inch
+_QUALITY = 45  # of a WebP, to 100
 
 
 def require_ffmpeg() -> str:
@@ -57,7 +57,7 @@ def write_film(
     scene = Scene(drives, curves, drops=drops, pace=pace, title=title, known=known)
     writer = _writer(file)
     try:
-        with style.context(["default", LOOK]), writer.saving(scene.figure, str(file), DOTS):
+        with style.context(["default", LOOK]), writer.saving(scene.figure, str(file), _DOTS):
             for number, t in enumerate(instants, start=1):
                 scene.show(float(t))
                 writer.grab_frame()
@@ -70,7 +70,7 @@ def write_film(
         raise ValueError(f"ffmpeg could not write {file.name}: {said[-1]}") from None
 
 
-class WebpWriter(PillowWriter):
+class _WebpWriter(PillowWriter):
     """Pillow's writer at a quality that a page can hold, for which matplotlib's has no word."""
 
     _frames: list[Any]
@@ -78,7 +78,7 @@ class WebpWriter(PillowWriter):
     def finish(self) -> None:
         """Write the file."""
         first, *others = self._frames
-        words: dict[str, Any] = {"quality": QUALITY, "minimize_size": True, "loop": 0}
+        words: dict[str, Any] = {"quality": _QUALITY, "minimize_size": True, "loop": 0}
         time = round(1000.0 / RATE)
         with naming(self.outfile):
             first.save(self.outfile, save_all=True, append_images=others, duration=time, **words)
@@ -86,7 +86,7 @@ class WebpWriter(PillowWriter):
 
 def _writer(file: FilePath) -> AbstractMovieWriter:
     if file.suffix == ".webp":
-        return WebpWriter(fps=RATE)  # type: ignore[arg-type]
+        return _WebpWriter(fps=RATE)  # type: ignore[arg-type]
     if file.suffix == ".gif":
         return PillowWriter(fps=RATE)  # type: ignore[arg-type]
     require_ffmpeg()

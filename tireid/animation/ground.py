@@ -14,12 +14,12 @@ from mpc.path import Path
 from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_look
 from tireid.figures.style import PURPLE
 
-WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
-LOOK_BACK, LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]
+_WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
+_LOOK_BACK, _LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]
 LEVEL = 9.0  # a straight path whose sides are this close [m] is not followed sidewards
 
 
-class View(NamedTuple):
+class _View(NamedTuple):
     """A pose of the camera: what is ahead of it along the path is to the right in the picture."""
 
     center: Array
@@ -39,7 +39,7 @@ class View(NamedTuple):
 
         directions : (..., 2).
         """
-        return View(np.zeros(2), self.angle).see(directions)
+        return _View(np.zeros(2), self.angle).see(directions)
 
 
 class Instant(NamedTuple):
@@ -47,7 +47,7 @@ class Instant(NamedTuple):
 
     k: int
     t: float
-    view: View
+    view: _View
 
 
 class Camera:
@@ -55,13 +55,13 @@ class Camera:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._winding = bool(path.closed or np.ptp(path.psi) > WINDING)
+        self._winding = bool(path.closed or np.ptp(path.psi) > _WINDING)
         self._angle = float(np.mean(path.psi))
-        still = View(np.array([path.X[0], path.Y[0]]), self._angle)
+        still = _View(np.array([path.X[0], path.Y[0]]), self._angle)
         sides = still.see(np.column_stack([path.X, path.Y]))[:, 1]
         self._middle = 0.5 * float(sides.min() + sides.max()) if np.ptp(sides) < LEVEL else None
 
-    def at(self, s: float) -> View:
+    def at(self, s: float) -> _View:
         """Return the view of a car.
 
         s : arc length of the car along the path [m].
@@ -69,26 +69,26 @@ class Camera:
         X, Y, _ = self._path.pose(s)
         center = np.array([float(X), float(Y)])
         if self._winding:
-            stretch = np.linspace(s - LOOK_BACK, s + LOOK_AHEAD, 24)
-            return View(center, float(np.mean(self._path.pose(stretch)[2])))
+            stretch = np.linspace(s - _LOOK_BACK, s + _LOOK_AHEAD, 24)
+            return _View(center, float(np.mean(self._path.pose(stretch)[2])))
         if self._middle is None:
-            return View(center, self._angle)
+            return _View(center, self._angle)
         start = np.array([self._path.X[0], self._path.Y[0]])
-        along, _ = View(start, self._angle).see(center)
+        along, _ = _View(start, self._angle).see(center)
         c, s_ = np.cos(self._angle), np.sin(self._angle)
         ground = np.array([[c, s_], [-s_, c]])
-        return View(start + np.array([along, self._middle]) @ ground, self._angle)
+        return _View(start + np.array([along, self._middle]) @ ground, self._angle)
 
 
 # What covers what: the ground below, then ghosts, the car, its plan and its forces.
-BELOW, GHOST, CAR, ABOVE = 0.5, 2.0, 3.0, 4.0
+_BELOW, _GHOST, CAR, _ABOVE = 0.5, 2.0, 3.0, 4.0
 
 PLAN = "#333333"
 DROP: Mapping[str, Any] = {"color": "#AA4499", "linewidth": 1.6, "linestyle": (0, (3, 1.5))}
-HALF_ROAD = 4.0  # [m]
+_HALF_ROAD = 4.0  # [m]
 GRID = 5.0  # [m]
 SHOWN = 60.0  # of the path, to both sides of the car [m]
-FORCE_LENGTH = 4.0  # of the arrow that is as long as the static load of the axle [m]
+_FORCE_LENGTH = 4.0  # of the arrow that is as long as the static load of the axle [m]
 ARROW = np.array([(0.0, 0.1), (0.0, -0.1), (1.0, -0.1), (1.0, -0.42), (1.7, 0.0), (1.0, 0.42),
                   (1.0, 0.1)])  # fmt: skip
 SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
@@ -112,9 +112,9 @@ class Ground:
         self._plan_at = np.array([plan.period for plan in plans])
         self._plan_lines = [np.column_stack(plan.line(path)) for plan in plans]
         self._room = 1.1 * np.hypot(*(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
-        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, zorder=BELOW)
+        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, zorder=_BELOW)
         axes.add_collection(self._grid)
-        (self._line,) = axes.plot([], [], zorder=BELOW, **PATH)
+        (self._line,) = axes.plot([], [], zorder=_BELOW, **PATH)
         (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
         self._drops = [
             (_across(path, s), axes.plot([], [], label=friction_label(mu), **DROP)[0])
@@ -123,7 +123,7 @@ class Ground:
         self._tracks, self._bodies, self._wheels = [], [], []
         for number, label in enumerate(drives):
             color = tire_look(label)["color"]
-            order = CAR if number == 0 else GHOST - 0.1 * number
+            order = CAR if number == 0 else _GHOST - 0.1 * number
             (track,) = axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, zorder=order)
             body = PolyCollection(
                 [],
@@ -140,9 +140,9 @@ class Ground:
             self._bodies.append(body)
             self._wheels.append(wheels)
         (self._plan,) = axes.plot(
-            [], [], color=PLAN, linewidth=1.3, marker="o", markersize=2.2, zorder=ABOVE
+            [], [], color=PLAN, linewidth=1.3, marker="o", markersize=2.2, zorder=_ABOVE
         )
-        self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=ABOVE + 1)
+        self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=_ABOVE + 1)
         axes.add_collection(self._forces)
         self._names = ["path", "plan", *drives]
 
@@ -178,7 +178,7 @@ class Ground:
             self._plan.set_data(*view.see(self._plan_lines[kept]).T)
         self._forces.set_verts(self._arrows(drive, k, view))
 
-    def _car(self, number: int, t: float, view: View) -> None:
+    def _car(self, number: int, t: float, view: _View) -> None:
         drive = self._drives[number]
         k = sample_at(drive, t)
         places = np.column_stack([drive.X[: k + 1], drive.Y[: k + 1]])[-1200::4]
@@ -191,14 +191,14 @@ class Ground:
         self._bodies[number].set_verts(body)
         self._wheels[number].set_verts(list(view.see(shape.wheels)))
 
-    def _arrows(self, drive: Drive, k: int, view: View) -> list[Array]:
+    def _arrows(self, drive: Drive, k: int, view: _View) -> list[Array]:
         """Lateral axle forces as arrows from the axles, to the side to which they push."""
         car, psi = drive.vehicle, float(drive.psi[k])
         ahead, left = np.array([np.cos(psi), np.sin(psi)]), np.array([-np.sin(psi), np.cos(psi)])
         place = np.array([drive.X[k], drive.Y[k]])
         arrows = []
         for axle, x in enumerate((car.l_f, -car.l_r)):
-            length = FORCE_LENGTH * drive.axle_force[k, axle] / car.axle_loads[axle]
+            length = _FORCE_LENGTH * drive.axle_force[k, axle] / car.axle_loads[axle]
             if abs(length) < SMALLEST:
                 continue
             head = ARROW.copy()
@@ -208,7 +208,7 @@ class Ground:
             arrows.append(view.see(place + x * ahead + head[:, :1] * left + head[:, 1:] * ahead))
         return arrows
 
-    def _grid_lines(self, view: View) -> list[Array]:
+    def _grid_lines(self, view: _View) -> list[Array]:
         """Lines on the ground every few meters, so that one sees it pass."""
         reach = 0.5 * self._room + 10.0
         lines = []
@@ -225,7 +225,7 @@ class Ground:
 def _across(path: Path, s: float) -> Array:
     """Ends of a line across the path at a place, (2, 2) [m]."""
     X, Y, psi = (float(value) for value in path.pose(s))
-    sides = HALF_ROAD * np.array([[1.0], [-1.0]])
+    sides = _HALF_ROAD * np.array([[1.0], [-1.0]])
     ends: Array = np.array([X, Y]) + sides * np.array([-np.sin(psi), np.cos(psi)])
     return ends
 

@@ -41,7 +41,7 @@ STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steere
 LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "learnt by now"}
 
 
-class ForcePanel:
+class _ForcePanel:
     """Force of an axle over its slip: the curves as they were known then, and where the tire is.
 
     Parameters
@@ -140,7 +140,7 @@ class ForcePanel:
         return drawable(force[:, self._axle] / self._unit.newtons, self._limits)
 
 
-class DeviationPanel:
+class _DeviationPanel:
     """Deviation over arc length: faint as a whole, strong up to now.
 
     Parameters
@@ -177,7 +177,7 @@ class DeviationPanel:
             line.set_data(drive.s[part], drive.e_y[part])
 
 
-class Overview:
+class _Overview:
     """A closed course as a whole, and where the cars are.
 
     Parameters
@@ -219,7 +219,7 @@ def _small(axes: Axes) -> None:
 
 
 SIZE = (6.4, 4.0)  # [in]
-BEHIND, AHEAD = 12.0, 36.0  # what is shown along the path [m]
+BEHIND, _AHEAD = 12.0, 36.0  # what is shown along the path [m]
 
 
 class Scene:
@@ -252,18 +252,18 @@ class Scene:
             width, height = SIZE
             box = (0.0, 0.43, 1.0, 0.5)
             ground = self.figure.add_axes(box, xticks=[], yticks=[], frame_on=False)
-            half = 0.5 * (BEHIND + AHEAD) * box[3] * height / width
-            ground.set(xlim=(-BEHIND, AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
+            half = 0.5 * (BEHIND + _AHEAD) * box[3] * height / width
+            ground.set(xlim=(-BEHIND, _AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
             self._parts: list[Any] = [Ground(ground, drives, drops)]
             if path.closed:
-                self._parts.append(Overview(self._axes((0.86, 0.69, 0.135, 0.235)), drives))
+                self._parts.append(_Overview(self._axes((0.86, 0.69, 0.135, 0.235)), drives))
             left = self._axes((0.075, 0.11, 0.19, 0.2)), self._axes((0.3, 0.11, 0.19, 0.2))
             drop = drops[-1][0] if drops else np.inf
             for axle, axes in enumerate(left):
-                forces = ForcePanel(axes, first, curves, axle, known=known, drop=drop)
+                forces = _ForcePanel(axes, first, curves, axle, known=known, drop=drop)
                 self._parts.append(forces)
             (marks, names), (more, said) = self._parts[0].legend(), forces.legend()
-            self._parts.append(DeviationPanel(self._axes((0.585, 0.11, 0.39, 0.2)), drives, drops))
+            self._parts.append(_DeviationPanel(self._axes((0.585, 0.11, 0.39, 0.2)), drives, drops))
             self.figure.text(0.012, 0.955, mathtext(title), fontsize=9.0, fontweight="bold")
             self.figure.legend(
                 [*marks, *more],

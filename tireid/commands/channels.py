@@ -25,9 +25,9 @@ from tireid.commands.options import add_force, add_log_map, told_map
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
-MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
-CUT_BY_MAP = "refused but with --cut-holes, or by a map that says so, as --write makes it"
-NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
+_MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
+_CUT_BY_MAP = "refused but with --cut-holes, or by a map that says so, as --write makes it"
+_NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
 
@@ -67,10 +67,10 @@ def run(options: argparse.Namespace) -> int:
     missing = choice.missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
-    tell(channels_text(listed, seen, signals, proposal, frozenset(sure)))
-    empty = holes_text(seen, signals)
+    tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)))
+    empty = _holes_text(seen, signals)
     if empty:
-        cut = "cut out, as given" if told.holes == CUT else CUT_BY_MAP
+        cut = "cut out, as given" if told.holes == CUT else _CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
         told = replace(told, holes=CUT)
     aside = [] if "v_y" in missing else choice.aside_signals(signals, proposal)
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
     if options.write is not None:
         behind = [*missing, *aside]
         text = of_wheels.toml(options.write.parent)
-        text += unsure_toml(behind, proposal) + ("" if rolls else NO_RADIUS)
+        text += _unsure_toml(behind, proposal) + ("" if rolls else _NO_RADIUS)
         write_atomically(options.write, text)
         say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(behind)))
     return DONE if rolls and not missing else FAILS
@@ -138,13 +138,13 @@ def _seen(
 ) -> dict[str, Channel]:
     """Return the channels whose ranges are told, by name."""
     names = [one.name for one in listed]
-    if sum(one.samples for one in listed) > MOST_NUMBERS:
+    if sum(one.samples for one in listed) > _MOST_NUMBERS:
         likely = {channel for signal in signals.values() for channel in signal.channel}
         names = [name for name in names if name in likely]
     return dict(zip(names, log.read(names, run), strict=True)) if names else {}
 
 
-def channels_text(
+def _channels_text(
     listed: Sequence[Listed],
     seen: Mapping[str, Channel],
     signals: Mapping[str, Signal],
@@ -197,7 +197,7 @@ def _meaning(
     return ""
 
 
-def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
+def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
     """Return which signals have cells without a value; nothing where none has."""
     said = []
     for name, signal in signals.items():
@@ -239,7 +239,7 @@ def missing_text(
     return "\n".join([*lines, f"tell it: tireid channels {log} --columns {' '.join(words)}"])
 
 
-def unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:
+def _unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:
     """Return the tables of what is missing as comments, to be completed."""
     blocks = []
     for name in (one for lack in missing for one in choice.stand_ins(lack, proposal) or [lack]):

@@ -73,7 +73,7 @@ def draw_check(
     history = identify(recording, vehicle, design)
     figures = (
         locus_figure(loop, integrator=design.integrator, dt=design.dt),
-        error_figure(history, error_bounds(certificate)),
+        error_figure(history, _error_bounds(certificate)),
     )
     paths = [folder / name for name in FIGURES]
     for path, figure in zip(paths, figures, strict=True):
@@ -81,7 +81,7 @@ def draw_check(
     return paths
 
 
-def error_bounds(certificate: Certificate) -> dict[str, float]:
+def _error_bounds(certificate: Certificate) -> dict[str, float]:
     """Return the bounds of the error norm that a certificate holds, by the name in a legend [U
     s].
     """
@@ -99,8 +99,8 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_r": "noise_r",
     "noise_delta": "noise_delta",
 }
-OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-OF_GAINS = tuple(option for field, option in CONDITIONS.items() if field not in OF_ALL)
+_OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
+_OF_GAINS = tuple(option for field, option in CONDITIONS.items() if field not in _OF_ALL)
 TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
@@ -168,7 +168,7 @@ def run(options: argparse.Namespace) -> int:
     text = method_text(name, certificate, vehicle, driving)
     numbers = {
         "method": name,
-        "conditions": {field: getattr(driving, field) for field in OF_ALL},
+        "conditions": {field: getattr(driving, field) for field in _OF_ALL},
         **certificate.to_dict(),
         "vehicle": vehicle_numbers(vehicle),
     }
@@ -213,7 +213,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
 
 
 def _refuse_gains(options: argparse.Namespace, name: str) -> None:
-    for option in OF_GAINS:
+    for option in _OF_GAINS:
         if getattr(options, option) is not None:
             raise ValueError(
                 f"--{option.replace('_', '-')} asks about the gains of the paper's laws, which "

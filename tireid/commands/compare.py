@@ -24,7 +24,7 @@ from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.reports.compare import write_compare_report
 from tireid.verdicts import verdicts_text
 
-FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
+_FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
 def add_parser(commands: Any) -> None:
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
             left_out=left_out,
         )
         work.begin("step times, tables and figures")
-        verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}
+        verdicts = _default_verdicts(recordings, vehicle) if DEFAULT in names else {}
         figures = results.write_comparison(folder, comparison, verdicts)
         rows = results.summary_rows(comparison)
         write_compare_report(
@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
             command=options.words,
         )
         told = [results.summary_table(comparison)]
-        if len(comparison.names) ** 2 <= FEW_PAIRS:
+        if len(comparison.names) ** 2 <= _FEW_PAIRS:
             told.append(results.pair_tables(comparison))
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
@@ -115,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
 
 
-def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
+def _default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
     """Return the verdict on what the default learns on each recording, by its name."""
     return {one.name: identify(one, vehicle, check=False).verdict for one in recordings}
 

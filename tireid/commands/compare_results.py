@@ -52,7 +52,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
 
 SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
 NOT_TOLD = "-"
-NOT_SHOWN = "shown no v_y; they tell it, and side slip is judged by the recorded one"
+_NOT_SHOWN = "shown no v_y; they tell it, and side slip is judged by the recorded one"
 
 
 def _slip_cells(trial: Trial) -> list[str]:
@@ -82,7 +82,7 @@ def remarks(comparison: Comparison) -> list[str]:
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             told.setdefault(method.remark, []).append(name)
             if not method.needs_v_y:
-                told.setdefault(NOT_SHOWN, []).append(name)
+                told.setdefault(_NOT_SHOWN, []).append(name)
     for name, why in comparison.left_out.items():
         told.setdefault(why, []).append(name)
     return [f"{', '.join(names)}: {remark}" for remark, names in told.items() if remark]
@@ -98,13 +98,13 @@ def pair_tables(comparison: Comparison) -> str:
                 frozen = comparison.trials[name].frozen
                 if frozen is not None:
                     error = frozen.get(learnt, {}).get(replayed)
-                    cell = "diverged" if error is None else cell_text(comparison, replayed, error)
+                    cell = "diverged" if error is None else _cell_text(comparison, replayed, error)
                     lines.append([name, cell])
             blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
     return "\n".join(blocks)
 
 
-def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
+def _cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
     """Return an error as percent of the rms force and in newtons, front / rear.
 
     error : over it [N].
@@ -112,7 +112,7 @@ def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
     return _mean(comparison, [(name, error)])
 
 
-def newton_text(value: float) -> str:
+def _newton_text(value: float) -> str:
     """Return a force with three digits, more where it is above 1000 N.
 
     value : [N].
@@ -139,7 +139,7 @@ def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
         [(e.front / sizes[name].front, e.rear / sizes[name].rear) for name, e in pairs], axis=0
     )
     front, rear = (
-        f"{100.0 * p:.1f} ({newton_text(n)})" for p, n in zip(parts, newtons, strict=True)
+        f"{100.0 * p:.1f} ({_newton_text(n)})" for p, n in zip(parts, newtons, strict=True)
     )
     return f"{front} / {rear}"
 
@@ -158,7 +158,7 @@ def write_comparison(
 
     verdicts : on what the default learns, by recording.
     """
-    numbers = comparison_numbers(comparison)
+    numbers = _comparison_numbers(comparison)
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
     write_file(folder / "tables.txt", summary_table(comparison) + pair_tables(comparison))
@@ -173,7 +173,7 @@ def write_comparison(
     return save_figures(folder, figures)
 
 
-def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
+def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
     """Return what compare.json holds."""
     course = comparison.course
     return {

@@ -51,7 +51,7 @@ REFERENCE = (
 )
 
 
-def demo_report(
+def _demo_report(
     story: Story,
     verdict: Verdict,
     shipped: demo_parts.Shipped,
@@ -65,7 +65,7 @@ def demo_report(
     learnt = story.axle.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
     return page.Report(
-        title=TITLE,
+        title=_TITLE,
         summary=SUMMARY,
         numbers=[
             verdict_headline(verdict),
@@ -275,17 +275,23 @@ def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[p
     ]
 
 
-TITLE = "tireid: lateral tire forces, learnt while driving"
+_TITLE = "tireid: lateral tire forces, learnt while driving"
 SUMMARY = (
     "A car drives, its tire forces are learnt from speed, lateral velocity, yaw rate and steering, "
     "the weights are frozen, and the frozen model steers the car and predicts drives that it has "
     "not seen."
 )
 SEEDS = 20
-LEARNING, EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
-TESTING, DRIVING = "the frozen-weight test of the paper", "driving on what was learnt"
-REPORTING = "writing the report"
-PARTS = {LEARNING: 15.0, EXPORTING: 20.0, TESTING: 20.0, DRIVING: 40.0, REPORTING: 2.0}  # about s
+LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
+_TESTING, DRIVING = "the frozen-weight test of the paper", "driving on what was learnt"
+_REPORTING = "writing the report"
+PARTS = {
+    LEARNING: 15.0,
+    _EXPORTING: 20.0,
+    _TESTING: 20.0,
+    DRIVING: 40.0,
+    _REPORTING: 2.0,
+}  # about s
 
 
 def add_parser(commands: Any) -> None:
@@ -328,14 +334,14 @@ def run(options: argparse.Namespace) -> None:
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
-        work.begin(EXPORTING)
+        work.begin(_EXPORTING)
         shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
-        study = run_study(SEEDS, partial(work.begin(TESTING).step, STEPS))
+        study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))
         figures["paper"] = write_study(folders["paper"], study)
         work.begin(DRIVING)
         driven = demo_parts.drive_story(story, folder)
-        work.begin(REPORTING)
-        report = demo_report(
+        work.begin(_REPORTING)
+        report = _demo_report(
             story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
         )
         page.write_report(folder / REPORT, report)

@@ -25,10 +25,10 @@ from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
 from tireid.reports.drive import SCORES, known_blocks, score_rows
 
-LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
+LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 FILM = FORMATS[0]
 DELAY = 2  # periods of 10 ms
-SOURCE = "frozen ones learnt on the slalom"
+_SOURCE = "frozen ones learnt on the slalom"
 NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
 
 
@@ -50,7 +50,7 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
     slippery = _setup(story, "slalom", 0.57, ((110.0, 0.5),))
     return {
         LANE_CHANGE: _drive(story, lane_change, (FROZEN, LINEAR, ORACLE), folder / LANE_CHANGE),
-        SLIPPERY: _drive(story, slippery, (LEARNING, FROZEN, LINEAR), folder / SLIPPERY),
+        _SLIPPERY: _drive(story, slippery, (LEARNING, FROZEN, LINEAR), folder / _SLIPPERY),
     }
 
 
@@ -64,7 +64,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
     heading = "The car drives on what it learnt"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
-    lane, slippery = driven[LANE_CHANGE], driven[SLIPPERY]
+    lane, slippery = driven[LANE_CHANGE], driven[_SLIPPERY]
     blocks: list[Block] = [
         Paragraph(
             text="A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
@@ -75,7 +75,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
             "others keep the tires that were frozen before, or the linear ones."
         ),
         Picture(
-            image=folder / SLIPPERY / f"drive.{FILM}",
+            image=folder / _SLIPPERY / f"drive.{FILM}",
             caption="The drive of the learning car; outlines are the others.",
             read=READ["film"],
         ),
@@ -103,7 +103,7 @@ def _scores(one: Driven) -> Table:
 def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
     said = {
         LANE_CHANGE: "in the lane change at 90 % of the grip",
-        SLIPPERY: "where friction drops to half",
+        _SLIPPERY: "where friction drops to half",
     }
     return [
         Headline(
@@ -129,7 +129,7 @@ def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> D
         folder,
         runs,
         known_curves(runs, setup, learnt),
-        inputs=inputs_of(conditions, labels, SOURCE, learnt),
+        inputs=inputs_of(conditions, labels, _SOURCE, learnt),
         drops=setup.drops,
         film=FILM,
     )

@@ -98,8 +98,8 @@ def _chassis(vehicle: Vehicle) -> dict[str, Any]:
     return {**asdict(chassis), "tire": tire}
 
 
-NOT_COMPLETED = 1
-EPILOG = (
+_NOT_COMPLETED = 1
+_EPILOG = (
     "Without --weights or --network, frozen tires are learnt first: the same car drives on an "
     f"open field for {DURATION:g} s, steered at random and ever harder until it slides, and what "
     "the identifier knows at the end steers. linear is the tire of the vehicle file, oracle the "
@@ -116,7 +116,7 @@ def add_parser(commands: Any) -> None:
         description="Learn the tires on one drive, freeze them, and let a model predictive tracker "
         "that is told of them steer the car along a path; write report.html, summary.json, "
         "every signal as CSV, figures and a film.",
-        epilog=EPILOG,
+        epilog=_EPILOG,
     )
     parser.add_argument(
         "--path",
@@ -249,4 +249,4 @@ def run(options: argparse.Namespace) -> int:
         told = f"{headline(conditions)}\ntires: {source}\n{drive_lines(runs)}"
     tell(told)
     say(f"wrote {options.out}/")
-    return 0 if runs[0].scores.completed else NOT_COMPLETED
+    return 0 if runs[0].scores.completed else _NOT_COMPLETED

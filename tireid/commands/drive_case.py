@@ -98,7 +98,7 @@ def parse_fault(text: str, kind: str = runs.FULL) -> SensorFault:
 
 
 ALL = "all"
-LONGEST_DELAY = 100.0  # ms
+_LONGEST_DELAY = 100.0  # ms
 
 
 def labels_of(words: Sequence[str]) -> list[str]:
@@ -113,7 +113,7 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     require_within(ValueError, *runs.WEAVES, **{"--dither in m": options.dither})
     require_within(ValueError, *FRICTIONS, **{"--mu": options.mu})
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
-    path = named_path(options.path)
+    path = _named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
     _require_one_source(options)
@@ -141,9 +141,9 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
 
 def _periods(delay: float) -> int:
     periods = delay / (1e3 * PERIOD)
-    if not (0.0 <= delay <= LONGEST_DELAY and abs(periods - round(periods)) < 1e-9):
+    if not (0.0 <= delay <= _LONGEST_DELAY and abs(periods - round(periods)) < 1e-9):
         raise ValueError(
-            f"--delay must be 0 to {LONGEST_DELAY:g} ms in steps of {1e3 * PERIOD:g} ms, it is "
+            f"--delay must be 0 to {_LONGEST_DELAY:g} ms in steps of {1e3 * PERIOD:g} ms, it is "
             f"{delay:g}"
         )
     return round(periods)
@@ -159,7 +159,7 @@ def _require_one_source(options: argparse.Namespace) -> None:
         raise ValueError(f"give only one of {', '.join('--' + name for name in given)}")
 
 
-def named_path(name: str) -> Path:
+def _named_path(name: str) -> Path:
     """Return a built-in path, or one from way-points in a file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()

@@ -51,10 +51,10 @@ def write_drives(
     drops : arc length [m] and friction from there on.   film : webp, gif, mp4 or none.
     """
     first = runs[0]
-    write_json(folder / "summary.json", summarize_drives(runs, inputs))
+    write_json(folder / "summary.json", _summarize_drives(runs, inputs))
     for run in runs:
         name = "drive.csv" if run is first else f"drive_{run.label}.csv"
-        write_csv(folder / name, drive_columns(run.drive))
+        write_csv(folder / name, _drive_columns(run.drive))
     say("drawing figures")
     drives = {run.label: run.drive for run in runs}
     limits = first.problem.limits
@@ -87,7 +87,7 @@ def write_drives(
     return figures
 
 
-def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
+def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return what summary.json holds: scores of the first drive and of each, and what went in."""
     by_label = {run.label: _scores(run) for run in runs}
     return {
@@ -107,7 +107,7 @@ def _scores(run: Run) -> dict[str, Any]:
     return {**run.scores.to_dict(), **lateral, "ending": run.drive.ending, "notes": notes}
 
 
-COLUMNS_TOLD = {
+_COLUMNS_TOLD = {
     "v_y": "v_y_told_m_s",
     "v_y_sd": "v_y_told_sd_m_s",
     "observable": "side_slip_observable",
@@ -130,7 +130,7 @@ SIGNALS = (
 )
 
 
-def drive_columns(drive: Drive) -> dict[str, Array]:
+def _drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
     slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
     return {
@@ -140,7 +140,7 @@ def drive_columns(drive: Drive) -> dict[str, Array]:
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
         **{f"{name}_measured_{UNITS[name]}": values for name, values in measured if name != "t"},
-        **{COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
+        **{_COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
     }
 
 
@@ -165,13 +165,13 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
 def drive_lines(runs: Sequence[Run]) -> str:
     """Return the scores of drives as lines of text."""
     lines = [text_table([SCORES, *score_rows(runs)], "<>><>>")]
-    lines += [f"{run.label}: {told_words(run)}" for run in runs if run.drive.told]
+    lines += [f"{run.label}: {_told_words(run)}" for run in runs if run.drive.told]
     for run in runs:
         lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
     return "\n".join(lines)
 
 
-def told_words(run: Run) -> str:
+def _told_words(run: Run) -> str:
     """Return how right the v_y was that was told, in one line."""
     told = told_scores(run.drive)
     assert told is not None

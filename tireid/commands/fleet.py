@@ -23,7 +23,7 @@ from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.verdicts import warn_of_stored
 
 SHOWN = 5  # logs with errors that are named
-SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
+_SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
 
 
 def add_parser(commands: Any) -> None:
@@ -279,7 +279,7 @@ def _learn(options: argparse.Namespace) -> int:
             tasks, telling, store, spread, again=options.again, replacing=options.replace, done=done
         )
     wanted = {task.log for task in tasks} | {name for _, name in became.copies}
-    rows = [row for row in store.stream(SUMMED) if row.log in wanted]
+    rows = [row for row in store.stream(_SUMMED) if row.log in wanted]
     errors = [row for row in rows if row.error]
     for row in errors[:SHOWN]:
         say(f"{row.name}: {row.error}")

@@ -37,8 +37,8 @@ from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import asked_text, verdict_text, warn_of_stored
 
-LEARNING, JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
-OWN_PAST = "  its past, against online"
+LEARNING, _JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
+_OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
@@ -153,7 +153,7 @@ def run(options: argparse.Namespace) -> int:
     if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
-    parts = {LEARNING: 1.0 + count, JUDGING: count, DRAWING: 2.0 + 3.0 * count}
+    parts = {LEARNING: 1.0 + count, _JUDGING: count, DRAWING: 2.0 + 3.0 * count}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("identify", parts) as progress,
@@ -169,7 +169,7 @@ def run(options: argparse.Namespace) -> int:
                 identify(one, vehicle, design, start=start, check=False, progress=share).history
             )
             say(f"learnt {law} over {one.name}")
-        progress.begin(JUDGING)
+        progress.begin(_JUDGING)
         if network is not None:
             verdict = judge_prediction(network, histories[0].recording)
             verdict = with_doctor(verdict, diagnosis, repair)
@@ -340,6 +340,6 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
             sides = result.reproduction
             if sides is not None and sides.past_against_online is not None:
                 rows.append(
-                    ["", OWN_PAST, *results.error_cells(sides.past_against_online, sizes[name])]
+                    ["", _OWN_PAST, *results.error_cells(sides.past_against_online, sizes[name])]
                 )
     return text_table(rows, "><>>")

@@ -46,7 +46,7 @@ def _told(error: AxleRmse | None) -> dict[str, float] | None:
     return None if error is None else asdict(error)
 
 
-def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | None:
+def _certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | None:
     """Return the verdict on a method, and which bounds hold of it whatever is measured.
 
     None of a method that learns from whole logs: nothing learns in a car.
@@ -95,7 +95,7 @@ def summarize(
         },
         "law": law,
         **learnt.design.numbers(),
-        "certificate": certificate_numbers(learnt.design, learnt.vehicle),
+        "certificate": _certificate_numbers(learnt.design, learnt.vehicle),
         "vehicle": vehicle_numbers(learnt.vehicle),
         "diverged_at_s": learnt.diverged_at,
         "version": __version__,
@@ -133,7 +133,7 @@ def guaranteed_text(model: TireModel) -> str:
 
 Frozen = Mapping[float, Mapping[str, Replay]]
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
-WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
+_WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 TOLD = {  # columns of forces.csv by the outputs of methods that estimate v_y
     "v_y_told_m_s": "v_y",
     "v_y_sd_m_s": "v_y_sd",
@@ -173,7 +173,7 @@ def write_results(
         model = learnt.freeze(t) if last else tire
         judged = verdict if t == max(frozen) else None
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
-        columns = curve_columns(model, [run.recording for run in (learnt, *others)])
+        columns = _curve_columns(model, [run.recording for run in (learnt, *others)])
         write_csv(folder / f"curve{last}.csv", columns)
     tracks = drawn_tracks(learnt)
     told = progress or Progress("curves")
@@ -227,8 +227,8 @@ def _write_curves(
             for t, by_name in frozen.items()
         }
         name = "forces" if history is learnt else f"forces_{file_name(history.recording)}"
-        told = progress.within(WRITING * k / count, WRITING * (k + 1) / count)
-        write_forces(folder / f"{name}.{curves}", history, replays, told)
+        told = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
+        _write_forces(folder / f"{name}.{curves}", history, replays, told)
     if OBSERVED in learnt.outputs:
         found = learnt.blocks()
         write_table(folder / f"errors.{curves}", (_error_columns(learnt, one) for one in found))
@@ -265,7 +265,7 @@ def _weight_columns(learnt: History, block: Block) -> dict[str, Array]:
     return weights
 
 
-def write_forces(
+def _write_forces(
     path: Path,
     history: History,
     replays: Mapping[str, Replay],
@@ -315,11 +315,11 @@ def _force_columns(
     return columns
 
 
-CURVE_POINTS = 201
-FARTHER = 1.25  # than the slip that was driven, or is known
+_CURVE_POINTS = 201
+_FARTHER = 1.25  # than the slip that was driven, or is known
 
 
-def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
+def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
     """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
@@ -328,8 +328,8 @@ def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str
             moving = recording.v_x[part] >= model.min_speed
             slip = np.abs(recording.alpha(car.l_f, car.l_r, part)[moving])
             reach.append(float(slip.max(initial=0.0)))
-    end = min(FARTHER * max(reach) or 0.1, 0.5)
-    slip = np.linspace(-end, end, CURVE_POINTS)
+    end = min(_FARTHER * max(reach) or 0.1, 0.5)
+    slip = np.linspace(-end, end, _CURVE_POINTS)
     force = model.force(slip)
     columns = {"slip_rad": slip, **axle_columns("Fy{}_N", force)}
     if known is not None:
@@ -400,7 +400,7 @@ def write_network_results(
     summary = summarize(law, histories, {NETWORK: replays}, verdict, asked)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json", valid=verdict.valid)
-    columns = curve_columns(model, [history.recording for history in histories])
+    columns = _curve_columns(model, [history.recording for history in histories])
     write_csv(folder / "curve.csv", columns)
     say("drawing figures")
     figures: dict[str, Figure] = {}
@@ -408,7 +408,7 @@ def write_network_results(
         recording = history.recording
         name, own = file_name(recording), replays[recording.name]
         last = "" if history is histories[0] else f"_{name}"
-        write_forces(folder / f"forces{last}.{curves}", history, {NETWORK: own})
+        _write_forces(folder / f"forces{last}.{curves}", history, {NETWORK: own})
         figures[f"slip{last}"] = slip_figure(model, recording, _beside(history))
         figures[f"replay_{name}"] = prediction_figure(own, _beside(history))
     figures["inputs"] = inputs_figure(histories[0].recording)

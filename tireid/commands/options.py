@@ -273,7 +273,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 def told_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
-    told = with_columns(map_of(_map_path(options)), column_words(options.columns))
+    told = with_columns(map_of(_map_path(options)), _column_words(options.columns))
     if options.cut_holes:
         told = replace(told, holes=CUT)
     if options.mend_clock:
@@ -308,7 +308,7 @@ def read_log(
     return recording
 
 
-def column_words(pairs: Sequence[str]) -> dict[str, str]:
+def _column_words(pairs: Sequence[str]) -> dict[str, str]:
     """Return what is told of columns by the name that they are read as."""
     columns = {}
     for pair in pairs:
@@ -321,7 +321,7 @@ def column_words(pairs: Sequence[str]) -> dict[str, str]:
     return columns
 
 
-CONVENTIONS = (
+_CONVENTIONS = (
     "A network of --network is static: its outputs are the lateral forces F_yf, F_yr of both tires "
     "of an axle [N], left positive, frame of the body; its inputs are slip angles alpha_f, alpha_r "
     "[rad] in the sign in which F_y = +C alpha, alpha = delta - (v_y +- l r)/v_x, or v_x, v_y "
@@ -333,7 +333,7 @@ CONVENTIONS = (
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option and what belongs to it."""
-    group = parser.add_argument_group("a tire network of your own", CONVENTIONS)
+    group = parser.add_argument_group("a tire network of your own", _CONVENTIONS)
     group.add_argument("--network", type=Path, metavar="FILE.onnx", help=what)
     group.add_argument(
         "--network-inputs",

@@ -163,7 +163,7 @@ FIGURES = {  # number of the paper's figure, by maneuver and law
 }
 
 
-def study_text(study: paper_study.Study) -> str:
+def _study_text(study: paper_study.Study) -> str:
     """Return the tables, every gain, and the verdict of each law's certificate as lines of text."""
     tables = [table_text(maneuver, study) for maneuver in study.errors]
     return "\n".join([*tables, settings(paper_study.GAINS, paper_study.NETWORK), *verdicts()])
@@ -182,7 +182,7 @@ def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
     """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures."""
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
-    write_file(folder / "tables.txt", study_text(study) + "\n")
+    write_file(folder / "tables.txt", _study_text(study) + "\n")
     say("drawing figures")
     figures = {SCHEME: scheme_figure()}
     for maneuver in study.errors:
@@ -228,7 +228,7 @@ def _compared(maneuver: str) -> dict[str, str]:
     return labels
 
 
-STUDY, DRAWING = "the study", "figures"
+_STUDY, DRAWING = "the study", "figures"
 
 
 def add_parser(commands: Any) -> None:
@@ -247,16 +247,16 @@ def run(options: argparse.Namespace) -> None:
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
-    parts = {STUDY: float(options.seeds), DRAWING: 10.0}
+    parts = {_STUDY: float(options.seeds), DRAWING: 10.0}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("paper", parts, long=True) as progress,
     ):
         study = paper_study.run_study(
-            options.seeds, partial(progress.begin(STUDY).step, paper_study.STEPS)
+            options.seeds, partial(progress.begin(_STUDY).step, paper_study.STEPS)
         )
         progress.begin(DRAWING)
         write_study(folder, study)
-        told = study_text(study)
+        told = _study_text(study)
     tell(told)
     say(f"wrote {options.out}/")

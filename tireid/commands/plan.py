@@ -150,7 +150,7 @@ def run(options: argparse.Namespace) -> int:
             )
         driven = planning.rehearsals(found)
         inputs = inputs_of(options, vehicle, area, speed)
-        write_plan(folder, found, inputs, ratio)
+        _write_plan(folder, found, inputs, ratio)
         figures = {
             "area": plan_area_figure(found),
             "steering": plan_steering_figure(found, ratio),
@@ -235,7 +235,7 @@ def inputs_of(
     }
 
 
-def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
+def _steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """Return the columns of steering.csv: pass by pass from its entry on, with the course.
 
     ratio : hand wheel over front wheels; None tells no hand wheel.
@@ -254,7 +254,7 @@ def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     return columns
 
 
-def path_columns(found: Plan, k: int) -> dict[str, Array]:
+def _path_columns(found: Plan, k: int) -> dict[str, Array]:
     """Return way-points of a pass for `tireid drive --path`, with its straight run-up.
 
     k : which pass, from 0.
@@ -268,12 +268,12 @@ def path_columns(found: Plan, k: int) -> dict[str, Array]:
     return {"X_m": np.append(before[0], X), "Y_m": np.append(before[1], Y)}
 
 
-def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
+def _write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
     """Write steering.csv, a path for each pass and summary.json."""
-    write_csv(folder / "steering.csv", steering_columns(found, ratio))
+    write_csv(folder / "steering.csv", _steering_columns(found, ratio))
     for k in range(len(found.passes)):
         name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
-        write_csv(folder / name, path_columns(found, k))
+        write_csv(folder / name, _path_columns(found, k))
     write_json(folder / "summary.json", summary(found, inputs))
 
 

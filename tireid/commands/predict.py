@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
             columns |= {"another": friction.another, "unexplained": friction.unexplained}
             output.write_csv(folder / "friction.csv", columns)
         output.write_json(folder / "summary.json", summary(model, prediction, verdict, half))
-        lines = prediction_text(model, prediction, half, friction)
+        lines = _prediction_text(model, prediction, half, friction)
         say("drawing figures")
         figures = draw(folder, prediction, verdict)
         write_predict_report(
@@ -213,7 +213,7 @@ def error_table(prediction: Prediction) -> str:
     )
 
 
-def prediction_text(
+def _prediction_text(
     model: TireModel, prediction: Prediction, half: Array | None, friction: RoadFriction | None
 ) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
@@ -251,7 +251,7 @@ def prediction_text(
         )
     against = contradictions(model, prediction.recording)
     if against is not None:
-        lines.append(contradiction_line(*against))
+        lines.append(_contradiction_line(*against))
     if model.has_band and not model.band_calibrated:
         lines.append(f"friction: cannot be told, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
@@ -263,7 +263,7 @@ def prediction_text(
     return "\n".join(lines)
 
 
-def contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
+def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
     """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
         return "no moment of the drive contradicts the forces that are guaranteed"

@@ -34,7 +34,7 @@ def method_label(name: str) -> str:
     return mathtext(name.replace("_", " "))
 
 
-def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
+def _percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from low to high, at most to FARTHEST, with ticks in percent.
 
     low : smallest value shown [%].   high : largest value shown [%].
@@ -69,13 +69,13 @@ ROW = 0.3  # height of a method [in]
 @style.styled
 def methods_figure(comparison: Comparison) -> Figure:
     """Draw a row for each method: means over recordings, lines from the best to the worst."""
-    rows = {method_label(name): method_errors(comparison, name) for name in ranking(comparison)}
+    rows = {method_label(name): _method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
     figure = style.new_figure(style.PAGE, 0.9 + ROW * len(rows))
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
-    percent_axis(axes, "x", min(finite, default=1.0), max(finite, default=100.0))
+    _percent_axis(axes, "x", min(finite, default=1.0), max(finite, default=100.0))
     for position, (label, errors) in enumerate(rows.items()):
         _draw_row(axes, position, errors)
         if label in lost:
@@ -98,7 +98,7 @@ def methods_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
+def _method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     """Return by kind all errors of a method that did not diverge [%]."""
     trial, course = comparison.trials[name], comparison.course
     sane = {rec: error for rec, error in trial.online.items() if rec not in trial.diverged_at}
@@ -137,7 +137,7 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
 BEST, WORST = 1.0, 100.0  # [%], ends of the color scale
 # Learnt on one recording, replayed on another: a map of errors for each method.
 
-DARK = 0.55  # share of the color scale from which text is white
+_DARK = 0.55  # share of the color scale from which text is white
 LONGEST = 17  # letters of a recording's name beside a map
 
 
@@ -187,7 +187,7 @@ def _draw_map(
     shown = np.clip(np.nan_to_num(shares, nan=WORST), BEST, WORST)
     axes.imshow(shown, norm=norm, cmap=colors, aspect="auto")
     for (i, j), share in np.ndenumerate(shares):
-        dark = norm(shown[i, j]) > DARK
+        dark = norm(shown[i, j]) > _DARK
         text = f"{share:.1f}" if share < 10.0 else f"{share:.0f}" if share < 1e3 else ">999"
         text = "div." if np.isnan(share) else text
         axes.text(j, i, text, ha="center", va="center", color="white" if dark else "black")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mpc.loop.record import Drive
     from mpc.path import Path
 
-BINS = 60
+_BINS = 60
 WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
 MILLI = 1e3
 
@@ -32,7 +32,9 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     left, right = figure.subplots(1, 2)
     wide = largest > WIDE * median
     low = float(times.min()) / 1.1 if wide else 0.0
-    bins = np.geomspace(low, 1.1 * largest, BINS) if wide else np.linspace(low, 1.1 * largest, BINS)
+    bins = (
+        np.geomspace(low, 1.1 * largest, _BINS) if wide else np.linspace(low, 1.1 * largest, _BINS)
+    )
     left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
     left.set(xlabel="solve time [ms]", ylabel="steps [-]", xlim=(low, 1.1 * largest))
     right.plot(
@@ -108,7 +110,7 @@ def tire_look(label: str) -> dict[str, Any]:
     return look | {"linestyle": LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
 
-REPLANNED, NOTICED = "plans with another tire or grip", "sensor fault noticed"
+_REPLANNED, _NOTICED = "plans with another tire or grip", "sensor fault noticed"
 ARC = "arc length of the path [m]"
 
 
@@ -154,9 +156,11 @@ def drive_errors_figure(
     last = max(float(drive.s[-1]) for drive in drives.values())
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
     for axes in panels:
-        mark_faults(axes, drives, faults)
+        _mark_faults(axes, drives, faults)
     figure.align_ylabels(panels)
-    style.legend_above(figure, order=(*drives, REPLANNED, *(friction_label(mu) for _, mu in drops)))
+    style.legend_above(
+        figure, order=(*drives, _REPLANNED, *(friction_label(mu) for _, mu in drops))
+    )
     return figure
 
 
@@ -171,7 +175,7 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
         )
 
 
-def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[SensorFault]) -> None:
+def _mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[SensorFault]) -> None:
     """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors."""
     from mpc.handover.rules import Verdict
 
@@ -195,7 +199,7 @@ def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[Sens
                     color=tire_look(label)["color"],
                     linewidth=1.2,
                     linestyle=(0, (1, 1)),
-                    label=NOTICED,
+                    label=_NOTICED,
                 )
 
 
@@ -222,7 +226,7 @@ def _mark_notes(axes: Axes, drive: "Drive", color: str) -> None:
             markeredgewidth=0.9,
             color=color,
             zorder=3.0,
-            label=REPLANNED,
+            label=_REPLANNED,
         )
 
 
@@ -277,7 +281,7 @@ def drive_steering_figure(
         axes.set_ylabel(label)
         _limits(axes, float(np.rad2deg(limit)))
         mark_drops(axes, drops)
-        mark_faults(axes, drives, faults)
+        _mark_faults(axes, drives, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
     style.legend_above(figure, order=tuple(drives))
@@ -291,20 +295,20 @@ def _limits(axes: Axes, limit: float) -> None:
             axes.axhline(side, color="#AA4499", linewidth=0.8, linestyle=(0, (4, 2)), label="limit")
 
 
-FRONT_OVERHANG, REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axles
+_FRONT_OVERHANG, _REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axles
 # The car from above as polygons: a body and four wheels, the front ones steered.
 #
 # Pictures need a length, a width and wheels; a vehicle without a chassis gets those that are usual
 # for its wheelbase.
 
 TRACK = 0.57  # of the wheelbase, where no chassis says
-BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
-WHEEL_LENGTH, WHEEL_WIDTH = 0.24, 0.085  # of the wheelbase
+_BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
+_WHEEL_LENGTH, _WHEEL_WIDTH = 0.24, 0.085  # of the wheelbase
 CORNERS = 6  # points of each rounded corner
 ROUNDING = 0.28  # radius of the body's corners, of its width
 
 
-class CarShape(NamedTuple):
+class _CarShape(NamedTuple):
     """Polygons in the ground's frame [m]: body (k, 2), glass (4, 2) and wheels (4, 4, 2)."""
 
     body: Array
@@ -312,7 +316,7 @@ class CarShape(NamedTuple):
     wheels: Array
 
 
-def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0.0) -> CarShape:
+def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0.0) -> _CarShape:
     """Return a car at a pose; wheels in the order front left, front right, rear left, rear right.
 
     X, Y : center of gravity [m].   psi : heading [rad].
@@ -321,8 +325,8 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     long = vehicle.wheelbase
     chassis = vehicle.chassis
     tracks = (TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
-    half = 0.5 * (max(tracks) + BODY_BESIDE_TRACK * long)
-    front, rear = vehicle.l_f + FRONT_OVERHANG * long, -vehicle.l_r - REAR_OVERHANG * long
+    half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
+    front, rear = vehicle.l_f + _FRONT_OVERHANG * long, -vehicle.l_r - _REAR_OVERHANG * long
     body = _rounded(rear, front, half, 2.0 * half * ROUNDING)
     glass = np.array([(0.32, 0.6), (0.18, 0.78), (0.18, -0.78), (0.32, -0.6)]) * (long, half) + (
         0.05 * long,
@@ -336,12 +340,12 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
         ]
     )
     turn, place = _turn(psi).T, np.array([X, Y])
-    return CarShape(body @ turn + place, glass @ turn + place, wheels @ turn + place)
+    return _CarShape(body @ turn + place, glass @ turn + place, wheels @ turn + place)
 
 
 def _wheel(wheelbase: float) -> Array:
     corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
-    return 0.5 * wheelbase * corners * (WHEEL_LENGTH, WHEEL_WIDTH)
+    return 0.5 * wheelbase * corners * (_WHEEL_LENGTH, _WHEEL_WIDTH)
 
 
 def _turn(angle: float) -> Array:
@@ -360,17 +364,17 @@ def _rounded(rear: float, front: float, half: float, radius: float) -> Array:
     return np.concatenate(points)
 
 
-ROW_LENGTH = 80.0  # a long and narrow path goes on in the next row after about this many meters
-MOST_ROWS = 5
-NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
+_ROW_LENGTH = 80.0  # a long and narrow path goes on in the next row after about this many meters
+_MOST_ROWS = 5
+_NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
 MARGIN = 3.0  # around the path [m]
 RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
-INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
-HIGHEST = 5.0  # panel [in]
-CARS_EVERY = 2.6  # wheelbases between two outlines
+_INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
+_HIGHEST = 5.0  # panel [in]
+_CARS_EVERY = 2.6  # wheelbases between two outlines
 SMALL = 160.0  # in a picture of more than that [m] cars cannot be seen
-ZOOM = 44.0  # a part of such a path that is drawn large, where a car was farthest off [m]
-SEEN = 0.05  # deviations are drawn larger until the largest is this share of the picture
+_ZOOM = 44.0  # a part of such a path that is drawn large, where a car was farthest off [m]
+_SEEN = 0.05  # deviations are drawn larger until the largest is this share of the picture
 
 
 @style.styled
@@ -383,13 +387,13 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    if width <= NARROW * height and max(width, height) > SMALL:
+    if width <= _NARROW * height and max(width, height) > SMALL:
         return _large(path, drives)
     rows = 1
-    if width > NARROW * height:
-        rows = min(MOST_ROWS, max(1, round(width / ROW_LENGTH)))
+    if width > _NARROW * height:
+        rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH)))
     step = width / rows
-    inch = min(INNER_WIDTH / step, HIGHEST / height)  # of a meter
+    inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
     figure = style.new_figure(style.PAGE, rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
@@ -424,7 +428,7 @@ def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
     whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
     size = max(float(np.ptp(path.X)), float(np.ptp(path.Y)))
-    times = _round(SEEN * size / max(largest, 1e-3))
+    times = _round(_SEEN * size / max(largest, 1e-3))
     whole.plot(path.X, path.Y, **PATH)
     for label, drive in reversed(list(drives.items())):
         X, Y, psi = path.pose(drive.s)
@@ -436,7 +440,7 @@ def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
     k = int(np.abs(worst.e_y).argmax())
     X0, Y0, _ = (float(value) for value in path.pose(worst.s[k]))
     whole.plot(X0, Y0, marker="s", markersize=9.0, markerfacecolor="none", color="#AA4499")
-    half = 0.5 * ZOOM
+    half = 0.5 * _ZOOM
     part.set(xlim=(X0 - half, X0 + half), ylim=(Y0 - half, Y0 + half), aspect="equal")
     _draw(part, path, drives)
     part.set_title(f"the largest deviation, {abs(worst.e_y[k]):.2f} m, to scale")
@@ -463,7 +467,7 @@ def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
 
 
 def _draw_cars(axes: Axes, drive: "Drive", color: str) -> None:
-    every = CARS_EVERY * drive.vehicle.wheelbase
+    every = _CARS_EVERY * drive.vehicle.wheelbase
     at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
     signals = (drive.X, drive.Y, drive.psi, drive.delta)
     shapes = [

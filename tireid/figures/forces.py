@@ -207,7 +207,7 @@ def prediction_figure(
     return figure
 
 
-COLORS = (style.ORANGE, style.BLUE, style.GREEN, style.PURPLE)
+_COLORS = (style.ORANGE, style.BLUE, style.GREEN, style.PURPLE)
 
 
 @style.styled
@@ -229,7 +229,7 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
     for axle, name in enumerate(style.AXLES):
         upper, lower = panels[:, axle]
         upper.plot(t, truth[:, axle] / unit.newtons, **style.TRUTH)
-        for (label, replay), color in zip(replays.items(), COLORS, strict=False):
+        for (label, replay), color in zip(replays.items(), _COLORS, strict=False):
             force = style.drawable(replay.axle_force[:, axle] / unit.newtons, limits)
             upper.plot(t, force, color=color, linewidth=1.1, label=label)
             lower.plot(t, missed[label][:, axle], color=color, **RESIDUAL)

@@ -75,7 +75,7 @@ def error_figure(
     return figure
 
 
-SYMBOLS = {
+_SYMBOLS = {
     "v_y": "$v_y$",
     "r": "$r$",
     "delta_f": r"$\delta_f$",
@@ -106,7 +106,7 @@ def weights_figure(
     _lines(upper, t, W[:, 1, :], style.PURPLE, "rear axle")
     upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
     for number, name in enumerate(design.network.inputs):
-        _lines(lower, t, V[:, :, number], style.SERIES[number % len(style.SERIES)], SYMBOLS[name])
+        _lines(lower, t, V[:, :, number], style.SERIES[number % len(style.SERIES)], _SYMBOLS[name])
     lower.set(ylabel=r"weights $\hat{V}$ [-]")
     style.label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
@@ -135,19 +135,19 @@ def _settled(values: Array) -> Array:
     return kept
 
 
-Quartiles = tuple[float, float, float]  # median, lower and upper quartile
-MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
+_Quartiles = tuple[float, float, float]  # median, lower and upper quartile
+_MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
     "instantaneous": (style.ORANGE, "s"),
     "integral": (style.BLUE, "o"),
     "instantaneous_scaled": (style.GREEN, "D"),
 }
-FURTHER = ((style.PURPLE, "^"), (style.AMBER, "v"))
+_FURTHER = ((style.PURPLE, "^"), (style.AMBER, "v"))
 OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 
 
 @style.styled
 def comparison_figure(
-    results: Mapping[str, Mapping[str, Quartiles]],
+    results: Mapping[str, Mapping[str, _Quartiles]],
     paper: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Figure:
     """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
@@ -167,7 +167,7 @@ def comparison_figure(
         if not row:
             continue
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
-        color, marker = MARKS.get(law, FURTHER[number % len(FURTHER)])
+        color, marker = _MARKS.get(law, _FURTHER[number % len(_FURTHER)])
         order += [label, f"{label} (paper)"]
         shift = OFFSET * (number - (len(results) - 1) / 2)
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T

@@ -15,8 +15,8 @@ from matplotlib.patches import Circle, FancyBboxPatch
 
 from tireid.figures.style import BLACK, GREY, ORANGE, PAGE, new_figure, styled
 
-WIDTH, HEIGHT = 100.0, 46.0  # of the drawing, in its own unit
-JOINT, SUM = 0.45, 1.6  # radii of a joint of two lines and of the sum
+WIDTH, _HEIGHT = 100.0, 46.0  # of the drawing, in its own unit
+_JOINT, SUM = 0.45, 1.6  # radii of a joint of two lines and of the sum
 
 Point = tuple[float, float]
 
@@ -55,9 +55,9 @@ CUT: Point = (66.0, 6.0)
 @styled
 def scheme_figure() -> Figure:
     """Draw the identifier as blocks and signals."""
-    figure = new_figure(PAGE, PAGE * HEIGHT / WIDTH)
+    figure = new_figure(PAGE, PAGE * _HEIGHT / WIDTH)
     axes = figure.subplots()
-    axes.set(xlim=(0.0, WIDTH), ylim=(-0.5, HEIGHT - 0.5), aspect="equal")
+    axes.set(xlim=(0.0, WIDTH), ylim=(-0.5, _HEIGHT - 0.5), aspect="equal")
     axes.set_axis_off()
     for block in BLOCKS.values():
         _draw_block(axes, block)
@@ -96,6 +96,6 @@ def _draw_signal(axes: Axes, signal: Signal) -> None:
     arrow = {"arrowstyle": "-|>", "color": signal.color, "linewidth": 0.9, "shrinkA": 0.0}
     axes.annotate("", xy=last, xytext=way[-1], arrowprops={**arrow, "shrinkB": 0.0})
     if signal.joint:
-        axes.add_patch(Circle(signal.points[0], JOINT, facecolor=GREY, edgecolor="none", zorder=3))
+        axes.add_patch(Circle(signal.points[0], _JOINT, facecolor=GREY, edgecolor="none", zorder=3))
     if signal.label:
         axes.text(*signal.place, signal.label, ha="center", va="center", color=signal.color)

@@ -30,7 +30,7 @@ from identifier.setup import force_unit_name
 P = ParamSpec("P")
 
 PAGE = 7.16  # width of both columns of a paper [in]
-RESOLUTION = 200  # [dots per inch]
+_RESOLUTION = 200  # [dots per inch]
 
 BLACK, GREY, BLUE, ORANGE = "#000000", "#767676", "#0072B2", "#D55E00"
 GREEN, PURPLE, SKY, AMBER = "#009E73", "#AA4499", "#56B4E9", "#E69F00"
@@ -66,17 +66,17 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapper
 
 
-class PlainNumbers(ScalarFormatter):
+class _PlainNumbers(ScalarFormatter):
     r"""The usual numbers of an axis as words: math, `$\mathdefault{1.5}$`, is laid out slowly.
 
     What stands beside the axis, as ×10³, stays as it is.
     """
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        return MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
+        return _MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
 
 
-MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
+_MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -115,8 +115,8 @@ def _lay_out(figure: Figure) -> None:
     if engine is not None:
         for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
             if type(axis.get_major_formatter()) is ScalarFormatter:
-                axis.set_major_formatter(PlainNumbers())
-        resolution, figure.dpi = figure.dpi, RESOLUTION  # at fewer dots letters are less exact
+                axis.set_major_formatter(_PlainNumbers())
+        resolution, figure.dpi = figure.dpi, _RESOLUTION  # at fewer dots letters are less exact
         engine.execute(figure)
         figure.dpi = resolution
         figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
@@ -130,7 +130,7 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
         yield
 
 
-def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
+def figure_png(figure: Figure, *, resolution: int = _RESOLUTION) -> bytes:
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
@@ -139,15 +139,15 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
 
 # Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
 # opened, and the same figure has the same bytes.
-CLOUDS = 130  # dots per inch of what is pixels in a drawing
-VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
+_CLOUDS = 130  # dots per inch of what is pixels in a drawing
+_VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
 
 
 def figure_svg(figure: Figure) -> bytes:
     """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
-    with laid_out(figure, {**LOOK, **VECTOR}):
-        figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
+    with laid_out(figure, {**LOOK, **_VECTOR}):
+        figure.savefig(buffer, format="svg", dpi=_CLOUDS, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
@@ -167,20 +167,20 @@ Window = tuple[float, float] | None
 
 TIME = "time [s]"
 AXLES = ("Front axle", "Rear axle")
-FREEZE, PREDICTION = "freeze", "after the freeze (prediction)"
+FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
 
 
 FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
-DIGITS_SHOWN = 100.0  # s
+_DIGITS_SHOWN = 100.0  # s
 
 
-def clock_zero(t: Array) -> float:
+def _clock_zero(t: Array) -> float:
     """Return what figures take off the times of a recording [s]; 0 where they are as short as is.
 
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return 0.0 if abs(first) < FAR else DIGITS_SHOWN * float(np.floor(first / DIGITS_SHOWN))
+    return 0.0 if abs(first) < FAR else _DIGITS_SHOWN * float(np.floor(first / _DIGITS_SHOWN))
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:
@@ -188,7 +188,7 @@ def frozen_title(t: Array, t_freeze: float) -> str:
 
     t : times of the samples (n,) [s].   t_freeze : time of the freeze [s].
     """
-    return f"frozen at {freeze_key(round(t_freeze - clock_zero(t), 6))} s"
+    return f"frozen at {freeze_key(round(t_freeze - _clock_zero(t), 6))} s"
 
 
 def label_time(axes: Axes, t: Array) -> None:
@@ -196,7 +196,7 @@ def label_time(axes: Axes, t: Array) -> None:
 
     t : times of the samples (n,) [s].
     """
-    zero = clock_zero(t)
+    zero = _clock_zero(t)
     axes.set_xlabel(TIME if zero == 0.0 else f"time since {zero:.0f} s [s]")
     if zero != 0.0:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
@@ -232,7 +232,7 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
             facecolor="#F1EDE4",
             edgecolor="none",
             zorder=0,
-            label=PREDICTION,
+            label=_PREDICTION,
         )
     if first <= t_freeze <= last:
         axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=FREEZE)
@@ -244,7 +244,7 @@ def note(axes: Axes, text: str) -> None:
 
 
 def legend_above(
-    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (FREEZE, PREDICTION)
+    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (FREEZE, _PREDICTION)
 ) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 
@@ -309,7 +309,7 @@ class ForceUnit(NamedTuple):
         return f"{digits} {self.name}" if np.isfinite(value) else "not finite"
 
 
-KILONEWTON, NEWTON = ForceUnit("kN", 1000.0), ForceUnit("N", 1.0)
+_KILONEWTON, _NEWTON = ForceUnit("kN", 1000.0), ForceUnit("N", 1.0)
 
 
 def force_unit_of(force: Array) -> ForceUnit:
@@ -317,7 +317,7 @@ def force_unit_of(force: Array) -> ForceUnit:
 
     force : any shape [N]; what is not finite does not count.
     """
-    return KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else NEWTON
+    return _KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else _NEWTON
 
 
 def impulse_unit(force_unit: float) -> str:

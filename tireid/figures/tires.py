@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 UNKNOWN = "slip not known"
 BAND = "band of 90 %"
-GUARANTEED = "guaranteed, steady"
-CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
+_GUARANTEED = "guaranteed, steady"
+_CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
     "marker": ".",
     "markersize": 2.2,
@@ -78,17 +78,17 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
                 style.drawable(reference[:, axle], limits),
                 color=color,
                 label=label,
-                **{**CLOUD, "markersize": 3.0, "alpha": 0.35},
+                **{**_CLOUD, "markersize": 3.0, "alpha": 0.35},
             )
             missed = np.clip(frozen[:, axle] - reference[:, axle], *limits)
             lowest.axhline(0.0, color=color, linewidth=0.6)
-            lowest.plot(alpha[:, axle], missed, color=style.ORANGE, **CLOUD)
+            lowest.plot(alpha[:, axle], missed, color=style.ORANGE, **_CLOUD)
         axes.plot(
             alpha[:, axle],
             style.drawable(frozen[:, axle], limits),
             color=style.ORANGE,
             label="frozen weights",
-            **CLOUD,
+            **_CLOUD,
         )
         low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
         margin = 0.04 * (high - low) or 1.0
@@ -137,7 +137,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
             color=style.PURPLE,
             linewidth=0.9,
             linestyle="--",
-            label=GUARANTEED,
+            label=_GUARANTEED,
         )
     axes.plot(
         np.rad2deg(slip),
@@ -178,7 +178,7 @@ def axle_slip(drive: "Drive") -> Array:
     return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
 
 
-REACH = 1.25  # curves go on this far beyond the slip of the drive
+_REACH = 1.25  # curves go on this far beyond the slip of the drive
 
 
 @style.styled
@@ -189,7 +189,7 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     """
     unit = style.force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
-    reach = REACH * float(np.abs(alpha).max())
+    reach = _REACH * float(np.abs(alpha).max())
     shown = [np.abs(np.rad2deg(curve.alpha)) <= reach for curve in curves]
     within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
     steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
@@ -207,7 +207,7 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
             force[:, axle],
             color=style.SKY,
             label="this drive, true forces",
-            **{**CLOUD, "markersize": 3.0, "alpha": 0.6},
+            **{**_CLOUD, "markersize": 3.0, "alpha": 0.6},
         )
         for curve, part, values in zip(curves, shown, within, strict=True):
             axes.plot(

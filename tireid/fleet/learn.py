@@ -45,17 +45,17 @@ from models.vehicle import Vehicle
 from tireid.fleet.store import INDEX, LogRow, Store, information_columns, needed, protocols
 
 TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
-PORTIONS = 16  # that few logs are shared into
+_PORTIONS = 16  # that few logs are shared into
 PART = 300.0  # s of a log whose information is kept as one
 DT = 0.01  # s, to which logs are brought
 Judging = Literal["motion", "none"]
 DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
-FIELD = re.compile(r"\{(\w+)\}")
+_FIELD = re.compile(r"\{(\w+)\}")
 EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
+class _Task:
     """A log to be learnt.
 
     Parameters
@@ -146,7 +146,7 @@ class Car(NamedTuple):
 
 def find_logs(
     patterns: Sequence[str], vehicle: str, tags: str = "", root: str = ""
-) -> tuple[list[Task], dict[str, str]]:
+) -> tuple[list[_Task], dict[str, str]]:
     """Return the logs that patterns name, in order, and why others are left out.
 
     Parameters
@@ -164,10 +164,10 @@ def find_logs(
     core = needed("fsspec.core")
     above = _absolute(root) if root else ""
     shape = tag_pattern(tags) if tags else None
-    unknown = [one for one in FIELD.findall(vehicle) if one not in FIELD.findall(tags)]
+    unknown = [one for one in _FIELD.findall(vehicle) if one not in _FIELD.findall(tags)]
     if unknown:
         raise ValueError(f"--vehicle {vehicle}: {{{unknown[0]}}} is no tag of --tags")
-    found: dict[str, Task] = {}
+    found: dict[str, _Task] = {}
     left: dict[str, str] = {}
     for pattern in patterns:
         fs, path = core.url_to_fs(pattern)
@@ -188,8 +188,8 @@ def find_logs(
                 left[log] = f"its path is not like {tags}"
                 continue
             words = {} if said is None else said.groupdict()
-            car = FIELD.sub(lambda field, words=words: words[field[1]], vehicle)  # type: ignore[misc]
-            found[address] = Task(
+            car = _FIELD.sub(lambda field, words=words: words[field[1]], vehicle)  # type: ignore[misc]
+            found[address] = _Task(
                 log=log,
                 address=address,
                 size=int(info.get("size") or 0),
@@ -213,10 +213,10 @@ def tag_pattern(tags: str) -> re.Pattern[str]:
     ValueError
         Where it names nothing, or a name twice.
     """
-    names = FIELD.findall(tags)
+    names = _FIELD.findall(tags)
     if not names or len(set(names)) < len(names):
         raise ValueError(f"--tags {tags}: wants {{name}} for parts of a path, each name once")
-    parts = FIELD.split(tags)
+    parts = _FIELD.split(tags)
     words = [re.escape(text).replace(r"\*", "[^/]*") for text in parts[::2]]
     groups = [f"(?P<{name}>{DATE if name == 'date' else '[^/]+?'})" for name in parts[1::2]]
     body = "".join(a + b for a, b in zip(words, [*groups, ""], strict=True))
@@ -262,7 +262,7 @@ def _written(info: Mapping[str, Any]) -> str:
 # What is learnt of one.
 
 
-def learn_log(task: Task, telling: Telling, car: Car, known: Set[str] = frozenset()) -> "Learnt":
+def _learn_log(task: _Task, telling: Telling, car: Car, known: Set[str] = frozenset()) -> "Learnt":
     """Return the row of a log, one for each run of its file; where it cannot be used, it says why.
 
     Parameters
@@ -272,7 +272,7 @@ def learn_log(task: Task, telling: Telling, car: Car, known: Set[str] = frozense
     row = row_of(task, car)
     try:
         with _near(task.address) as path:
-            row = replace(row, content=content_of(path))
+            row = replace(row, content=_content_of(path))
             if row.known in known:
                 return Learnt([], [(row.log, row.known)])
             try:
@@ -287,7 +287,7 @@ def learn_log(task: Task, telling: Telling, car: Car, known: Set[str] = frozense
         return Learnt([_failed(row, error)], [])
 
 
-def row_of(task: Task, car: Car) -> LogRow:
+def row_of(task: _Task, car: Car) -> LogRow:
     """Return the row of a log of which nothing was read yet."""
     tags = dict(task.tags)
     return LogRow(
@@ -302,7 +302,7 @@ def row_of(task: Task, car: Car) -> LogRow:
     )
 
 
-def content_of(path: Path) -> str:
+def _content_of(path: Path) -> str:
     """Return the hash of what a file holds."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, partial(hashlib.blake2b, digest_size=16)).hexdigest()
@@ -439,20 +439,20 @@ class LearnSome:
     cars: Mapping[Path, Car]
     known: Set[str] = frozenset()
 
-    def __call__(self, tasks: Sequence[Task]) -> Learnt:
+    def __call__(self, tasks: Sequence[_Task]) -> Learnt:
         """Return the rows of some logs."""
-        each = [learn_log(one, self.telling, self.cars[one.vehicle], self.known) for one in tasks]
+        each = [_learn_log(one, self.telling, self.cars[one.vehicle], self.known) for one in tasks]
         return Learnt(
             [row for one in each for row in one.rows], [two for one in each for two in one.copies]
         )
 
-    def died(self, task: Task) -> Learnt:
+    def died(self, task: _Task) -> Learnt:
         """Return the row of a log that processes die of."""
         why = "the process that learnt it died, twice: it may want more memory than there is"
         return Learnt([replace(row_of(task, self.cars[task.vehicle]), error=why)], [])
 
 
-class Done(NamedTuple):
+class _Done(NamedTuple):
     """What became of logs.
 
     learnt : how many were learnt now.   of : how many there are.
@@ -467,7 +467,7 @@ class Done(NamedTuple):
 
 
 def learn_fleet(
-    tasks: Sequence[Task],
+    tasks: Sequence[_Task],
     telling: Telling,
     store: Store,
     spread_map: Map,
@@ -475,7 +475,7 @@ def learn_fleet(
     again: bool = False,
     replacing: bool = False,
     done: Callable[[int, int], None] | None = None,
-) -> Done:
+) -> _Done:
     """Learn the logs that a store has no row of, and keep what comes.
 
     Parameters
@@ -513,12 +513,12 @@ def learn_fleet(
         store.drop(others)
     named = {row.known: row.log for row in index}
     elsewhere = [(log, named[known]) for log, known in copies if named[known] != log]
-    return Done(learnt, of, elsewhere, others)
+    return _Done(learnt, of, elsewhere, others)
 
 
-def _portions(tasks: Sequence[Task]) -> list[tuple[Task, ...]]:
+def _portions(tasks: Sequence[_Task]) -> list[tuple[_Task, ...]]:
     """Return logs in portions, small ones where there are few."""
-    size = min(max(len(tasks) // PORTIONS, 1), TOGETHER)
+    size = min(max(len(tasks) // _PORTIONS, 1), TOGETHER)
     return [tuple(tasks[k : k + size]) for k in range(0, len(tasks), size)]
 
 
@@ -583,10 +583,10 @@ def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     """
 
     def spread_map(work: Any, portions: Any) -> Iterator[Learnt]:
-        suspects: list[Sequence[Task]] = []
+        suspects: list[Sequence[_Task]] = []
         yield from elsewhere(work, portions, lost=suspects.append)
         alone = [(task,) for portion in suspects for task in portion]
-        dead: list[Sequence[Task]] = []
+        dead: list[Sequence[_Task]] = []
         yield from elsewhere(work, alone, lost=dead.append)
         for portion in dead:
             yield from map(work.died, portion)
@@ -605,7 +605,7 @@ def _prepare_process(work: LearnSome) -> None:
     _WORK[:] = [work]
 
 
-def _work_of_process(portion: Sequence[Task]) -> Learnt:
+def _work_of_process(portion: Sequence[_Task]) -> Learnt:
     return _WORK[0](portion)
 
 
@@ -626,7 +626,7 @@ def _until_one_dies(
         pool.shutdown(cancel_futures=True)
 
 
-def _carefully(work: LearnSome, portion: Sequence[Task]) -> Iterator[Learnt]:
+def _carefully(work: LearnSome, portion: Sequence[_Task]) -> Iterator[Learnt]:
     """Yield what a process of its own learns of a portion; where it dies, log by log."""
     for _, found in _until_one_dies(work, [tuple(portion)], 1):
         yield found

@@ -31,10 +31,10 @@ from models.vehicle import Vehicle
 from tireid.fleet.store import INDEX as WHICH
 from tireid.fleet.store import MOVING, LogRow
 
-TAGGED = ("vehicle", "tires", "date")
-BY = (*TAGGED, "week", "month", "log", "setting")
+_TAGGED = ("vehicle", "tires", "date")
+BY = (*_TAGGED, "week", "month", "log", "setting")
 TOLD = ("reach", "part_begin", "part_seconds", "matrix", "vector")
-COLUMNS = (*WHICH, *TAGGED, "tags", "valid", "car", *TOLD)  # of a row, that are asked for here
+COLUMNS = (*WHICH, *_TAGGED, "tags", "valid", "car", *TOLD)  # of a row, that are asked for here
 ROUNDS = 3  # over the rows
 PASSES = 60  # of expectation and maximization
 WORTH = 2.0  # cars that the identifier's prior counts as
@@ -92,7 +92,7 @@ def _value(row: LogRow, name: str) -> str:
         day = day_of(row)
         year, week, _ = day.isocalendar()
         return f"{year}-W{week:02d}" if name == "week" else f"{day:%Y-%m}"
-    if name in (*TAGGED, "log", "setting"):
+    if name in (*_TAGGED, "log", "setting"):
         return str(getattr(row, name))
     tags = json.loads(row.tags)
     if name not in tags:
@@ -275,7 +275,7 @@ def errors_of(beliefs: Priors) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FleetPrior:
+class _FleetPrior:
     """What cars of a fleet have in common, and how they differ.
 
     Parameters
@@ -321,7 +321,7 @@ def sizes(vehicle: Vehicle) -> Array:
     return np.array([vehicle.wheelbase if NAMES[k] in lengths else 1.0 for k in TIRES])
 
 
-def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
+def fleet_prior(cars: Sequence[Merged]) -> _FleetPrior:
     """Return what many cars have in common.
 
     Raises
@@ -348,7 +348,7 @@ def fleet_prior(cars: Sequence[Merged]) -> FleetPrior:
         model = one.model
         squares = model.unexplained**2
         reach = reach.with_(Reach(model.driven, model.speeds, model.a_x, squares, 1.0))
-    return FleetPrior(mean=m, spread=T + M, cars=V, reach=reach)
+    return _FleetPrior(mean=m, spread=T + M, cars=V, reach=reach)
 
 
 def _of_size(one: Merged) -> tuple[Array, Array, Array, Array]:

@@ -35,7 +35,7 @@ from models.extras import needs
 from models.vehicle import Vehicle, sedan
 
 Key = tuple[str, str, str]
-BUCKETS = 16
+_BUCKETS = 16
 FORMAT = "tireid fleet 3"
 BATCH = 512  # rows that are read at once
 SMALL = 1 << 22  # bytes of a file that is fetched as one
@@ -156,7 +156,7 @@ class LogRow:
     def bucket(self) -> str:
         """The file of its row; the runs of a file lie together."""
         word = hashlib.blake2b(self.key[0].encode(), digest_size=1)
-        return f"bucket-{word.digest()[0] % BUCKETS:02d}.parquet"
+        return f"bucket-{word.digest()[0] % _BUCKETS:02d}.parquet"
 
     @property
     def told_car(self) -> Vehicle:

@@ -35,10 +35,10 @@ from tireid.fleet.store import LogRow
 LEAST = 600.0  # s of driving that an alarm takes at least
 SHORTEST = 5.0  # s of learning, below which a part says nothing
 FLOOR = 0.01  # standard deviation of ln C that roads make at least
-FLOOR_FRICTION = 0.05  # and of ln μ
+_FLOOR_FRICTION = 0.05  # and of ln μ
 HELD = 10.0  # parts that the fleet's scatter counts as
-NORMAL = 1.4826  # standard deviation of normal errors over their median absolute deviation
-CHANGED = [INDEX[name] for name in ("ln_stiffness_f", "ln_stiffness_r", "ln_road")]
+_NORMAL = 1.4826  # standard deviation of normal errors over their median absolute deviation
+_CHANGED = [INDEX[name] for name in ("ln_stiffness_f", "ln_stiffness_r", "ln_road")]
 LARGEST = 0.5  # standard deviation of ln C and ln μ that is believed before
 TITLES = ("stiffness of the front axle", "stiffness of the rear axle", "friction of both axles")
 
@@ -241,7 +241,7 @@ class _Compared(NamedTuple):
     def scatter(self) -> Array:
         """Median squared deviation within the baseline, as a variance (3,)."""
         z = self.z[self.baseline]
-        return np.asarray((NORMAL * np.median(np.abs(z - np.median(z, axis=0)), axis=0)) ** 2)
+        return np.asarray((_NORMAL * np.median(np.abs(z - np.median(z, axis=0)), axis=0)) ** 2)
 
 
 def parts_of(row: LogRow) -> list[Part]:
@@ -293,17 +293,17 @@ def change_from(told: Information, p: Array, beliefs: Priors) -> tuple[Array, Ar
     u, slopes = coordinates(p)
     sensors = np.zeros((SIZE, len(SENSORS)))
     sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
-    along = np.hstack([slopes[:, CHANGED], sensors])
-    sd = np.array([*(LARGEST for _ in CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
+    along = np.hstack([slopes[:, _CHANGED], sensors])
+    sd = np.array([*(LARGEST for _ in _CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
     P = np.linalg.inv(along.T @ told.matrix @ along + np.diag(sd**-2.0))
     value = P @ (along.T @ (told.vector - told.matrix @ u))
-    return value[: len(CHANGED)], np.diag(P)[: len(CHANGED)]
+    return value[: len(_CHANGED)], np.diag(P)[: len(_CHANGED)]
 
 
 def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     """Return the cumulative sums of a car's parts after its baseline."""
     count = len(one.baseline)
-    floor = np.array([FLOOR, FLOOR, FLOOR_FRICTION]) ** 2
+    floor = np.array([FLOOR, FLOOR, _FLOOR_FRICTION]) ** 2
     T = np.maximum((HELD * fleet + count * one.scatter) / (HELD + count), floor)
     usual = np.median(one.z[one.baseline], axis=0)
     z, variance = one.z[count:] - usual, one.S[count:] + T

@@ -47,9 +47,9 @@ def write_compare_report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Every method learns on each recording, is frozen at its end and asked about all "
         "of them.",
-        numbers=[*verdicts_headline(verdicts), *compare_headlines(comparison)],
+        numbers=[*verdicts_headline(verdicts), *_compare_headlines(comparison)],
         warnings=[
-            *compare_warnings(comparison),
+            *_compare_warnings(comparison),
             *(
                 one
                 for name, verdict in verdicts.items()
@@ -64,7 +64,7 @@ def write_compare_report(
     write_report(folder / REPORT, report)
 
 
-def compare_headlines(comparison: Comparison) -> list[Headline]:
+def _compare_headlines(comparison: Comparison) -> list[Headline]:
     """Return the frozen error of the best methods on recordings that they did not learn on."""
     numbers = []
     elsewhere = len(comparison.names) > 1
@@ -79,7 +79,7 @@ def compare_headlines(comparison: Comparison) -> list[Headline]:
     return numbers[:4]
 
 
-def compare_warnings(comparison: Comparison) -> list[str]:
+def _compare_warnings(comparison: Comparison) -> list[str]:
     """Return what speaks against a comparison."""
     vehicle = comparison.course.vehicle
     said = [f"{vehicle.estimates}."] if vehicle.estimates else []

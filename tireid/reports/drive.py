@@ -30,10 +30,10 @@ def write_drive_report(
     report = Report(
         title=f"{first.drive.path.name} on {first.label} tires",
         summary=f"{headline}.",
-        numbers=drive_headlines(runs),
-        warnings=drive_warnings(runs),
+        numbers=_drive_headlines(runs),
+        warnings=_drive_warnings(runs),
         sections=[
-            Section(heading="How the car drove", blocks=drive_blocks(runs, figures, film)),
+            Section(heading="How the car drove", blocks=_drive_blocks(runs, figures, film)),
             Section(heading="What the tracker knew", blocks=known_blocks(runs, figures)),
             Section(
                 heading="Was it in time?",
@@ -51,7 +51,7 @@ def write_drive_report(
     write_report(folder / REPORT, report)
 
 
-def drive_headlines(runs: Sequence[Run]) -> list[Headline]:
+def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
     """Return how far the cars were off, and how long a step took."""
     first = runs[0].scores
     numbers = [
@@ -87,7 +87,7 @@ def _end(run: Run) -> str:
     return "" if run.scores.completed else f", who {run.drive.ending}"
 
 
-def drive_warnings(runs: Sequence[Run]) -> list[str]:
+def _drive_warnings(runs: Sequence[Run]) -> list[str]:
     """Return what went wrong on the way."""
     said = []
     for run in runs:
@@ -128,7 +128,7 @@ def score_rows(runs: Sequence[Run]) -> list[list[str]]:
     return rows
 
 
-def drive_blocks(
+def _drive_blocks(
     runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
     """Return film, table and figures of drives."""

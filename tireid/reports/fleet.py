@@ -20,12 +20,12 @@ COLUMNS = (*INDEX, "vehicle", "date", "seconds", "valid", "findings", "stiffness
            "stiffness_rear")  # fmt: skip
 DRAWN = 6  # cars with an alarm that are drawn
 
-READ_STIFFNESS = (
+_READ_STIFFNESS = (
     "Dots of a car lie on a level line; a step or a slope is a change of its tires, its load or a "
     "sensor. Hollow dots are logs whose answer the verdict refuses."
 )
-READ_CURVES = "Each curve ends where it is known; a dotted one is the prior: nothing was learnt."
-READ_WATCH = (
+_READ_CURVES = "Each curve ends where it is known; a dotted one is the prior: nothing was learnt."
+_READ_WATCH = (
     "Dots around zero are tires as in the baseline. A change stays away from zero by more than its "
     "bars, for as long as it lasts."
 )
@@ -60,12 +60,12 @@ def write_fleet_report(
         warnings.append(f"{len(errors)} logs could not be used.")
     models: list[Block] = [
         _groups_table(groups),
-        drawing(curves_figure(groups), "Force curves of the groups.", READ_CURVES),
-        drawing(stiffness_figure(learnt), "Cornering stiffness, log by log.", READ_STIFFNESS),
+        drawing(curves_figure(groups), "Force curves of the groups.", _READ_CURVES),
+        drawing(stiffness_figure(learnt), "Cornering stiffness, log by log.", _READ_STIFFNESS),
     ]
     sections = [
         Section(heading="What the logs say together", blocks=models),
-        Section(heading="What changed", blocks=watch_blocks(watched)),
+        Section(heading="What changed", blocks=_watch_blocks(watched)),
     ]
     if errors or refused:
         why = {row.name: row.error for row in errors}
@@ -101,14 +101,14 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
         ],
         warnings=[f"{alarm.line}." for alarm in lasting],
         sections=[
-            Section(heading="What changed", blocks=watch_blocks(watched)),
+            Section(heading="What changed", blocks=_watch_blocks(watched)),
             _origin(command, store, ()),
         ],
     )
     write_report(folder / REPORT, report)
 
 
-def watch_blocks(watched: Watch) -> list[Block]:
+def _watch_blocks(watched: Watch) -> list[Block]:
     """Return what was seen over time, as table and figures."""
     told = f"{len(watched.seen)} cars were driven beyond their baseline"
     short = f"; {len(watched.short)} were not, and are not watched yet" if watched.short else ""
@@ -127,7 +127,7 @@ def watch_blocks(watched: Watch) -> list[Block]:
     for car in cars[:DRAWN]:
         mine = [alarm for alarm in watched.alarms if alarm.car == car]
         figure = watch_figure(car, watched.seen[car], mine)
-        blocks.append(drawing(figure, f"{car} against its baseline.", READ_WATCH))
+        blocks.append(drawing(figure, f"{car} against its baseline.", _READ_WATCH))
     return blocks
 
 

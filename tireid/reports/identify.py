@@ -28,7 +28,7 @@ from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.reports.common import READ, REPORT, drawing, drawings, origin
 
-EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
+_EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
 
 def write_identify_report(
@@ -76,7 +76,7 @@ def write_identify_report(
                 verdict,
                 [
                     *verdicts.missed_headline(verdict),
-                    *asked_headlines(asked),
+                    *_asked_headlines(asked),
                     *verdicts.number_headlines(verdict),
                     *identify_headlines(model, runs, last),
                 ],
@@ -136,7 +136,7 @@ def identify_headlines(
     return numbers
 
 
-def asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
+def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
     """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
     if not asked:
         return []
@@ -200,7 +200,7 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
         f"{recording.name}: {100.0 * share:.0f} % of the samples exceed the identified slip range "
         f"of the {axle} axle ({known:.1f}°). There the curve is extrapolated."
         for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True)
-        if share > EXTRAPOLATED
+        if share > _EXTRAPOLATED
     ]
 
 

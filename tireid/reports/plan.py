@@ -81,7 +81,7 @@ def write_plan_report(
             Headline(f"{100.0 * found.rivals[0].error:.1f} %", "after a slalom of that length"),
             Headline(f"{found.clearance:.2g} m", "least distance to the edge"),
         ],
-        warnings=plan_warnings(found, driven),
+        warnings=_plan_warnings(found, driven),
         sections=[
             Section(
                 heading="What to drive",
@@ -113,7 +113,7 @@ def write_plan_report(
     write_report(folder / REPORT, report)
 
 
-def plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
+def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     """Return what to know before somebody drives a plan."""
     said = [
         "Drive on a closed field only, at half the speed first: tires outside of what was taken "

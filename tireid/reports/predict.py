@@ -62,7 +62,7 @@ def write_predict_report(
         "model learnt nothing.",
         numbers=[
             verdict_headline(verdict, notes),
-            *of_answer(verdict, [*missed_headline(verdict), *predict_headlines(prediction)]),
+            *of_answer(verdict, [*missed_headline(verdict), *_predict_headlines(prediction)]),
         ],
         lead=[curve_drawing(figures, verdict)],
         warnings=[*verdict_warnings(verdict), *notes],
@@ -82,7 +82,7 @@ def write_predict_report(
     page.write_report(folder / REPORT, report)
 
 
-def predict_headlines(prediction: Prediction) -> list[page.Headline]:
+def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
     """Return what is missed of the true force, explained of the motion, and the known slip."""
     numbers = []
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
