@@ -13,7 +13,16 @@ from typing import NoReturn
 
 import tireid
 from models.limits import LimitError, limits_text
-from tireid.commands import BAD_INPUT, COMMANDS, DONE, INTERRUPTED, NOT_TOLD, add_command
+from tireid.commands import (
+    BAD_INPUT,
+    COMMANDS,
+    DONE,
+    INTERRUPTED,
+    NOT_TOLD,
+    add_command,
+    installed,
+    summary,
+)
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 LONGEST_LINE = 900  # characters of a message, command and option not counted
@@ -48,11 +57,18 @@ def build_parser(words: Sequence[str]) -> _Parser:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     named = next((word for word in words if word in COMMANDS), None)
-    for name, summary in COMMANDS.items():
+    for name, text in COMMANDS.items():
         if name == named:
             add_command(name, commands)
         else:
-            commands.add_parser(name, help=summary)
+            commands.add_parser(name, help=text)
+    if named is None:
+        named = next((word for word in words if word in installed()), None)
+        for name in installed():
+            if name == named:
+                add_command(name, commands)
+            else:
+                commands.add_parser(name, help=summary(name))
     return parser
 
 
@@ -73,7 +89,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         parser = build_parser(words)
-    except LimitError as error:  # of the environment
+    except (LimitError, ValueError) as error:  # of the environment; of another's command
         complain(f"tireid: error: {one_line(error)}")
         return BAD_INPUT
     options = parser.parse_args(words)

@@ -304,14 +304,18 @@ def _is_hint(signal: str, one: Heading) -> bool:
     return fits and named and not words & RULES[signal].never
 
 
-def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -> Proposal:
+def propose(
+    log: LogFile, headings: Sequence[Heading] | None = None, run: str | None = None
+) -> Proposal:
     """Return what the channels of a log probably are.
 
     Parameters
     ----------
     log : as a format reads it; numbers are read of the channels that are in question.
+    headings : names and units to choose from; None all of the log.
     run : which of its runs is looked at; None the only one, or the first.
     """
+    headings = log.headings() if headings is None else headings
     candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
     posed = _pose(headings)
     asked = {name for found in candidates.values() for guess in found for name in guess.channel}

@@ -1,4 +1,4 @@
-"""`tireid fleet learn|merge|prior|watch|report`: thousands of logs in one command."""
+"""Thousands of logs in one command: learn, merge, where the next car starts, watch."""
 
 import argparse
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
-from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import DONE, FAILS
 from tireid.commands.options import add_force, add_jobs, add_log_map, jobs_of, told_map
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
     """Add the command to the parser."""
     parser = commands.add_parser(
         "fleet",
-        help=COMMANDS["fleet"],
+        help=str(__doc__)[:-1].lower(),
         description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
         "each log, and ask it: one model of many logs, where the next car starts, which car's "
         f"tires changed. {needs('A store', 'libraries', 'fleet')}.",
