@@ -342,6 +342,13 @@ class TireModel(ABC):
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
 
+    @property
+    def lengthwise(self) -> tuple[Array, Array] | None:
+        """Numbers of `motion.parameters` (p,) and their covariance (p, p), of which load transfer
+        and friction ellipse are; None where the model has none of its own.
+        """
+        return None
+
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
         return np.zeros(t.shape, dtype=bool)

@@ -23,6 +23,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "fleet": "thousands of logs in one command: learn, merge, where the next car starts, watch",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
         "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
     }
