@@ -1,43 +1,31 @@
-"""A stored tire as other programs read it: property files, g-g-v, a car of slipx, understeer."""
+"""A tire as other programs read it: property files, g-g-v, a car of slipx, understeer gradient."""
 
-from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from datetime import date
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from codegen.writing import write_file
-from identifier.export.ggv import ggv_text, limits
+from identifier.export.ggv import ggv_text
 from identifier.export.slipx import slipx_files
 from identifier.export.tir import tire_properties
 from identifier.export.understeer import Understeer, understeer_gradient
 from identifier.tire_model import AXLES, TireModel
 from models.files import resolved, write_atomically
-from models.vehicle import GRAVITY
-from tireid.output import OutputError, output_folder, require_free, text_table
+from tireid.output import OutputError, output_folder, require_free
 from tireid.run import Run
 
 WANTED = "--tir FILE, --slipx DIR, --ggv FILE, --understeer"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Emitted:
-    """What was written, and the understeer gradient where it was asked for.
-
-    files : that were written, folders among them.
-    """
+class Emitted(NamedTuple):
+    """Files and folders that were written, and the understeer gradient where it was asked for."""
 
     files: tuple[Path, ...]
     understeer: Understeer | None
-
-    def __str__(self) -> str:
-        return "" if self.understeer is None else _table(self.understeer)
-
-    def __repr__(self) -> str:
-        return f"<Emitted {', '.join(map(str, self.files))}>"
 
 
 def emit(
@@ -67,59 +55,38 @@ def emit(
     ------
     ValueError
         Where nothing is asked for, or the model cannot tell what is.
-    OutputError
-        Where a file is there and not to be replaced, or two have one name.
-    OSError
-        Where something cannot be written.
+    OutputError, OSError
+        Where a file is there and not to be replaced, two have one name, or one cannot be written.
     """
-    if all(one is None for one in (tir, slipx, ggv)) and understeer is False:
+    if understeer is False and tir is slipx is ggv is None:
         raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
     model = source.tire if isinstance(source, Run) else source
-    names: list[Path] = []
-    if tir is not None:
-        path = Path(tir)
-        names += [path.with_name(f"{path.stem}_{axle}{path.suffix}") for axle in AXLES]
-    names += [] if ggv is None else [Path(ggv)]
-    names += [] if isinstance(understeer, bool) else [Path(understeer)]
-    _require_places([*names, *([] if slipx is None else [Path(slipx)])], overwrite=overwrite)
+    table = None if isinstance(understeer, bool) else Path(understeer)
+    files = [] if tir is None else [Path(tir).with_stem(f"{Path(tir).stem}_{a}") for a in AXLES]
+    files += [Path(one) for one in (ggv, table) if one is not None]
+    for path in files:
+        if not path.parent.is_dir() or (path.exists() and not path.is_file()):
+            raise OutputError(f"{path} cannot be a file: name one in a folder that is there")
+        require_free(path, force=overwrite)
+    paths = (*files, *([] if slipx is None else [Path(slipx)]))
+    if len({resolved(path) for path in paths}) < len(paths):
+        raise OutputError(f"two outputs have one name: {', '.join(map(str, paths))}")
+    rng, new = np.random.default_rng(seed), [path for path in files if not path.exists()]
     with ExitStack() as stack:
         if slipx is not None:
             folder = stack.enter_context(output_folder(Path(slipx), force=overwrite))
-            drawn = np.random.default_rng(seed)
-            for inner, text in slipx_files(model, drawn, date.today()).items():
-                (folder / inner).parent.mkdir(parents=True, exist_ok=True)
-                write_file(folder / inner, text)
+            for name, text in slipx_files(model, rng, date.today()).items():
+                (folder / name).parent.mkdir(exist_ok=True)
+                write_file(folder / name, text)
         texts = [] if tir is None else [tire_properties(model, axle) for axle in AXLES]
-        texts += [] if ggv is None else [ggv_text(model, limits(model))]
-        found = None
-        if understeer is not False:
-            found = understeer_gradient(model, np.random.default_rng(seed))
-            texts += [] if isinstance(understeer, bool) else [found.csv]
-        for path, text in zip(names, texts, strict=True):
-            write_atomically(path, text)
-    return Emitted(files=(*names, *([] if slipx is None else [Path(slipx)])), understeer=found)
-
-
-def _require_places(paths: Sequence[Path], *, overwrite: bool) -> None:
-    """Refuse, before anything is computed, a file that cannot be written and two of one name."""
-    for path in paths:
-        if not path.parent.is_dir():
-            raise OutputError(f"{path.parent} is no folder: create it first")
-        require_free(path, force=overwrite)
-    if len({resolved(path) for path in paths}) < len(paths):
-        raise OutputError(f"two outputs have one name: {', '.join(map(str, paths))}")
-
-
-def _table(found: Understeer) -> str:
-    """Return the gradient as lines: a row for each a_y, a column for each speed."""
-    unit, first = np.degrees(GRAVITY), found.gradient[:1]
-    alike = np.array_equal(np.broadcast_to(first, found.gradient.shape), found.gradient, True)
-    speeds = ["at any speed"] if alike else [f"at {v:.3g} m/s" for v in found.v_x]
-    rows = [["a_y [m/s2]", *speeds]]
-    for k, a_y in enumerate(found.a_y):
-        cells = [
-            f"{unit * K:.2f} +- {unit * sd:.2f}" if np.isfinite(K) else ""
-            for K, sd in zip(found.gradient[: len(speeds), k], found.sd[:, k], strict=False)
-        ]
-        rows.append([f"{a_y:g}", *cells])
-    return f"understeer gradient [deg/g], +- one standard deviation\n{text_table(rows, '>>>>')}"
+        texts += [] if ggv is None else [ggv_text(model)]
+        found = understeer_gradient(model, rng) if understeer is not False else None
+        texts += [] if table is None or found is None else [found.csv]
+        try:
+            for path, text in zip(files, texts, strict=True):
+                write_atomically(path, text)
+        except BaseException:
+            for path in new:
+                path.unlink(missing_ok=True)
+            raise
+    return Emitted(paths, found)

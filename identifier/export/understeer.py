@@ -16,7 +16,7 @@ from models.vehicle import GRAVITY
 
 STEP = 1.0  # m/s², of the lateral acceleration
 COUNT = 3  # of speeds
-DRAWN, LOW, HIGH = 200, 0.16, 0.84  # models; shares of them that lie a deviation off
+DRAWN, LOW, HIGH = 100, 0.16, 0.84  # models; shares of them that lie a deviation off
 SLIPS = np.linspace(0.0, 0.6, 301)  # rad
 
 
@@ -35,14 +35,10 @@ class Understeer(NamedTuple):
     def csv(self) -> str:
         """A table with a row for each speed and acceleration, without those that are NaN."""
         k, degrees = self.a_y.size, np.degrees(GRAVITY)
-        columns = [
-            np.repeat(self.v_x, k),
-            np.tile(self.a_y, self.v_x.size),
-            degrees * self.gradient.ravel(),
-            degrees * self.sd.ravel(),
-        ]
+        at = [np.repeat(self.v_x, k), np.tile(self.a_y, self.v_x.size)]
+        columns = [*at, degrees * self.gradient.ravel(), degrees * self.sd.ravel()]
         rows = [one for one in zip(*columns, strict=True) if np.isfinite(one).all()]
-        lines = [",".join(f"{value:.9g}" for value in row) for row in rows]
+        lines = [",".join(f"{value:.4g}" for value in row) for row in rows]
         return "\n".join(["v_x_m_s,a_y_m_s2,gradient_deg_per_g,sd_deg_per_g", *lines]) + "\n"
 
 
@@ -64,7 +60,7 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     v_x = np.full(1, model.reference_speed) if speeds is None else np.linspace(*speeds, COUNT)
     force = model.force_at(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
-    most = reached * car.load_ratio(v_x) / _masses(model)  # (n, 2)
+    most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)
     a_y = np.arange(0.0, most.min(axis=1).max(), STEP)
     found = _gradients(model, force, v_x, a_y)
     spread = np.array([_gradients(one, one.force_at(SLIPS), v_x, a_y) for one in drawn])
@@ -75,17 +71,13 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     return Understeer(v_x, a_y, np.where(past, np.nan, found), np.where(past, np.nan, sd))
 
 
-def _masses(model: TireModel) -> Array:
-    """Return the masses [kg] that the axles turn, (2,)."""
-    return np.array(model.vehicle.axle_loads) / GRAVITY
-
-
 def _gradients(model: TireModel, force: Array, v_x: Array, a_y: Array) -> Array:
     """Return K [rad/(m/s²)], (n, k): infinite where the front axle is at its end, else minus it.
 
     force : at `SLIPS` under static loads, (s, 2) [N].
     """
-    masses, pressed = _masses(model), model.vehicle.load_ratio(v_x)
+    masses = np.array(model.vehicle.axle_loads) / GRAVITY
+    pressed = model.vehicle.load_ratio(v_x)
     gradient = np.zeros((v_x.size, a_y.size))
     for i, sign in ((1, -1.0), (0, 1.0)):
         curve = force[:, i]

@@ -8,6 +8,7 @@ from identifier.tire_model import load_model
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.emitting import WANTED, emit
+from tireid.output import text_table
 from tireid.progress import say, tell
 from tireid.verdicts import warn_of_stored
 
@@ -20,31 +21,16 @@ def add_parser(commands: Any) -> None:
         "written, or none.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
-    parser.add_argument(
-        "--tir",
-        type=Path,
-        metavar="FILE",
-        help="lateral force in pure slip of one tire (PAC2002): car.tir gives car_front.tir and "
-        "car_rear.tir",
-    )
-    parser.add_argument(
-        "--slipx", type=Path, metavar="DIR", help="folder of a car of 1:10 for slipx 0.2.0"
-    )
-    parser.add_argument(
-        "--ggv",
-        type=Path,
-        metavar="FILE",
-        help="speed, largest a_x and a_y as raceline planners read them, at the lower end of the "
-        "band",
-    )
-    parser.add_argument(
-        "--understeer",
-        action="store_true",
-        help="print the understeer gradient over speed and a_y, with its standard deviation",
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="with --understeer: also write it as CSV"
-    )
+    told = "tire property files (PAC2002): car.tir gives car_front.tir and car_rear.tir"
+    parser.add_argument("--tir", type=Path, metavar="FILE", help=told)
+    told = "folder of a car of 1:10 for slipx 0.2.0"
+    parser.add_argument("--slipx", type=Path, metavar="DIR", help=told)
+    told = "speed, largest a_x and a_y, for raceline planners; at the lower end of the band"
+    parser.add_argument("--ggv", type=Path, metavar="FILE", help=told)
+    told = "print the understeer gradient over speed and a_y, with its standard deviation"
+    parser.add_argument("--understeer", action="store_true", help=told)
+    told = "with --understeer: also write it as CSV"
+    parser.add_argument("--out", type=Path, metavar="FILE", help=told)
     shared.add_force(parser)
     parser.set_defaults(run=run)
 
@@ -63,6 +49,7 @@ def run(options: argparse.Namespace) -> None:
         overwrite=options.force,
     )
     if emitted.understeer is not None:
-        tell(str(emitted))
+        rows = [line.split(",") for line in emitted.understeer.csv.splitlines()]
+        tell(text_table(rows, ">>>>"))
     for path in emitted.files:
         say(f"wrote {path}")
