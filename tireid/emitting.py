@@ -35,7 +35,6 @@ def emit(
     slipx: str | PathLike[str] | None = None,
     ggv: str | PathLike[str] | None = None,
     understeer: bool | str | PathLike[str] = False,
-    seed: int = 0,
     overwrite: bool = False,
 ) -> Emitted:
     """Write a tire as other programs read it: all that is asked for, or nothing.
@@ -48,7 +47,6 @@ def emit(
     slipx : folder of a car for slipx 0.2.0.
     ggv : table of speed and largest a_x and a_y, at the lower end of the band of 90 %.
     understeer : whether to compute the gradient; a path also writes it as CSV.
-    seed : of the models that are drawn for standard deviations.
     overwrite : replace what is there.
 
     Raises
@@ -71,7 +69,7 @@ def emit(
     paths = (*files, *([] if slipx is None else [Path(slipx)]))
     if len({resolved(path) for path in paths}) < len(paths):
         raise OutputError(f"two outputs have one name: {', '.join(map(str, paths))}")
-    rng, new = np.random.default_rng(seed), [path for path in files if not path.exists()]
+    rng, new = np.random.default_rng(0), [path for path in files if not path.exists()]
     with ExitStack() as stack:
         if slipx is not None:
             folder = stack.enter_context(output_folder(Path(slipx), force=overwrite))

@@ -39,8 +39,7 @@ class Limits(NamedTuple):
 def limits(model: TireModel) -> Limits:
     """Return the limits of a model's car from standing to the fastest speed that was driven.
 
-    Load transfer and ellipse are those of the estimate; of a model without, what is believed of
-    its car.
+    Load transfer and ellipse of a model that has none are what is believed of its car.
 
     Raises
     ------
@@ -54,22 +53,17 @@ def limits(model: TireModel) -> Limits:
     priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
     mean, covariance = (priors.mean, priors.covariance) if own is None else own
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    h, *use = (mean + normal_quantile(LEVEL) * sd)[index]
-    transfer = h * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
+    ends = (mean + normal_quantile(LEVEL) * sd)[index]
+    transfer = ends[0] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
     top = model.reference_speed if model.known_speeds is None else float(model.known_speeds[1])
     v_x = np.linspace(0.0, top, SPEEDS)
     pressed = car.load_ratio(v_x)
     a_y = (grip * pressed).min(axis=1)
-    braking, driving = (
-        np.array(
-            [
-                _side(*at, sign * transfer, grip, np.array(c))
-                for at in zip(a_y, pressed, strict=True)
-            ]
-        )
-        for sign, c in ((-1.0, use[:2]), (1.0, use[2:]))
-    )
-    return Limits(v_x, GRAVITY * a_y, GRAVITY * braking, GRAVITY * driving)
+    sides = [
+        [_side(*at, sign * transfer, grip, use) for at in zip(a_y, pressed, strict=True)]
+        for sign, use in ((-1.0, ends[1:3]), (1.0, ends[3:]))
+    ]
+    return Limits(v_x, *(GRAVITY * np.array([a_y, *sides])))
 
 
 def _lowest_grip(model: TireModel, i: int, known: float) -> float:

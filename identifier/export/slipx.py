@@ -21,10 +21,8 @@ HEAD = 'schema_version: "0.2.0"\n'
 DRAWN = 100  # models, for standard deviations
 SIZES = {"mass": (0.5, 15.0), "yaw_inertia": (0.0, 5.0), "wheelbase": (0.0, 0.6)}  # SI
 GUESSED = (
-    "ixx, iyy, length, width, wheel_radius, differential, roll_resist, compound, limits.yaml, "
-)
-GUESSED += (
-    "mu_x0 (as mu_y0), k_mu (force goes with load), and unless declared tracks, h_cog, layout"
+    "ixx, iyy, length, width, tracks, wheel_radius, differential, roll_resist, compound, mu_x0 (as "
+    "mu_y0), k_mu (force goes with load), limits.yaml; unless the car file has them, h_cog, layout"
 )
 
 
@@ -44,7 +42,6 @@ def slipx_files(model: TireModel, rng: np.random.Generator, today: date) -> dict
     drawn = model.samples(DRAWN, rng)
     height, front = car.lengthwise("cg_height"), car.lengthwise("drive_front_share")
     layout = "4WD" if front is None else {0.0: "2WD_rear", 1.0: "2WD_front"}.get(front, "4WD")
-    name = json.dumps(visible(car.name))
     origin = f"""\
 label: provisional
 source: "a driving log"
@@ -53,8 +50,8 @@ date: "{today.isoformat()}"
 notes: "Not identified, typical of the class: {GUESSED}."
 """
     files = {
-        "car.yaml": f"{HEAD}name: tireid_car\ndescription: {name}\ndynamics: dynamics.yaml\n"
-        "limits: limits.yaml\nprovenance: provenance.yaml\n",
+        "car.yaml": f"{HEAD}name: tireid_car\ndescription: {json.dumps(visible(car.name))}\n"
+        "dynamics: dynamics.yaml\nlimits: limits.yaml\nprovenance: provenance.yaml\n",
         "provenance.yaml": HEAD + origin,
         "limits.yaml": f"{HEAD}steering: {{max_angle: 0.4}}\n"
         "drivetrain: {accel_max: 8.0, decel_max: 12.0, v_max: 20.0}\n",

@@ -91,8 +91,12 @@ def test_the_axle_identifier_and_a_network_give_property_files_too(tmp_path):
         assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max(), model.kind
 
 
-def test_a_property_file_says_what_it_is_and_what_it_is_not():
+def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
     model = fitted(**TIRES)
+    tire, load = read(model, "front", tmp_path), 0.5 * CAR.axle_loads[0]
+    assert tire.coefficients.FNOMIN == pytest.approx(load)
+    assert tire.valid_range.F_z[0] < load < tire.valid_range.F_z[1]
+    assert tire.valid_range.alpha[1] == pytest.approx(model.known_slip[0])
     text = tire_properties(model, "front")
     words = " ".join(line[2:] for line in text.splitlines() if line.startswith("$"))
     for told in ("pure slip", "driving log", "friction of the road", "Is not", "Band of 90 %"):
@@ -143,17 +147,41 @@ def test_limits_of_a_car_are_those_that_the_ellipse_leaves_by_hand():
     np.testing.assert_allclose(found.driving, GRAVITY / 2.0, rtol=1e-3)
 
 
-def test_the_diamond_of_planners_lies_within_the_forces_of_the_model():
-    """Whatever a_x and a_y it allows, both axles of the model can give, by `FittedModel.ratio`."""
-    model = fitted(PRESSED, sd=1e-6, **TIRES, load_transfer=0.25, braking_f=1.1, driving_r=1.3)
+@pytest.mark.parametrize(
+    ("h", "braking_r", "driving_f"), [(0.4, 0.9, 0.8), (0.45, 0.2, 0.2), (0.1, 1.1, 1.3)]
+)
+def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_r, driving_f):
+    """All that it allows both axles can give, by `FittedModel.ratio`; of a larger one they cannot.
+
+    So it is on the side that limits a_x_max; the other is as wide or wider.
+    """
+    use = {"braking_f": 0.1, "braking_r": braking_r, "driving_f": driving_f, "driving_r": 0.1}
+    grip = {"ln_grip_f": math.log(1.3), "ln_grip_r": math.log(1.25)}
+    model = fitted(PRESSED, sd=1e-6, load_transfer=h, **use, **grip)
     found = limits(model)
-    peak = (model.force_at(np.linspace(0.0, 0.15, 300)) / PRESSED.axle_loads).max(axis=0)
+    low = 1.0 - Z * model.load_doubt
+    forces = [model.force_at(np.linspace(0.0, known, 300))[:, i].max()
+              for i, known in enumerate(model.known_slip)]  # fmt: skip
+    peak = low * forces / PRESSED.axle_loads
     coasting = -PRESSED.drag * found.v_x**2
     for side, most in ((-1.0, found.braking), (1.0, found.driving)):
-        for share in np.linspace(0.0, 0.99, 12):
+        spare = []
+        for share in np.linspace(0.0, 0.999, 200):
             ratio = model.ratio(found.v_x, coasting + side * share * most)
             able = GRAVITY * (peak * ratio).min(axis=1)
-            assert (found.a_y * (1.0 - share) <= able + 1e-6).all(), (side, share)
+            assert (found.a_y * (1.0 - share) <= 1.002 * able).all(), (side, share)
+            larger = model.ratio(found.v_x, coasting + side * share * 1.03 * most)
+            spare.append(GRAVITY * (peak * larger).min(axis=1) - found.a_y * (1.0 - share))
+        ends = 1.03 * most * (braking_r if side < 0.0 else driving_f) > GRAVITY
+        assert ((np.min(spare, axis=0) < 0.0) | ends | (most > 0.999 * found.a_y)).all(), side
+
+
+def test_the_end_of_what_is_not_known_of_the_ellipse_is_taken():
+    model = level(load_transfer=0.0, **{**NO_ELLIPSE, "braking_r": 1.25})
+    covariance, k = model.covariance.copy(), INDEX["braking_r"]
+    covariance[k, k] = 0.2**2
+    found = limits(replace(model, covariance=covariance))
+    np.testing.assert_allclose(found.braking, GRAVITY / (1.25 + Z * 0.2), rtol=1e-3)
 
 
 def test_limits_fall_with_what_is_not_known_and_models_without_a_band_have_none():
