@@ -57,7 +57,11 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     known, speeds, car = model.known_slip, model.known_speeds, model.vehicle
     if known is None or not known.min() > 0.0:
         raise ValueError("the force of an axle is not known at any slip: drive harder")
-    v_x = np.full(1, model.reference_speed) if speeds is None else np.linspace(*speeds, COUNT)
+    v_x = (
+        np.full(1, model.reference_speed)
+        if speeds is None
+        else np.linspace(speeds[0], speeds[1], COUNT)
+    )
     force = model.force_at(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
     most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)

@@ -94,7 +94,7 @@ def test_the_axle_identifier_and_a_network_give_property_files_too(tmp_path):
 def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
     model = fitted(**TIRES)
     tire, load = read(model, "front", tmp_path), 0.5 * CAR.axle_loads[0]
-    assert tire.coefficients.FNOMIN == pytest.approx(load)
+    assert pytest.approx(load) == tire.coefficients.FNOMIN
     assert tire.valid_range.F_z[0] < load < tire.valid_range.F_z[1]
     assert tire.valid_range.alpha[1] == pytest.approx(model.known_slip[0])
     text = tire_properties(model, "front")
