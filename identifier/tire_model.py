@@ -344,9 +344,7 @@ class TireModel(ABC):
 
     @property
     def lengthwise(self) -> tuple[Array, Array] | None:
-        """Numbers of `motion.parameters` (p,) and their covariance (p, p), of which load transfer
-        and friction ellipse are; None where the model has none of its own.
-        """
+        """Parameters (p,) with load transfer and ellipse, and covariance (p, p); None: it has none."""
         return None
 
     def road_differs(self, t: Array) -> NDArray[np.bool_]:

@@ -39,12 +39,8 @@ class Limits(NamedTuple):
 def limits(model: TireModel) -> Limits:
     """Return the limits of a model's car from standing to the fastest speed that was driven.
 
-    Load transfer and ellipse of a model that has none are what is believed of its car.
-
-    Raises
-    ------
-    ValueError
-        Where the model cannot tell how sure it is, or an axle has no slip at which it is sure.
+    Load transfer and ellipse of a model that has none are what is believed of its car. A model
+    that cannot tell how sure it is, or is sure at no slip of an axle, is refused.
     """
     car, known, own = model.vehicle, model.known_slip, model.lengthwise
     if known is None or not model.has_band:

@@ -27,13 +27,7 @@ GUESSED = (
 
 
 def slipx_files(model: TireModel, rng: np.random.Generator, today: date) -> dict[str, str]:
-    """Return the files of the folder by path.
-
-    Raises
-    ------
-    ValueError
-        Where the car is none of the class, or the model cannot tell how sure it is.
-    """
+    """Return the files of the folder by path, of a car of the class and a model with a doubt."""
     car = model.vehicle
     for key, (low, high) in SIZES.items():
         if not low < (value := float(getattr(car, key))) <= high:
@@ -103,6 +97,7 @@ def _tire(model: TireModel, axle: Axle, drawn: Sequence[TireModel], origin: str)
     return f"""{HEAD}\
 compound: rubber
 surface: as-driven-{axle}
+# Differs from the curve of tireid by at most {100.0 * found.missed:.2g} % of its largest force.
 nominal_load: {load:.9f}
 linear: {{c_alpha: {stiff:.9f}}}
 friction: {{mu_y0: {mu:.9f}, mu_x0: {mu:.9f}, k_mu: 0.0}}

@@ -20,7 +20,7 @@ WIDEST, BEYOND = 0.6, 0.02  # slip up to which curves are compared [rad]; weight
 LEAST_REACH, REACH = 0.032, 0.1  # rad, that is followed at least, and where nothing is said
 LOW, HIGH = (0.0, -4.0, 1.0001, -5.0), (6.0, 2.0, 2.4, 0.95)  # of ln K, ln μ, C, E
 WORST = 5.0  # power of the errors whose squares are summed at last: near to the largest one
-MOST_MISSED = 0.05  # of the peak: past that a curve is no Magic Formula
+MOST_MISSED = 0.1  # of the peak: past that a curve is no Magic Formula
 PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
 
 
@@ -38,14 +38,9 @@ class MagicCurve(NamedTuple):
 
 
 def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> MagicCurve:
-    """Return the Magic Formula nearest to the curve of an axle.
+    """Return the Magic Formula nearest to the curve of an axle; refuse one beyond `MOST_MISSED`.
 
     drawn : models whose spread is the standard deviation, by one linear step each.
-
-    Raises
-    ------
-    ValueError
-        Where it misses more than `MOST_MISSED` of the largest force.
     """
     i, known = AXLES.index(axle), model.known_slip
     reach = REACH if known is None else max(LEAST_REACH, float(known[i]))

@@ -46,22 +46,14 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     """Return the understeer gradient at the speeds and within the slips that were driven.
 
     Its standard deviation is half of what lies between the 16 % and 84 % points of models drawn
-    from what the drives left open.
-
-    Raises
-    ------
-    ValueError
-        Where the model cannot tell how sure it is, or nothing is known of an axle.
+    from what the drives left open. A model that cannot tell how sure it is is refused.
     """
     drawn = model.samples(DRAWN, rng)
     known, speeds, car = model.known_slip, model.known_speeds, model.vehicle
     if known is None or not known.min() > 0.0:
         raise ValueError("the force of an axle is not known at any slip: drive harder")
-    v_x = (
-        np.full(1, model.reference_speed)
-        if speeds is None
-        else np.linspace(speeds[0], speeds[1], COUNT)
-    )
+    slow, fast = (model.reference_speed,) * 2 if speeds is None else speeds
+    v_x = np.unique(np.linspace(slow, fast, COUNT))
     force = model.force_at(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
     most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)

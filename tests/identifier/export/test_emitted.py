@@ -109,7 +109,7 @@ def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
 
 
 def test_a_curve_that_is_no_magic_formula_has_no_property_file():
-    bumpy = fitted(residual0_f=0.8, residual1_f=-0.9, residual2_f=0.5)
+    bumpy = fitted(residual0_f=2.0, residual1_f=-2.2, residual2_f=0.9)
     with pytest.raises(ValueError, match=r"front axle is no Magic Formula: .* % of its peak"):
         tire_properties(bumpy, "front")
 
@@ -336,6 +336,7 @@ def test_the_folder_of_slipx_holds_value_and_deviation_of_each_number_of_a_tire(
     stiff = float(re.search(r"c_alpha: {value: \S+, stddev: (\S+),", text)[1])
     expected = next(one for one in model.estimates() if one.title == "cornering stiffness")
     assert stiff == pytest.approx(0.5 * expected.sd, rel=0.4)
+    assert re.search(r"curve of tireid by at most \S+ % of its largest", text)
     assert "2026-11-26" in text and "typical of the class" in text
 
 
