@@ -344,7 +344,7 @@ class TireModel(ABC):
 
     @property
     def lengthwise(self) -> tuple[Array, Array] | None:
-        """Parameters (p,) with load transfer and ellipse, and covariance (p, p); None: it has none."""
+        """Parameters (p,) with load transfer and ellipse, and covariance (p, p); None: none."""
         return None
 
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
