@@ -59,6 +59,8 @@ def emit(
     if understeer is False and tir is slipx is ggv is None:
         raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
     model = source.tire if isinstance(source, Run) else source
+    if tir is not None and not Path(tir).name:
+        raise OutputError(f"tir must name a file, it is {str(tir)!r}")
     table = None if isinstance(understeer, bool) else Path(understeer)
     files = [] if tir is None else [Path(tir).with_stem(f"{Path(tir).stem}_{a}") for a in AXLES]
     files += [Path(one) for one in (ggv, table) if one is not None]

@@ -65,6 +65,7 @@ def test_what_cannot_be_written_or_known_leaves_nothing(stored, tmp_path, capsys
     assert "slipx describes cars of 1:10" in line
     line = refused(capsys, stored / "tire.json", "--ggv", ggv, "--understeer", "--out", ggv)
     assert "two outputs have one name" in line
+    assert "tir must name a file" in refused(capsys, stored / "tire.json", "--tir", "")
     line = refused(capsys, stored / "tire.json", "--ggv", tmp_path / "none" / "ggv.csv")
     assert f"{tmp_path / 'none' / 'ggv.csv'} cannot be a file" in line
     assert list(tmp_path.iterdir()) == []
