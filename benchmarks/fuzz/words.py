@@ -17,7 +17,7 @@ FEW = (
     "2e0",
     "٢",
 )  # more of them is more work, as asked
-PLACES = ("--out", "--tune", "--tir", "--ggv", "--slipx", "init", "sample")  # here it writes
+PLACES = ("--out", "--tune", "init", "sample")  # what follows is written
 OUTS = (
     *(
         "out",
