@@ -64,7 +64,7 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
     missed = float(np.abs(errors(z))[inside].max())
     if not missed <= MOST_MISSED:
         raise ValueError(
-            f"the curve of the {axle} axle is no Magic Formula: the nearest one misses "
+            f"the curve of the {axle} axle is no Magic Formula: the nearest one is off by "
             f"{100.0 * missed:.2g} % of its peak ({100.0 * MOST_MISSED:g} % are allowed)"
         )
     moved = [formula(slip, z + h) - formula(slip, z - h) for h in 1e-5 * np.eye(4)]

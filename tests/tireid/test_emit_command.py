@@ -32,12 +32,12 @@ def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
     words = ["--tir", "car.tir", "--ggv", "ggv.csv", "--out", "understeer.csv"]
     words = [word if word.startswith("--") else str(tmp_path / word) for word in words]
     assert main(["emit", str(stored / "tire.json"), "--understeer", *words]) == 0
-    told = capsys.readouterr()
+    printed = capsys.readouterr()
     names = {"car_front.tir", "car_rear.tir", "ggv.csv", "understeer.csv"}
     assert {path.name for path in tmp_path.iterdir()} == names
-    assert all(f"wrote {tmp_path / name}" in told.err for name in names)
+    assert all(f"wrote {tmp_path / name}" in printed.err for name in names)
     rows = np.loadtxt(tmp_path / "understeer.csv", delimiter=",", skiprows=1)
-    head, first = (line.split() for line in told.out.splitlines()[:2])
+    head, first = (line.split() for line in printed.out.splitlines()[:2])
     assert head == ["v_x_m_s", "a_y_m_s2", "gradient_deg_per_g", "sd_deg_per_g"]
     assert [float(one) for one in first] == pytest.approx(rows[0])
     for axle, load in zip(("front", "rear"), tire.vehicle.axle_loads, strict=True):

@@ -99,8 +99,8 @@ def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
     assert tire.valid_range.alpha[1] == pytest.approx(model.known_slip[0])
     text = tire_properties(model, "front")
     words = " ".join(line[2:] for line in text.splitlines() if line.startswith("$"))
-    for told in ("pure slip", "driving log", "friction of the road", "Is not", "Band of 90 %"):
-        assert told in words
+    for part in ("pure slip", "driving log", "friction of the road", "Is not", "Band of 90 %"):
+        assert part in words
     assert f"{math.degrees(model.known_slip[0]):.3g} deg" in words
     known = model.known_slip[:1]
     half = 0.5 * model.half_band(known)[0, 0]
