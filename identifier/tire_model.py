@@ -342,6 +342,11 @@ class TireModel(ABC):
         """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
         return None
 
+    @property
+    def lengthwise(self) -> tuple[Array, Array] | None:
+        """Parameters (p,) with load transfer and ellipse, and covariance (p, p); None: none."""
+        return None
+
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
         return np.zeros(t.shape, dtype=bool)

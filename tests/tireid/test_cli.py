@@ -101,7 +101,8 @@ def test_an_option_takes_the_same_in_every_command():
 def test_folders_are_named_by_out_and_nothing_is_replaced_without_force():
     options = options_of()
     for name, action in options["--out"].items():
-        assert action.default == (None if name in ("check", "doctor") else Path(f"tireid-{name}"))
+        asked = name in ("check", "doctor", "emit")
+        assert action.default == (None if asked else Path(f"tireid-{name}"))
         assert not action.required
         assert name in options["--force"]
     assert set(COMMANDS) - set(options["--out"]) == {"channels", "init", "sample"}  # one file each

@@ -30,6 +30,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "compare": "learn, freeze and replay with every method, side by side",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
         "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
     }
