@@ -10,13 +10,12 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge, judge_prediction
+from identifier.verdict import Verdict
 from tireid import report as page
 from tireid.commands import COMMANDS, certificate_table, demo_parts
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
 from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
-from tireid.commands.identify_results import write_results
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -53,7 +52,6 @@ REFERENCE = (
 
 def _demo_report(
     story: Story,
-    verdict: Verdict,
     shipped: demo_parts.Shipped,
     study: Study,
     driven: dict[str, demo_parts.Driven],
@@ -62,8 +60,7 @@ def _demo_report(
     command: str,
 ) -> page.Report:
     """Return the report: the product first, the paper's study folded."""
-    learnt = story.axle.learnt
-    model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
+    model, runs, verdict = story.axle.model, story.axle.runs, story.axle.verdict
     return page.Report(
         title=_TITLE,
         summary=SUMMARY,
@@ -71,7 +68,7 @@ def _demo_report(
             verdict_headline(verdict),
             *missed_headline(verdict),
             *number_headlines(verdict),
-            *identify_headlines(model, runs, story.axle.frozen[FREEZE]),
+            *identify_headlines(model, runs, story.axle.replays),
             *demo_parts.drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
@@ -149,7 +146,7 @@ def _predict(story: Story) -> page.Section:
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    for history in story.axle.others:
+    for history in story.axle.runs[1:]:
         name = history.recording.name
         said = name.replace("_", " ")
         figure = side_by_side_figure(story.side_by_side(name))
@@ -316,21 +313,11 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
-        parts = {"identify": story.axle, "paper_network": story.paper}
-        verdicts = {name: judge(part.learnt, FREEZE) for name, part in parts.items()}
-        figures: dict[str, Mapping[str, Figure]] = {}
-        for name, part in parts.items():
-            model = part.learnt.freeze(FREEZE)
-            figures[name] = write_results(
-                folders[name],
-                part.law,
-                part.learnt,
-                part.others,
-                part.frozen,
-                verdicts[name],
-                {one.recording.name: judge_prediction(model, one.recording) for one in part.others},
-            )
-        operation, drive = story.design.operation(story.car), story.paper.learnt.recording
+        figures: dict[str, Mapping[str, Figure]] = {
+            "identify": story.axle.write(folders["identify"]),
+            "paper_network": story.paper.write(folders["paper_network"]),
+        }
+        operation, drive = story.design.operation(story.car), story.paper.runs[0].recording
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
@@ -341,9 +328,7 @@ def run(options: argparse.Namespace) -> None:
         work.begin(DRIVING)
         driven = demo_parts.drive_story(story, folder)
         work.begin(_REPORTING)
-        report = _demo_report(
-            story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
-        )
+        report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
         page.write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),
