@@ -146,8 +146,6 @@ class Progress:
 
     Use it as a context: the changing line goes away at its end.
 
-    Parameters
-    ----------
     parts : names of its parts in order, and about how long each takes beside the others; None has
         one.
     long : whether it is known to last, so that the beginning of each part is told at once.

@@ -97,8 +97,6 @@ SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
 class Ground:
     """The upper part of the picture.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     """

@@ -44,8 +44,6 @@ LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "learnt by
 class _ForcePanel:
     """Force of an axle over its slip: the curves as they were known then, and where the tire is.
 
-    Parameters
-    ----------
     axle : 0 is the front axle, 1 the rear.
     known : what was known over time; None where nothing was learnt, so that nothing changes.
     drop : arc length [m] from which the true tire is that of the end; infinite for never.
@@ -143,8 +141,6 @@ class _ForcePanel:
 class _DeviationPanel:
     """Deviation over arc length: faint as a whole, strong up to now.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     """
@@ -180,8 +176,6 @@ class _DeviationPanel:
 class _Overview:
     """A closed course as a whole, and where the cars are.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     """
 
@@ -225,8 +219,6 @@ BEHIND, _AHEAD = 12.0, 36.0  # what is shown along the path [m]
 class Scene:
     """The stage on which a drive is shown.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.

@@ -317,10 +317,8 @@ def run(options: argparse.Namespace) -> None:
             "identify": story.axle.write(folders["identify"]),
             "paper_network": story.paper.write(folders["paper_network"]),
         }
-        operation, drive = story.design.operation(story.car), story.paper.runs[0].recording
-        draw_check(
-            folders["paper_network"], drive, story.car, story.design, operation, story.certificate
-        )
+        operation = story.design.operation(story.car)
+        draw_check(folders["paper_network"], story.paper.runs[0], operation, story.certificate)
         work.begin(_EXPORTING)
         shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
         study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))

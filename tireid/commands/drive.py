@@ -1,7 +1,6 @@
 """`tireid drive`: steer a car along a path, told of the tires that were learnt."""
 
 import argparse
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -23,7 +22,7 @@ from tireid.commands.drive_results import NO_FILM, drive_lines, known_curves, wr
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION
 from tireid.driving.setup import PERIOD, PLANT
-from tireid.output import output_folder
+from tireid.output import finite, output_folder
 from tireid.progress import say, tell
 from tireid.reports.drive import write_drive_report
 
@@ -77,24 +76,16 @@ def inputs_of(
         **({"sensors": conditions.kind} if conditions.kind != driving.FULL else {}),
         **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
         **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
-        "faults": [_finite(asdict(fault)) for fault in conditions.faults],
+        "faults": [finite(asdict(fault)) for fault in conditions.faults],
         "seed": conditions.seed,
     }
-
-
-def _finite(numbers: dict[str, Any]) -> dict[str, Any]:
-    """Return the numbers with null for what has no end, which JSON cannot say."""
-    return {key: None if value == math.inf else value for key, value in numbers.items()}
 
 
 def _chassis(vehicle: Vehicle) -> dict[str, Any]:
     """Return the chassis, with a hash in place of the file of its tire."""
     chassis = vehicle.require_chassis()
-    tire = (
-        None
-        if chassis.tire is None
-        else digest(Path(chassis.tire).read_text(errors="replace", encoding="utf-8"))
-    )
+    path = None if chassis.tire is None else Path(chassis.tire)
+    tire = None if path is None else digest(path.read_text(errors="replace", encoding="utf-8"))
     return {**asdict(chassis), "tire": tire}
 
 
@@ -118,27 +109,20 @@ def add_parser(commands: Any) -> None:
         "every signal as CSV, figures and a film.",
         epilog=_EPILOG,
     )
-    parser.add_argument(
-        "--path",
-        default="iso-3888-2",
-        metavar="NAME|FILE.csv",
-        help=f"{', '.join(BUILT_IN)}, or way-points with the columns X_m, Y_m (%(default)s)",
-    )
-    parser.add_argument(
-        "--speed",
-        default="90%",
-        metavar="WHAT",
-        help="share of the grip that the tightest bend takes (90%%), or a speed (17m/s, 60km/h); "
-        "constant on an open path; a share on a closed one brakes for bends (%(default)s)",
-    )
-    parser.add_argument("--mu", type=float, default=1.0, help="friction of the road (%(default)s)")
-    parser.add_argument(
-        "--mu-drop",
-        action="append",
-        default=[],
-        metavar="S:MU",
-        help="friction from arc length S [m] on, known to nobody but oracle; may be repeated",
-    )
+    given = {
+        "--path NAME|FILE.csv": (
+            "iso-3888-2",
+            f"{', '.join(BUILT_IN)}, or way-points with the columns X_m, Y_m (%(default)s)",
+        ),
+        "--speed WHAT": (
+            "90%",
+            "share of the grip that the tightest bend takes (90%%), or a speed (17m/s, 60km/h); "
+            "constant on an open path; a share on a closed one brakes for bends (%(default)s)",
+        ),
+    }
+    shared.add_options(parser, str, given)
+    text = "friction from arc length S [m] on, known to nobody but oracle; may be repeated"
+    parser.add_argument("--mu-drop", action="append", default=[], metavar="S:MU", help=text)
     parser.add_argument(
         "--tires",
         nargs="+",
@@ -151,13 +135,25 @@ def add_parser(commands: Any) -> None:
     shared.add_weights(parser, "the frozen tires, as identified")
     shared.add_method(parser)
     shared.add_vehicle(parser)
-    parser.add_argument(
-        "--delay",
-        type=float,
-        default=20.0,
-        metavar="MS",
-        help="from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
-    )
+    numbers = {
+        "--mu": (1.0, "friction of the road (%(default)s)"),
+        "--delay MS": (
+            20.0,
+            "from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
+        ),
+        "--dither M": (
+            0.0,
+            "weave by at most so much about the path, to learn from it; where the car goes on "
+            "learning the weave fades as the tires become known (%(default)g: off)",
+        ),
+        "--caution SHARE": (
+            0.0,
+            "of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
+            "plans with the least grip that its motion leaves possible (%(default)g)",
+        ),
+        "--laps N": (1.0, "of a closed path (%(default)g)"),
+    }
+    shared.add_options(parser, float, numbers)
     parser.add_argument(
         "--noise", action=argparse.BooleanOptionalAction, default=True, help="of the sensors (on)"
     )
@@ -171,41 +167,16 @@ def add_parser(commands: Any) -> None:
         "position (2 cm) and heading (0.1 degrees) of a localization, and no v_y: an identifier "
         "that learns while it drives tells it (%(default)s)",
     )
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="CHANNEL:KIND:START:DURATION[:SIZE]",
-        help=f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "
-        f"{', '.join(KINDS)}; may be repeated",
+    text = (
+        f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "
+        f"{', '.join(KINDS)}; may be repeated"
     )
-    parser.add_argument(
-        "--dither",
-        type=float,
-        default=0.0,
-        metavar="M",
-        help="weave by at most so much about the path, to learn from it; where the car goes on "
-        "learning the weave fades as the tires become known (%(default)g: off)",
-    )
-    parser.add_argument(
-        "--caution",
-        type=float,
-        default=0.0,
-        metavar="SHARE",
-        help="of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
-        "plans with the least grip that its motion leaves possible (%(default)g)",
-    )
+    fault = "CHANNEL:KIND:START:DURATION[:SIZE]"
+    parser.add_argument("--fault", action="append", default=[], metavar=fault, help=text)
     shared.add_seed(parser, "noise and learning")
-    parser.add_argument(
-        "--laps", type=float, default=1.0, metavar="N", help="of a closed path (%(default)g)"
-    )
-    parser.add_argument(
-        "--film",
-        choices=(*FORMATS, NO_FILM),
-        default=FORMATS[0],
-        metavar="NAME",
-        help=f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)",
-    )
+    formats: dict[str, Any] = {"choices": (*FORMATS, NO_FILM), "default": FORMATS[0]}
+    text = f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)"
+    parser.add_argument("--film", metavar="NAME", help=text, **formats)
     shared.add_network_arguments(parser, "steer on this frozen network")
     shared.add_output(parser, "drive")
     parser.set_defaults(run=run)

@@ -13,7 +13,7 @@ from identifier.methods import DEFAULT, usual
 from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
-from identifier.tire_model import TireModel, load_model
+from identifier.tire_model import TireModel
 from identifier.verdict import Verdict, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
@@ -27,7 +27,7 @@ from tireid.learning import identify, with_v_y
 from tireid.output import output_folder, require_curves, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
-from tireid.verdicts import asked_text, verdict_text, warn_of_stored
+from tireid.verdicts import asked_text, verdict_text
 
 LEARNING, _JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
 
@@ -51,43 +51,27 @@ def add_parser(commands: Any) -> None:
     shared.add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_method(parser)
-    parser.add_argument(
-        "--freeze",
-        nargs="+",
-        action="extend",
-        type=float,
-        metavar="T",
-        help="freeze at these times [s] (the end)",
+    several: dict[str, Any] = {"nargs": "+", "action": "extend"}
+    text = "freeze at these times [s] (the end)"
+    parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
+    text = "recordings to predict, each with a verdict"
+    parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
+    text = (
+        "state forces that are guaranteed where no force differs from the best curve by more "
+        "than E static axle loads, or, with a second number, is late by more [s] (estimated)"
     )
-    parser.add_argument(
-        "--replay",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="LOG[:RUN]",
-        help="recordings to predict, each with a verdict",
-    )
-    parser.add_argument(
-        "--bound",
-        nargs="*",
-        type=float,
-        metavar="E",
-        help="state forces that are guaranteed where no force differs from the best curve by more "
-        "than E static axle loads, or, with a second number, is late by more [s] (estimated)",
-    )
+    parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
     add_repair(parser, "learn on what is left, and write it to")
     shared.add_weights(parser, "begin learning with it")
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_network_arguments(parser, "freeze nothing, judge this network instead")
     shared.add_accept(parser)
-    parser.add_argument(
-        "--curves",
-        choices=("csv", "parquet"),
-        default="csv",
-        help="as what curves over time are written (csv); parquet is smaller, sooner written and "
-        "has all digits",
+    text = (
+        "as what curves over time are written (csv); parquet is smaller, sooner written and "
+        "has all digits"
     )
+    parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
@@ -103,9 +87,7 @@ def run(options: argparse.Namespace) -> int:
     bound = None if options.bound is None else AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
         raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
-    start = None if options.weights is None else load_model(options.weights)
-    if options.weights is not None:
-        warn_of_stored(options.weights)
+    start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
     require_curves(options.curves)

@@ -14,7 +14,7 @@ from codegen.escape import visible
 from identifier.frozen import vehicle_numbers
 from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
-from identifier.tire_model import UNCALIBRATED, TireModel, load_model
+from identifier.tire_model import UNCALIBRATED, TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__, output
@@ -28,7 +28,7 @@ from tireid.figures.tires import slip_figure
 from tireid.learning import replay
 from tireid.progress import say, tell
 from tireid.reports.predict import write_predict_report
-from tireid.verdicts import verdict_text, warn_of_stored
+from tireid.verdicts import verdict_text
 
 
 def add_parser(commands: Any) -> None:
@@ -97,13 +97,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _model(options: argparse.Namespace) -> TireModel:
     """Return the model, on the car that drove."""
-    model = load_model(options.model)
-    warn_of_stored(options.model)
-    if options.vehicle is None:
-        shared.say_estimates(model.vehicle, options.model)
-        vehicle = shared.repaired_vehicle(model.vehicle, options)
-    else:
-        vehicle = shared.read_vehicle(options)
+    model = shared.stored_model(options.model)
+    assert model is not None
+    vehicle = shared.car_of(options, model, options.model)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:

@@ -74,8 +74,6 @@ def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
 class DrawnRun:
     """What is drawn of what a run recorded, gathered block by block.
 
-    Parameters
-    ----------
     ends : first and last time [s].
     """
 

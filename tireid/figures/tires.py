@@ -124,8 +124,6 @@ def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
 class TireCurve:
     """Steady axle forces over slip, one curve an axle.
 
-    Parameters
-    ----------
     alpha : slip in the paper's sign [rad], (k,).
     force : of front and rear axle [N], (k, 2).
     """
