@@ -215,8 +215,6 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     slides by more than `MOST_SLIDING`, the window is empty, and x begins anew in a steady turn;
     θ and its covariance are kept.
 
-    Parameters
-    ----------
     samples : N of the window.
     """
     stage, constants = build_stage(), ("vehicle", "sampling", "numbers")
@@ -282,14 +280,7 @@ def _scan(samples: int, iterations: int) -> Scan:
 class HorizonEstimator(Method):
     """Lateral velocity and two numbers per tire by moving-horizon estimation; v_y is not read.
 
-    Parameters
-    ----------
     window : how long what was measured is looked at again [s].
-
-    Raises
-    ------
-    ValueError
-        Where the filter learns no tire, or the window is none or too long.
     """
 
     filter: SlipFilter

@@ -38,14 +38,7 @@ INFINITE = AxleRmse(front=np.inf, rear=np.inf)
 class Course:
     """What methods are compared on.
 
-    Parameters
-    ----------
     min_speed : samples below this speed [m/s] do not count, for any method.
-
-    Raises
-    ------
-    ValueError
-        Where there is no recording, two have the same name, or one shows no force to learn.
     """
 
     vehicle: Vehicle
@@ -90,8 +83,6 @@ class Course:
     def error(self, recording: Recording, force: Array) -> AxleRmse:
         """Return the RMSE of forces over the samples that count; infinite where not finite.
 
-        Parameters
-        ----------
         force : (n, 2) [N].
         """
         if self.by_motion:
@@ -116,8 +107,6 @@ class Course:
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].
 
-        Parameters
-        ----------
         error : over it [N].
         """
         (recording,) = (rec for rec in self.recordings if rec.name == name)
@@ -128,8 +117,6 @@ class Course:
 class Trial:
     """One method on a course.
 
-    Parameters
-    ----------
     online : by recording, error of what was identified online [N].
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
@@ -197,8 +184,6 @@ SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie
 class SideSlip:
     """What a method told of lateral velocity over a recording, and how far it was off.
 
-    Parameters
-    ----------
     v_y : told at each sample (n,) [m/s].
     v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.
     rms : of the error of side slip, from the first sample at a speed that counts [deg], infinite
@@ -215,8 +200,6 @@ class SideSlip:
 def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSlip | None:
     """Return what a run told of lateral velocity; None of a method that reads it.
 
-    Parameters
-    ----------
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """
@@ -257,8 +240,6 @@ def frozen_shares(
 ) -> tuple[float | None, float | None]:
     """Return the mean errors of frozen models where they learnt and elsewhere [%].
 
-    Parameters
-    ----------
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on, other = where_learnt_and_elsewhere(frozen)
@@ -273,8 +254,6 @@ def where_learnt_and_elsewhere(
 ) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
     """Return name and error of replays of the drive that was learnt, and of every other drive.
 
-    Parameters
-    ----------
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on: list[tuple[str, AxleRmse]] = []
@@ -306,8 +285,6 @@ def step_times(
     busy machine does not count, and the methods take turns. A short recording is run forward and
     backward in time until it is long enough, of a long one the first 100 000 samples count.
 
-    Parameters
-    ----------
     repeats : turns; the shortest counts.
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}

@@ -17,8 +17,6 @@ Frozen = Mapping[str, Mapping[str, AxleRmse]]
 class Comparison:
     """Methods side by side.
 
-    Parameters
-    ----------
     trials : by method, its errors with the numbers that follow from the vehicle.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them, a method
         that learns from whole logs never.
@@ -65,16 +63,8 @@ def run_comparison(
 ) -> Comparison:
     """Run every method over every recording.
 
-    Parameters
-    ----------
     recordings : with true forces, or judged by the motion.
     others : further methods by name.
-
-    Raises
-    ------
-    ValueError
-        Where a method is unknown, or the recordings cannot be compared on; a RecordingError where
-        one cannot learn on them, as `cannot_learn` tells.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
     methods |= others or {}

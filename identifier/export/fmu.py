@@ -67,15 +67,8 @@ def build_binary(
 ) -> bytes:
     """Compile sources to a shared library and return its content.
 
-    Parameters
-    ----------
     model : content by name of C files and headers that need no other: compiled once for both
         versions of FMI, since the equations take longest.
-
-    Raises
-    ------
-    CompilationError
-        Where the compiler refuses them.
     """
     built = _objects(target, tuple(sorted(model.items())))
     with _folder_of({**model, **around, **dict(built)}) as folder:
@@ -128,8 +121,6 @@ TOKEN = "token.h"
 def token_header(token: str, version: int) -> str:
     """Return token.h, which tells this FMU from every other one.
 
-    Parameters
-    ----------
     token : GUID of FMI 2.0, instantiation token of FMI 3.0.
     version : of FMI, 2 or 3.
     """
@@ -138,15 +129,7 @@ def token_header(token: str, version: int) -> str:
 
 
 def model_files(specialized: SpecializedStep) -> dict[str, str]:
-    """Return header and sources of the C package by file name.
-
-    Raises
-    ------
-    UnknownOperationError
-        Where the method needs an operation that has no plain C.
-    ValueError
-        Where nothing is carried from step to step, or a carried value is not finite.
-    """
+    """Return header and sources of the C package by file name."""
     about = summary(specialized, ingredients(specialized, single=False))
     sources = c_sources(specialized, single=False, about=about)
     return {PurePosixPath(path).name: text for path, text in sources.items()}
@@ -285,8 +268,6 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 def element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
     """Return an element; attributes that are empty strings are left out.
 
-    Parameters
-    ----------
     attributes : by name; True and False become true and false.
     """
     words = {name: _text(value) for name, value in attributes.items() if value != ""}
@@ -313,8 +294,6 @@ TOOL = "tireid"
 def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
     """Return modelDescription.xml of FMI 2.0.
 
-    Parameters
-    ----------
     sources : names of the C files.
     """
     table = variables(specialized)
@@ -404,8 +383,6 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
 def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
     """Return sources/buildDescription.xml of FMI 3.0.
 
-    Parameters
-    ----------
     sources : names of the C files.
     """
     files = (element("SourceFile", {"name": name}) for name in sources)
@@ -508,19 +485,8 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     interval after the start, whatever the communication step; a step from t to t + h takes those in
     [t, t + h).
 
-    Parameters
-    ----------
     specialized : the step; its name is the model identifier.
     version : of FMI, 2 or 3.
-
-    Raises
-    ------
-    ValueError
-        Where the version is another, nothing is carried, or a carried value is not finite.
-    CompilationError
-        Where a compiler refuses the sources.
-    OSError
-        Where the file cannot be written.
     """
     if version not in OF_VERSION:
         raise ValueError(f"version must be 2 or 3, it is {version}")
@@ -546,8 +512,6 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
 def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
     """Return the text files of an FMU by their path inside it.
 
-    Parameters
-    ----------
     version : of FMI, 2 or 3.
     """
     shared = model_files(specialized)
