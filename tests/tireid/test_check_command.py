@@ -254,9 +254,6 @@ def test_weights_of_a_found_design_are_kept_as_asked(capsys, tmp_path, keeping):
     assert (gains.rho_W > 0.0) == (keeping != "projection")
     assert ("W_free" in said.out, "W_max" in said.out) == tuple(name in found for name in radii)
     assert checked(capsys, "--design", path)[0] == 0
-    code, said = checked(capsys, "--design", path, "--monte-carlo", "16")
-    assert code == 0
-    assert ("by the projection" in said.out) == (keeping == "projection")
     assert checked(capsys, "--keep", keeping)[0] == 2
 
 

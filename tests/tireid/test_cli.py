@@ -25,15 +25,6 @@ def test_wrong_words_are_one_line_with_exit_code_2(capsys, words):
     assert "error:" in said[0]
 
 
-def test_help_lists_the_commands(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["--help"])
-    assert stop.value.code == 0
-    said = capsys.readouterr().out
-    for command in ("demo", "paper", "identify", "check", "drive"):
-        assert command in said
-
-
 def test_without_a_word_it_tells_what_there_is(capsys):
     assert main([]) == 0
     alone = capsys.readouterr().out

@@ -144,10 +144,6 @@ def test_a_method_that_needs_an_accelerometer_is_left_out_where_a_log_has_none(
     assert "blind has none" in capsys.readouterr().err
 
 
-def test_no_method_is_left_out_where_all_logs_have_what_it_needs(numbers):
-    assert numbers["left_out"] == {}
-
-
 def test_times_are_over_that_of_the_integral_law(numbers):
     methods = numbers["methods"]
     assert methods["integral"]["step_ratio"] == 1.0
@@ -195,20 +191,6 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
     )
     assert f"{best[0]:.1f} %" in told and best[1] in told
     assert "tireid compare" in told
-
-
-def test_figures_are_written(result):
-    for name in ("methods", "matrix"):
-        assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_the_same_seed_finds_the_same(words, numbers, tmp_path, undrawn):
-    out = tmp_path / "out"
-    words = [*words, "--method", *METHODS_TRIED]
-    assert main([*words, "--out", str(out)]) == 0
-    again = json.loads((out / "compare.json").read_text())
-    for name in METHODS_TRIED:
-        assert again["methods"][name]["frozen_N"] == numbers["methods"][name]["frozen_N"]
 
 
 @pytest.mark.parametrize(
