@@ -8,7 +8,7 @@ noise of the sensors taken off.
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -146,8 +146,12 @@ def _shown_to(method: Method, recording: Recording) -> Recording:
     return recording if method.needs_v_y else replace(recording, v_y=None)
 
 
-def cross_replay(method: Method, course: Course) -> Trial:
+def cross_replay(
+    method: Method, course: Course, seen: Callable[[History], None] | None = None
+) -> Trial:
     """Learn on each recording afresh, freeze at its end and replay on all.
+
+    seen : called with each run.
 
     A method that tells lateral velocity learns without that of the recording; the frozen tires of
     all are asked at the same slip.
@@ -157,6 +161,8 @@ def cross_replay(method: Method, course: Course) -> Trial:
     for recording in course.recordings:
         history = identify(_shown_to(method, recording), course.vehicle, method)
         end = float(recording.t[-1])
+        if seen is not None:
+            seen(history)
         online[recording.name] = course.error(recording, history.axle_force)
         found = side_slip(history, course.min_speed, recording.v_y)
         told |= {} if found is None else {recording.name: found}

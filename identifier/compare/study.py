@@ -2,15 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
 from identifier.method import Method
 from identifier.methods import REFERENCE, make_method
-from identifier.reproducibility import AxleRmse
+from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
-
-Frozen = Mapping[str, Mapping[str, AxleRmse]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,11 +59,12 @@ def run_comparison(
     progress: Callable[[str], None],
     others: Mapping[str, Method] | None = None,
     left_out: Mapping[str, str] | None = None,
+    seen: Callable[[str, History], None] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
 
     recordings : with true forces, or judged by the motion.
-    others : further methods by name.
+    others : further methods by name.   seen : called with each method's name and run.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
     methods |= others or {}
@@ -72,7 +72,7 @@ def run_comparison(
     course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
     trials = {}
     for name, method in methods.items():
-        trials[name] = cross_replay(method, course)
+        trials[name] = cross_replay(method, course, None if seen is None else partial(seen, name))
         lost = "".join(f", diverged on {rec}" for rec in trials[name].diverged_at)
         progress(f"{name}: learnt on {len(recordings)} recordings, replayed on all{lost}")
     timed = {REFERENCE: make_method(REFERENCE, vehicle, seed)} | methods

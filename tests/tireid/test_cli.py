@@ -33,28 +33,6 @@ def test_without_a_word_it_tells_what_there_is(capsys):
     assert alone == capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "hint"),
-    [
-        (
-            ["identify", "log.csv", "--vehicle", "car.toml", "--law", "axle"],
-            "--law is --method now",
-        ),
-        (
-            ["fleet", "learn", "l.csv", "--vehicle", "c", "--out", "o", "--workers", "2"],
-            "--workers is --jobs now",
-        ),
-        (["check", "--figures", "out"], "--figures is --out now"),
-        (["drive", "--nonsense"], "see tireid --help"),
-    ],
-)
-def test_an_option_that_was_renamed_leads_to_its_new_name(words, hint, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(words)
-    assert stop.value.code == 2
-    assert hint in capsys.readouterr().err
-
-
 def helps(parser):
     """The help of a parser and of all of its commands."""
     yield parser.format_help()

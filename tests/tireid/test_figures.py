@@ -1,10 +1,8 @@
 """Figures: units on every axis, legends beside the data, nothing clipped, truth or no truth."""
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -33,7 +31,7 @@ from tireid.figures.forces import (
     side_by_side_figure,
 )
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
-from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM, scheme_figure
+from tireid.figures.scheme import BLOCKS, scheme_figure
 from tireid.figures.style import (
     BLACK,
     figure_png,
@@ -269,41 +267,6 @@ def test_the_scheme_holds_every_equation_inside_its_frames() -> None:
     for label in labels:
         for frame in frames:
             assert not label.get_window_extent().overlaps(frame), label.get_text()
-
-
-def test_signals_of_the_scheme_end_at_a_block_and_begin_at_one_or_on_a_signal() -> None:
-    def edges(point: tuple[float, float]) -> set[str]:
-        found = set()
-        for name, block in BLOCKS.items():
-            x, y = (abs(p - c) for p, c in zip(point, block.center, strict=True))
-            w, h = block.size[0] / 2, block.size[1] / 2
-            if (x == pytest.approx(w) and y <= h) or (y == pytest.approx(h) and x <= w):
-                found.add(name)
-        if math.dist(point, DIFFERENCE) == pytest.approx(SUM):
-            found.add("difference")
-        return found
-
-    told = {
-        (b, e) for s in SIGNALS.values() for b in edges(s.points[0]) for e in edges(s.points[-1])
-    }
-    assert told == {
-        ("vehicle", "transform"),
-        ("transform", "difference"),
-        ("observer", "difference"),
-        ("difference", "filter"),
-        ("filter", "laws"),
-        ("laws", "network"),
-        ("network", "observer"),
-    }
-    assert all(edges(signal.points[-1]) for signal in SIGNALS.values())
-    for signal in SIGNALS.values():
-        if signal.joint:
-            (x, y), ways = signal.points[0], [s.points for s in SIGNALS.values() if s != signal]
-            assert any(
-                min(a[0], b[0]) <= x <= max(a[0], b[0]) and min(a[1], b[1]) <= y <= max(a[1], b[1])
-                for way in ways
-                for a, b in pairwise(way)
-            )
 
 
 def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:

@@ -125,6 +125,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
 
 
 def _predict(story: Story) -> page.Section:
+    told = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         page.Paragraph(
             text="Reproducing the drive that was learnt is the easier half. The same frozen "
@@ -134,15 +135,7 @@ def _predict(story: Story) -> page.Section:
         page.Table(
             caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
-            header=[
-                "drive",
-                "axle, online",
-                "frozen",
-                "of rms",
-                "paper, online",
-                "frozen",
-                "of rms",
-            ],
+            header=["drive", "axle, online", *told, "paper, online", *told],
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
@@ -209,38 +202,41 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[page.Block]:
 
 
 def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
-    blocks: list[page.Block] = [
+    captions = {
+        "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
+        "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
+        "median error); all errors count from the onset on.",
+        "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median error).",
+    }
+    return [
         page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(
             text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets what it learnt before. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
-        page.Table(
-            caption="Table II of the paper beside ours, RMSE of the axle force [kN]: median "
+        _table(
+            study,
+            "slalom",
+            "Table II of the paper beside ours, RMSE of the axle force [kN]: median "
             f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
-            header=[page.printed(word) for word in header()],
-            rows=rows("slalom", study),
         ),
         page.Paragraph(text=page.printed(MEANING)),
-    ]
-    return [
-        *blocks,
-        *_drawn(
-            figures,
-            {
-                "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
-                "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
-                "median error); all errors count from the onset on.",
-                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median "
-                "error).",
-            },
-        ),
+        *_drawn(figures, captions),
         page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),
     ]
 
 
+def _table(study: Study, maneuver: str, caption: str) -> page.Table:
+    head = [page.printed(word) for word in header()]
+    return page.Table(caption=caption, header=head, rows=rows(maneuver, study))
+
+
 def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
+    drawn = (
+        "The table as a picture; hollow marks are the paper's values. "
+        "The drives are Figs. 2 and 3 in the folder paper."
+    )
     return [
         page.Subheading(text="The frozen-weight reproducibility test: step steer"),
         page.Paragraph(
@@ -250,18 +246,12 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
             "the truth than what its frozen weights say of it. After 36 s, at "
             "an angle that was not learnt, all of them miss more than the linear tire."
         ),
-        page.Table(
-            caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
-            header=[page.printed(word) for word in header()],
-            rows=rows("step_steer", study),
+        _table(
+            study,
+            "step_steer",
+            "Table I of the paper beside ours, RMSE of the axle force [kN].",
         ),
-        *_drawn(
-            figures,
-            {
-                "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
-                "The drives are Figs. 2 and 3 in the folder paper."
-            },
-        ),
+        *_drawn(figures, {"step_steer_errors": drawn}),
     ]
 
 

@@ -38,13 +38,6 @@ from tireid.commands import DONE, NOT_VALID
 from tireid.progress import say
 from tireid.verdicts import warn_of_stored
 
-RENAMED = {  # options that had another word in some command
-    "--law": "--method",
-    "--methods": "--method",
-    "--workers": "--jobs",
-    "--figures": "--out",
-}
-
 
 def add_options(
     parser: argparse._ActionsContainer, kind: type, told: Mapping[str, str | tuple[Any, str]]
