@@ -1,6 +1,7 @@
 """`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side."""
 
 import argparse
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -82,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
         names = [name for name in names if name not in left_out]
         if not names:
             raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
-        lengths = [float(len(recordings))] * (len(names) + len(others))
+        steps = len(names) + len(others)
         verdicts: dict[str, Verdict] = {}
 
         def seen(name: str, run: History) -> None:
@@ -94,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
             vehicle,
             recordings,
             seed=seed,
-            progress=work.along(lengths),
+            progress=partial(work.step, steps),
             others=others,
             left_out=left_out,
             seen=seen,

@@ -36,7 +36,7 @@ def error_figure(
     recording = history.recording
     ends = style.time_window(recording.t, None)
     # A root of squares would overflow where a law diverges; hypot does not.
-    t, (norm,) = shown_of_run(history, ends, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
+    t, (norm,) = shown_of_run(history, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -83,7 +83,7 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     """
     recording, design = history.recording, style.paper_design(history)
     ends = style.time_window(recording.t, None)
-    t, (W, V) = shown_of_run(history, ends, lambda block: [block.before["W"], block.before["V"]])
+    t, (W, V) = shown_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
     figure = style.new_figure(style.PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)

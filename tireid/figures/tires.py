@@ -198,11 +198,7 @@ def drawn_tracks(history: History) -> DrawnRun | None:
     """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to."""
     if not history.tracks_over(next(history.blocks())):
         return None
-    t = history.recording.t
-    ends = (float(t[0]), float(t[-1]))
-    return DrawnRun(
-        history, ends, lambda block: [track.values for track in history.tracks_over(block)]
-    )
+    return DrawnRun(history, lambda block: [one.values for one in history.tracks_over(block)])
 
 
 @style.styled
