@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,7 +89,7 @@ class Results:
     models, frozen : by freeze time as text [s], or `NETWORK`, models and their replays by
         recording; the last counts.
     verdict : on the last.   asked : on it over the others, by name.
-    parts : of the first run, where it is over several logs.   source : file of a network.
+    parts : of the first run, where it is over several logs.   about : a network, its file.
     """
 
     law: str
@@ -98,7 +99,7 @@ class Results:
     verdict: Verdict
     asked: Mapping[str, Verdict]
     parts: Sequence[History] = ()
-    source: str = ""
+    about: Mapping[str, Any] = MappingProxyType({})
 
     @classmethod
     def learnt(
@@ -138,7 +139,9 @@ class Results:
         asked: Mapping[str, Verdict],
     ) -> "Results":
         found: Any = {"models": {NETWORK: model}, "frozen": {NETWORK: _replays(model, runs)}}
-        return cls(law=law, runs=runs, verdict=verdict, asked=asked, source=source, **found)
+        about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
+        found["about"] = {"file": source, **about}
+        return cls(law=law, runs=runs, verdict=verdict, asked=asked, **found)
 
     @property
     def model(self) -> TireModel:
@@ -186,11 +189,8 @@ class Results:
         `past_against_online` is the measure of the paper's section IV-A.
         """
         learnt, runs = self.runs[0], [self.runs[0], *self.parts, *self.runs[1:]]
-        design, model = learnt.design, self.model
+        design = learnt.design
         certificate = None if design.whole else certify(design, learnt.vehicle)
-        about: dict[str, Any] = {}
-        if isinstance(model, OnnxModel):
-            about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
 
         def of_frozen(of: Callable[[Replay], AxleRmse | None]) -> dict[str, Any]:
             return {
@@ -219,7 +219,7 @@ class Results:
             "vehicle": vehicle_numbers(learnt.vehicle),
             "diverged_at_s": learnt.diverged_at,
             "version": __version__,
-            **({NETWORK: {"file": self.source, **about}} if about else {}),
+            **({NETWORK: dict(self.about)} if self.about else {}),
         }
 
     def write(
@@ -267,7 +267,7 @@ class Results:
         recording, name = learnt.recording, learnt.recording.name
         figures = {"inputs": inputs_figure(recording)}
         asked = self.runs[1:]
-        if isinstance(model, OnnxModel):
+        if NETWORK in self.models:
             asked = self.runs
             for run in self.runs:
                 end = "" if run is learnt else f"_{file_name(run.recording)}"
