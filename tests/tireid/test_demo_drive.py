@@ -76,12 +76,11 @@ def test_with_a_compiler_the_learnt_car_drives_both_roads(tmp_path, monkeypatch)
     """The drives themselves are left out: which they are, on which tires, into which folder."""
     asked = []
 
-    def written(folder, runs, *_, **__):
+    def written(folder, _, runs, *__):
         asked.append((folder.relative_to(tmp_path).as_posix(), runs))
 
     monkeypatch.setattr(demo_drive, "find_compiler", lambda: "cc")
     monkeypatch.setattr(demo_drive, "run_drive", lambda label, _, tires: (label, tires))
-    monkeypatch.setattr(demo_drive, "known_curves", lambda *_: {})
     monkeypatch.setattr(demo_drive, "inputs_of", lambda *_: {})
     monkeypatch.setattr(demo_drive, "write_drives", written)
     frozen = "frozen"

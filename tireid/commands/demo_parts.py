@@ -16,8 +16,7 @@ from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
 from tireid.commands.demo_story import Story
-from tireid.commands.drive import headline, inputs_of
-from tireid.commands.drive_results import drive_lines, known_curves, write_drives
+from tireid.commands.drive_results import drive_lines, headline, inputs_of, write_drives
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions, Run, run_drive
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Verdict, self_test, write_files
@@ -125,14 +124,8 @@ def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> D
     conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
     runs = [run_drive(label, conditions, learnt) for label in labels]
     folder.mkdir()
-    figures = write_drives(
-        folder,
-        runs,
-        known_curves(runs, setup, learnt),
-        inputs=inputs_of(conditions, labels, _SOURCE, learnt),
-        drops=setup.drops,
-        film=FILM,
-    )
+    inputs = inputs_of(conditions, labels, _SOURCE, learnt)
+    figures = write_drives(folder, conditions, runs, learnt, inputs, FILM)
     return Driven(conditions, runs, figures)
 
 

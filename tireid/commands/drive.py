@@ -1,93 +1,20 @@
 """`tireid drive`: steer a car along a path, told of the tires that were learnt."""
 
 import argparse
-from collections.abc import Sequence
-from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from identifier.frozen import vehicle_numbers
-from identifier.tire_model import TireModel
 from models.faults import KINDS
-from models.files import digest
-from models.vehicle import Vehicle
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
-from tireid.commands.drive_results import NO_FILM, drive_lines, known_curves, write_drives
+from tireid.commands.drive_results import NO_FILM, drive_lines, headline, inputs_of, write_drives
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION
-from tireid.driving.setup import PERIOD, PLANT
-from tireid.output import finite, output_folder
+from tireid.output import output_folder
 from tireid.progress import say, tell
 from tireid.reports.drive import write_drive_report
-
-
-def headline(conditions: driving.Conditions) -> str:
-    """Return a case in one line."""
-    setup = conditions.setup
-    v = setup.speeds()
-    speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else f"{v.min():.1f} to {v.max():.1f} m/s"
-    wish = setup.wish.share
-    share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
-    drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
-    noise = "sensor noise" if conditions.noise else "no noise"
-    noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
-    noise += ", no v_y" if conditions.kind == driving.IMU else ""
-    noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
-    noise += "".join(f", {fault}" for fault in conditions.faults)
-    return (
-        f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
-        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
-        f"{noise}, seed {conditions.seed}"
-    )
-
-
-def inputs_of(
-    conditions: driving.Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
-) -> dict[str, Any]:
-    """Return all that goes into drives, ready for JSON."""
-    setup = conditions.setup
-    v = setup.speeds()
-    return {
-        "path": setup.path.name,
-        "path_hash": digest([setup.path.X.tolist(), setup.path.Y.tolist()]),
-        "length_m": setup.path.length,
-        "closed": setup.path.closed,
-        "laps": conditions.laps,
-        "speed": {"share": setup.wish.share, "m_s": setup.wish.speed},
-        "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
-        "grip_m_s2": setup.grip,
-        "mu": setup.mu,
-        "mu_drops": [{"s_m": s, "mu": mu} for s, mu in setup.drops],
-        "tires": list(labels),
-        "frozen": source,
-        "weights_hash": None if learnt is None else digest(learnt.to_dict()),
-        "plant": PLANT,
-        "vehicle": vehicle_numbers(setup.vehicle),
-        "chassis": _chassis(setup.vehicle),
-        "delay_ms": 1e3 * PERIOD * conditions.delay,
-        "period_ms": 1e3 * PERIOD,
-        "noise": conditions.noise,
-        **({"sensors": conditions.kind} if conditions.kind != driving.FULL else {}),
-        **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
-        **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
-        "faults": [finite(asdict(fault)) for fault in conditions.faults],
-        "seed": conditions.seed,
-    }
-
-
-def _chassis(vehicle: Vehicle) -> dict[str, Any]:
-    """Return the chassis, with a hash in place of the file of its tire."""
-    chassis = vehicle.require_chassis()
-    path = None if chassis.tire is None else Path(chassis.tire)
-    tire = None if path is None else digest(path.read_text(errors="replace", encoding="utf-8"))
-    return {**asdict(chassis), "tire": tire}
-
 
 _NOT_COMPLETED = 1
 _EPILOG = (
@@ -199,15 +126,7 @@ def run(options: argparse.Namespace) -> int:
             learnt.save(folder / "weights.json")
         runs = [driving.run_drive(label, conditions, learnt) for label in labels]
         inputs = inputs_of(conditions, labels, source, learnt)
-        figures = write_drives(
-            folder,
-            runs,
-            known_curves(runs, setup, learnt),
-            inputs=inputs,
-            drops=setup.drops,
-            film=options.film,
-            faults=conditions.faults,
-        )
+        figures = write_drives(folder, conditions, runs, learnt, inputs, options.film)
         write_drive_report(
             folder,
             runs,
