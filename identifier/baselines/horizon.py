@@ -283,6 +283,9 @@ class HorizonEstimator(Method):
     window : how long what was measured is looked at again [s].
     """
 
+    needs_v_y = False  # it tells one
+    needs_a_y = True
+
     filter: SlipFilter
     window: float
     iterations: int = 1
@@ -328,16 +331,6 @@ class HorizonEstimator(Method):
             ),
             window=window,
         )
-
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it needs a lateral velocity: it tells one."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer: so it is."""
-        return True
 
     @property
     def ports(self) -> tuple[Port, ...]:

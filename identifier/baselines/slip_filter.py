@@ -188,6 +188,8 @@ class SlipFilter(Method):
     """
 
     estimates = "lateral velocity"
+    needs_v_y = False  # it tells one
+    needs_a_y = True
 
     tire: str
     r_noise: float
@@ -231,16 +233,6 @@ class SlipFilter(Method):
             learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
         )
-
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it needs a lateral velocity: it tells one."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer: so it is."""
-        return True
 
     @property
     def learns(self) -> bool:

@@ -83,6 +83,8 @@ class Washout(Method):
     """
 
     estimates = "lateral velocity"
+    needs_v_y = False  # it tells one
+    needs_a_y = True
 
     cutoff: float
     dt: float = 0.01
@@ -99,16 +101,6 @@ class Washout(Method):
         one errs less there by a tenth at most, and is the linear model alone.
         """
         return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
-
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it needs a lateral velocity: it tells one."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it tells nothing from a recording without an accelerometer: so it is."""
-        return True
 
     @property
     def ports(self) -> tuple[Port, ...]:

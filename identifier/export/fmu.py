@@ -302,38 +302,20 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
         for i, variable in enumerate(table, start=1)
         if variable.causality == "output"
     ]
-    model = element(
-        "fmiModelDescription",
+    simulation = element(
+        "CoSimulation",
         {
-            "fmiVersion": "2.0",
-            "modelName": specialized.name,
-            "guid": token,
-            "description": _sentence(specialized),
-            "generationTool": TOOL,
-            "variableNamingConvention": "flat",
+            "modelIdentifier": specialized.name,
+            "canHandleVariableCommunicationStepSize": True,
+            "canNotUseMemoryManagementFunctions": True,
+            "canGetAndSetFMUstate": True,
+            "canSerializeFMUstate": True,
         },
-        element(
-            "CoSimulation",
-            {
-                "modelIdentifier": specialized.name,
-                "canHandleVariableCommunicationStepSize": True,
-                "canNotUseMemoryManagementFunctions": True,
-                "canGetAndSetFMUstate": True,
-                "canSerializeFMUstate": True,
-            },
-            element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
-        ),
-        _units(table),
-        _experiment(specialized),
-        element("ModelVariables", {}, *(_variable_2(variable) for variable in table)),
-        element(
-            "ModelStructure",
-            {},
-            element("Outputs", {}, *unknowns),
-            element("InitialUnknowns", {}, *unknowns),
-        ),
+        element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
     )
-    return document(model)
+    structure = element("Outputs", {}, *unknowns), element("InitialUnknowns", {}, *unknowns)
+    listed = map(_variable_2, table)
+    return _description(specialized, ("2.0", "guid", token), simulation, listed, structure)
 
 
 def description_3(specialized: SpecializedStep, token: str) -> str:
@@ -345,37 +327,54 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
         {"name": "time", "valueReference": 0, "causality": "independent", "unit": "s"}
         | {"variability": "continuous", "description": "simulation time"},
     )
+    simulation = element(
+        "CoSimulation",
+        {
+            "modelIdentifier": specialized.name,
+            "canGetAndSetFMUState": True,
+            "canSerializeFMUState": True,
+            "canHandleVariableCommunicationStepSize": True,
+        },
+    )
+    structure = [
+        element(tag, {"valueReference": variable.reference})
+        for tag in ("Output", "InitialUnknown")
+        for variable in outputs
+    ]
+    said, listed = ("3.0", "instantiationToken", token), [time, *map(_variable_3, table)]
+    return _description(specialized, said, simulation, listed, structure)
+
+
+def _description(
+    specialized: SpecializedStep,
+    said: tuple[str, str, str],
+    simulation: Element,
+    listed: Iterable[Element],
+    structure: Iterable[Element],
+) -> str:
+    """Return modelDescription.xml.
+
+    said : version, what it calls the token, the token.
+    """
+    version, key, token = said
+    table = variables(specialized)
+    about = {
+        "fmiVersion": version,
+        "modelName": specialized.name,
+        key: token,
+        "description": _sentence(specialized),
+        "generationTool": TOOL,
+        "variableNamingConvention": "flat",
+    }
+    experiment = {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
     model = element(
         "fmiModelDescription",
-        {
-            "fmiVersion": "3.0",
-            "modelName": specialized.name,
-            "instantiationToken": token,
-            "description": _sentence(specialized),
-            "generationTool": TOOL,
-            "variableNamingConvention": "flat",
-        },
-        element(
-            "CoSimulation",
-            {
-                "modelIdentifier": specialized.name,
-                "canGetAndSetFMUState": True,
-                "canSerializeFMUState": True,
-                "canHandleVariableCommunicationStepSize": True,
-            },
-        ),
+        about,
+        simulation,
         _units(table),
-        _experiment(specialized),
-        element("ModelVariables", {}, time, *(_variable_3(variable) for variable in table)),
-        element(
-            "ModelStructure",
-            {},
-            *(
-                element(tag, {"valueReference": variable.reference})
-                for tag in ("Output", "InitialUnknown")
-                for variable in outputs
-            ),
-        ),
+        element("DefaultExperiment", experiment),
+        element("ModelVariables", {}, *listed),
+        element("ModelStructure", {}, *structure),
     )
     return document(model)
 
@@ -421,43 +420,26 @@ def _units(table: Sequence[Variable]) -> Element:
     return element("UnitDefinitions", {}, *units)
 
 
-def _experiment(specialized: SpecializedStep) -> Element:
-    return element(
-        "DefaultExperiment", {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
-    )
+def _about(variable: Variable) -> dict[str, object]:
+    return {
+        "name": variable.name,
+        "valueReference": variable.reference,
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": _initial(variable),
+    }
 
 
 def _variable_2(variable: Variable) -> Element:
     tag = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}[variable.kind]
-    return element(
-        "ScalarVariable",
-        {
-            "name": variable.name,
-            "valueReference": variable.reference,
-            "description": variable.description,
-            "causality": variable.causality,
-            "variability": variable.variability,
-            "initial": _initial(variable),
-        },
-        element(tag, {"unit": variable.unit, "start": variable.start}),
-    )
+    kind = element(tag, {"unit": variable.unit, "start": variable.start})
+    return element("ScalarVariable", _about(variable), kind)
 
 
 def _variable_3(variable: Variable) -> Element:
     tag = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}[variable.kind]
-    return element(
-        tag,
-        {
-            "name": variable.name,
-            "valueReference": variable.reference,
-            "description": variable.description,
-            "causality": variable.causality,
-            "variability": variable.variability,
-            "initial": _initial(variable),
-            "unit": variable.unit,
-            "start": variable.start,
-        },
-    )
+    return element(tag, {**_about(variable), "unit": variable.unit, "start": variable.start})
 
 
 def _initial(variable: Variable) -> str:

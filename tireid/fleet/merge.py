@@ -217,15 +217,7 @@ class _Sum:
         p, covariance = self.settled()
         of_next = [INDEX[name] for name in CHANGES]  # its sensors are off by an error of its own
         covariance[of_next, of_next] += self.errors[1] ** 2
-        model = FittedModel(
-            vehicle=self.vehicle,
-            p=p,
-            covariance=covariance,
-            driven=self.reach.slip,
-            speeds=self.reach.speeds,
-            a_x=self.reach.a_x,
-            unexplained=self.reach.unexplained,
-        )
+        model = _model(self.vehicle, p, covariance, self.reach)
         return Merged(
             key=key, logs=self.logs, elsewhere=self.elsewhere, told=self.told, model=model
         )
@@ -266,15 +258,13 @@ class _FleetPrior:
         p, covariance = usual.mean.copy(), usual.covariance
         p[TIRES] = self.mean * size
         covariance[np.ix_(TIRES, TIRES)] = self.spread * np.outer(size, size)
-        return FittedModel(
-            vehicle=vehicle,
-            p=np.clip(p, usual.low, usual.high),
-            covariance=covariance,
-            driven=self.reach.slip,
-            speeds=self.reach.speeds,
-            a_x=self.reach.a_x,
-            unexplained=self.reach.unexplained,
-        )
+        return _model(vehicle, np.clip(p, usual.low, usual.high), covariance, self.reach)
+
+
+def _model(vehicle: Vehicle, p: Array, covariance: Array, reach: Reach) -> FittedModel:
+    reached = {"driven": reach.slip, "speeds": reach.speeds, "a_x": reach.a_x}
+    found: dict[str, Array] = {"p": p, "covariance": covariance, **reached}
+    return FittedModel(vehicle=vehicle, unexplained=reach.unexplained, **found)
 
 
 def sizes(vehicle: Vehicle) -> Array:
