@@ -6,9 +6,8 @@ time. What the identifier finds online over the same recordings stands beside it
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,7 +98,7 @@ class Results:
     verdict: Verdict
     asked: Mapping[str, Verdict]
     parts: Sequence[History] = ()
-    about: Mapping[str, Any] = MappingProxyType({})
+    about: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def learnt(
