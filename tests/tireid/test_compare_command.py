@@ -13,6 +13,7 @@ from identifier.methods import METHODS
 from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
+from tests.tireid.conftest import refusal
 from tireid.cli import main
 from tireid.commands.compare_results import ERROR_COLUMNS
 from tireid.figures.compare import short_names
@@ -210,10 +211,7 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(
     first, *rest = words
     logs_named = [one for one in extra if one.endswith(".csv")]
     named = [first, *logs_named, *rest, *(one for one in extra if one not in logs_named)]
-    assert main([*named, "--out", str(out)]) == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
-    assert len(lines) == 1
-    assert said in lines[0]
+    assert said in refusal(capsys, [*named, "--out", out])
     assert not out.exists()
 
 

@@ -7,7 +7,8 @@ import tireid as ti
 from identifier.tire_model import load_model
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
-from tests.tireid.test_drive_command import bend, refusal, summary_of  # noqa: F401
+from tests.tireid.conftest import refusal
+from tests.tireid.test_drive_command import bend, summary_of  # noqa: F401
 from tireid.cli import main
 from tireid.commands.drive_case import parse_fault
 from tireid.driving import learn as drive_learn
@@ -90,7 +91,7 @@ def test_the_line_that_is_printed_says_how_right_it_was(result, bend, tmp_path, 
 
 
 def test_a_fault_of_what_is_not_measured_is_one_clear_line(bend, tmp_path, capsys):  # noqa: F811
-    words = ["--path", bend, "--sensors", "imu", "--fault", "v_y:zero:1:1"]
+    words = ["drive", "--path", bend, "--sensors", "imu", "--fault", "v_y:zero:1:1"]
     said = refusal(capsys, [*words, "--out", tmp_path / "out"])
     assert "--fault v_y:zero:1:1: channel must be one of X, Y, psi, v_x, r, delta, a_y" in said
     assert list(tmp_path.iterdir()) == []

@@ -16,6 +16,7 @@ from identifier.tire_model import load_model
 from identifier.verdict import calibrated
 from models.recordings import read_recording
 from models.vehicle import sedan
+from tests.tireid.conftest import refusal
 from tireid import exporting
 from tireid.cli import main
 from tireid.commands import export as export_command
@@ -140,10 +141,7 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
 )
 def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, capsys):
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), *words]) == 2
-    error = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
-    assert len(error) == 1
-    assert complaint in error[0]
+    assert complaint in refusal(capsys, ["export", "--out", out, *words])
     assert not out.exists()
 
 

@@ -18,6 +18,7 @@ from identifier.tire_model import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
+from tests.tireid.conftest import refusal
 from tireid.cli import main
 
 METHOD_FILES = {  # figures and tables that belong to a method, and the columns of weights.csv
@@ -47,15 +48,6 @@ def ended(law, logs, tmp_path_factory):
 @pytest.fixture(scope="module")
 def result(ended):
     return ended[0]
-
-
-def refusal(capsys, words):
-    """The one line of an error, after checking the exit code."""
-    capsys.readouterr()
-    assert main([str(word) for word in words]) == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
-    assert len(lines) == 1
-    return lines[0]
 
 
 def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
