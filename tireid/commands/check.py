@@ -233,7 +233,8 @@ def _gains_text(
 def _require_sense(options: argparse.Namespace) -> None:
     shared.method_is_given(options)
     for word in ("columns", "dbc", "rate", "cut_holes", "mend_clock"):  # of how a log is read
-        if getattr(options, word) not in (None, False, []) and options.along is None:
+        value = getattr(options, word)
+        if options.along is None and value is not None and value is not False and value != []:
             option = f"--{word.replace('_', '-')}"
             raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
     if options.tune is None:

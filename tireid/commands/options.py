@@ -39,10 +39,8 @@ from tireid.progress import say
 from tireid.verdicts import warn_of_stored
 
 
-def add_options(
-    parser: argparse._ActionsContainer, kind: type, told: Mapping[str, str | tuple[Any, str]]
-) -> None:
-    """Add options of one kind; bool is a flag.
+def add_options(parser: Any, kind: type, told: Mapping[str, str | tuple[Any, str]]) -> None:
+    """Add options of one kind to a parser or to a group of it; bool is a flag.
 
     told : by "--word METAVAR" its help, or its default and its help.
     """
