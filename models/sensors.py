@@ -105,8 +105,6 @@ def is_shown(channel: str, value: float) -> bool:
     return abs(value) <= LARGEST_SHOWN[channel]
 
 
-STRAIGHT = 0.2  # median over 90th percentile of second differences, below which lines were drawn
-_MOST_BETWEEN = 10  # samples over which differences are taken
 _NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
 
 
@@ -119,26 +117,3 @@ def white_noise(signal: Array) -> float:
     """
     bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
     return float(np.median(np.abs(bend)) / (_NORMAL_MEDIAN * np.sqrt(6.0)))
-
-
-def noise_in_means(signal: Array) -> float:
-    """Return the standard deviation of white noise that would leave as much in means of a signal.
-
-    Of a signal that was brought from a slower clock by straight lines most second differences
-    vanish, and `white_noise` sees none. Means over 2 k samples are looked at then, for the least k
-    at which differences over k samples are not those of straight lines.
-
-    signal : samples (n,).
-    """
-    for k in range(1, _MOST_BETWEEN + 1):
-        if len(signal) <= 8 * k:
-            break
-        bend = np.abs(signal[2 * k :] - 2.0 * signal[k:-k] + signal[: -2 * k])
-        usual, large = np.percentile(bend, (50, 90))
-        if usual < STRAIGHT * large:
-            continue
-        if k == 1:
-            break
-        blocks = signal[: len(signal) // (2 * k) * 2 * k].reshape(-1, 2 * k)
-        return math.sqrt(2.0 * k) * white_noise(np.asarray(blocks.mean(axis=1)))
-    return white_noise(signal)

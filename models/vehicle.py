@@ -420,17 +420,6 @@ class Vehicle:
         )
         return front, rear
 
-    def downforce_areas(self, downforce: Sequence[float]) -> dict[str, float]:
-        """Return the areas [m^2] of a downforce of the front and the rear axle, by their keys.
-
-        Parameters
-        ----------
-        downforce : κ of both axles [s^2/m^2], as `downforce` has them.
-        """
-        pairs = zip(downforce, self.axle_loads, strict=True)
-        areas = [2.0 * one * load / _AIR_DENSITY for one, load in pairs]
-        return dict(zip(AREAS, areas, strict=True))
-
     @property
     def has_downforce(self) -> bool:
         """Whether the load of an axle changes with speed."""

@@ -309,18 +309,6 @@ class ValidRange:
     gamma: tuple[float, float]
     F_z: tuple[float, float]
 
-    def covers(self, alpha: float, kappa: float, gamma: float, F_z: float) -> bool:
-        """Whether the formula interpolates there.
-
-        alpha : slip angle, paper's sign [rad].
-        kappa : longitudinal slip [-].
-        gamma : camber [rad].
-        F_z : wheel load [N].
-        """
-        limits = (self.alpha, self.kappa, self.gamma, self.F_z)
-        values = (alpha, kappa, gamma, F_z)
-        return all(low <= x <= high for (low, high), x in zip(limits, values, strict=True))
-
 
 class _MagicFormulaFile(NamedTuple):
     """What a file tells about its tire.
