@@ -119,8 +119,10 @@ class Ground:
             body = PolyCollection([], facecolors=faces, zorder=order + 0.04, **edge)
             over = order + (0.02 if number == 0 else 0.06)
             wheels = PolyCollection([], facecolors="#222222", edgecolors="none", zorder=over)
-            self._bodies.append(axes.add_collection(body))
-            self._wheels.append(axes.add_collection(wheels))
+            for collection in (body, wheels):
+                axes.add_collection(collection)
+            self._bodies.append(body)
+            self._wheels.append(wheels)
         look: Mapping[str, Any] = {"color": PLAN, "linewidth": 1.3, "marker": "o", "ms": 2.2}
         (self._plan,) = axes.plot([], [], zorder=_ABOVE, **look)
         self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=_ABOVE + 1)

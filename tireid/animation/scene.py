@@ -36,7 +36,7 @@ from tireid.figures.tires import TireCurve, axle_slip
 
 TAIL = 80  # samples
 SMALL = 7.0  # points of the text
-MANY = 10  # entries of a legend that one row does not hold
+MANY = 9  # entries of a legend that one row does not hold
 STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steered by, now"}
 LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "learnt by now"}
 
@@ -80,8 +80,9 @@ class _ForcePanel:
             self._moving = [axes.plot([], [], **look)[0] for look in (LEARNT, STEERING)]
             shade: dict[str, Any] = {"facecolor": "#EFE9DD", "edgecolor": "none", "zorder": 0}
             shade["transform"] = axes.get_xaxis_transform()
-            empty = (Rectangle((0.0, 0.0), 0.0, 1.0, **shade) for _ in range(2))
-            self._shades = [axes.add_patch(patch) for patch in empty]
+            self._shades = [Rectangle((0.0, 0.0), 0.0, 1.0, **shade) for _ in range(2)]
+            for patch in self._shades:
+                axes.add_patch(patch)
         axes.set(xlim=(-self._reach, self._reach), ylim=self._limits)
         if axle == 0:
             axes.set_ylabel(f"force [{self._unit.name}]", fontsize=SMALL, labelpad=1.0)

@@ -130,7 +130,8 @@ def write_drives(
         write_csv(folder / name, _drive_columns(run.drive))
     say("drawing figures")
     drives = {run.label: run.drive for run in runs}
-    limits, on_the_way = first.problem.limits, {"drops": drops, "faults": faults}
+    on_the_way: dict[str, Any] = {"drops": drops, "faults": faults}
+    limits = first.problem.limits
     figures = {
         "path": drive_path_figure(drives),
         "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),

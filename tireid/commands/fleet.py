@@ -66,7 +66,7 @@ def _add_learn(tasks: Any) -> None:
     text = "car as TOML; {name} in it stands for a tag: cars/{vehicle}.toml"
     parser.add_argument("--vehicle", required=True, metavar="FILE", help=text)
     parser.add_argument("--out", required=True, metavar="STORE", help="folder or address to keep")
-    words = {
+    words: dict[str, Any] = {
         "--tags PATTERN": (
             "",
             "what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "

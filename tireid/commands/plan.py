@@ -48,7 +48,7 @@ def add_parser(commands: Any) -> None:
         f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)"
     )
     rate = math.degrees(planning.RATE)
-    numbers = {
+    numbers: dict[str, Any] = {
         "--time S": (planning.TIME, of_steering),
         "--mu MU": f"friction, a guess within 30 %% ({planning.FRICTION:g})",
         "--grip PERCENT": (

@@ -85,8 +85,8 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
         shown = np.minimum(values, FARTHEST * 1.1)
         y = position + shift
         axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
-        mean, look = min(float(np.mean(values)), FARTHEST * 1.1), {"color": color, "label": kind}
-        axes.plot(mean, y, marker, markersize=4.5, clip_on=False, **look)
+        mean = min(float(np.mean(values)), FARTHEST * 1.1)
+        axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
 
 
 BEST, WORST = 1.0, 100.0  # [%], ends of the color scale

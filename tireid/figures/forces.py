@@ -47,7 +47,7 @@ def _force_panels(
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
     signals: list[Signal] = [force.__getitem__ for force in (reference, *curves)]
-    signals += [lambda at, force=force: force[at] - reference[at] for force in curves]
+    signals += [_missed(force, reference) for force in curves]
     part = shown(recording.t, ends, *signals)
     t, unit = drawn_times(recording, recording.t[part]), style.force_unit_of(reference[part])
 
@@ -76,6 +76,10 @@ def _force_panels(
     return figure, panels, unit
 
 
+def _missed(force: Array, reference: Array) -> Signal:
+    return lambda at: force[at] - reference[at]
+
+
 @style.styled
 def force_figure(
     history: History,
@@ -101,8 +105,8 @@ def force_figure(
     recording, truth, first = history.recording, history.recording.axle_force, int(history.online)
     for at, replay in replays.items():
         _require_same(replay, history, f"the replay frozen at {freeze_key(at)} s")
-    online = [(history.axle_force, style.ONLINE)] * first
-    shown_in_all = [(truth, style.TRUTH)] * (truth is not None) + online
+    online: list[Curve] = [(history.axle_force, style.ONLINE)] * first
+    shown_in_all = online if truth is None else [(truth, style.TRUTH), *online]
     frozen = {at: (replay.axle_force, style.FROZEN) for at, replay in replays.items()}
     rows: list[tuple[str, Sequence[Curve]]] = [(", online", shown_in_all)] * first
     rows += [

@@ -98,7 +98,7 @@ def _label_slip(axes: Axes, axle: int) -> None:
 
 def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: float) -> None:
     """Draw the steady curve of an axle, in its band where it has one."""
-    degrees = np.linspace(*ends, 200)
+    degrees = np.linspace(float(ends[0]), float(ends[1]), 200)
     slip = np.deg2rad(degrees)
     band = model.band(slip)
     if band is not None:  # under the points, which it would make grey

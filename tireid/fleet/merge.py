@@ -15,6 +15,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
+from typing import Any
 
 import numpy as np
 
@@ -262,9 +263,9 @@ class _FleetPrior:
 
 
 def _model(vehicle: Vehicle, p: Array, covariance: Array, reach: Reach) -> FittedModel:
-    reached = {"driven": reach.slip, "speeds": reach.speeds, "a_x": reach.a_x}
-    found: dict[str, Array] = {"p": p, "covariance": covariance, **reached}
-    return FittedModel(vehicle=vehicle, unexplained=reach.unexplained, **found)
+    found: Any = {"driven": reach.slip, "speeds": reach.speeds, "a_x": reach.a_x}
+    found |= {"p": p, "covariance": covariance, "unexplained": reach.unexplained}
+    return FittedModel(vehicle=vehicle, **found)
 
 
 def sizes(vehicle: Vehicle) -> Array:
