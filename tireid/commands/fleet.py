@@ -153,8 +153,8 @@ def _add_watching(parser: argparse.ArgumentParser) -> None:
         "--stiffness X": (usual.stiffness, "change of stiffness that is looked for, of ln C"),
         "--friction X": (usual.friction, "change of friction that is looked for, of ln mu"),
     }
-    told = {word: (value, f"{text} (%(default)g)") for word, (value, text) in numbers.items()}
-    add_options(parser, float, told)
+    table = {word: (value, f"{text} (%(default)g)") for word, (value, text) in numbers.items()}
+    add_options(parser, float, table)
 
 
 def _watching(options: argparse.Namespace) -> Watching:

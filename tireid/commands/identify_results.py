@@ -91,7 +91,7 @@ class Results:
     parts : of the first run, where it is over several logs.   about : a network, its file.
     """
 
-    law: str
+    method: str
     runs: Sequence[History]
     models: Mapping[str, TireModel]
     frozen: Mapping[str, Mapping[str, Replay]]
@@ -103,7 +103,7 @@ class Results:
     @classmethod
     def learnt(
         cls,
-        law: str,
+        method: str,
         runs: Sequence[History],
         times: Sequence[float],
         verdict: Verdict,
@@ -125,12 +125,12 @@ class Results:
             for t, (key, model) in zip(times, models.items(), strict=True)
         }
         found: Any = {"models": models, "frozen": frozen, "verdict": verdict, "asked": asked}
-        return cls(law=law, runs=runs, parts=parts, **found)
+        return cls(method=method, runs=runs, parts=parts, **found)
 
     @classmethod
     def of_network(
         cls,
-        law: str,
+        method: str,
         runs: Sequence[History],
         model: OnnxModel,
         source: str,
@@ -140,7 +140,7 @@ class Results:
         found: Any = {"models": {NETWORK: model}, "frozen": {NETWORK: _replays(model, runs)}}
         about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
         found["about"] = {"file": source, **about}
-        return cls(law=law, runs=runs, verdict=verdict, asked=asked, **found)
+        return cls(method=method, runs=runs, verdict=verdict, asked=asked, **found)
 
     @property
     def model(self) -> TireModel:
@@ -170,7 +170,8 @@ class Results:
                 size, sides = force_rms(runs[name]), result.reproduction
                 errors = {(label, visible(name)): result.against_truth or result.against_online}
                 if label == NETWORK:
-                    errors[f"{self.law}, learning online", visible(name)] = online_error(runs[name])
+                    words = f"{self.method}, learning online", visible(name)
+                    errors[words] = online_error(runs[name])
                 elif sides is not None:
                     errors["", _OWN_PAST] = sides.past_against_online
                 for number, (words, error) in enumerate(errors.items()):
@@ -210,7 +211,7 @@ class Results:
                     for key, replays in self.frozen.items()
                 },
             },
-            "law": self.law,
+            "law": self.method,
             **design.numbers(),
             "certificate": None  # of a method that learns from whole logs: nothing learns in a car
             if certificate is None
@@ -226,7 +227,7 @@ class Results:
     ) -> dict[str, Figure]:
         """Write everything into a folder; return the figures by the name of their file.
 
-        progress : told how far it is; None tells nobody.
+        progress : informed how far it is; None informs nobody.
         """
         write_json(folder / "summary.json", self.summary())
         for key, model in self.models.items():
@@ -251,8 +252,8 @@ class Results:
                 for key, by_name in self.frozen.items()
             }
             end = "" if run is learnt else f"_{file_name(run.recording)}"
-            told = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
-            write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, told))
+            share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
+            write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, share))
         if NETWORK in self.models:
             return
         if OBSERVED in learnt.outputs:
@@ -275,12 +276,12 @@ class Results:
             own = {float(key): replays[name] for key, replays in self.frozen.items()}
             figures["slip"] = slip_figure(model, recording, _beside(learnt))
             figures["forces"] = force_figure(learnt, own)
-            told = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
+            slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
             if OBSERVED in learnt.outputs:
                 figures["error"] = error_figure(learnt, freeze_times=list(own))
                 figures["weights"] = weights_figure(learnt, list(own))
-            if told is not None:
-                figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: told}})
+            if slip is not None:
+                figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
             if tracks is not None:
                 figures["learnt"] = learnt_axles_figure(learnt, list(own), tracks)
         for run in asked:
@@ -371,7 +372,7 @@ def _force_columns(
     """
     recording, car, n = run.recording, run.vehicle, len(run.recording)
     outputs = run.outputs
-    told = {column: outputs[port].ravel() for column, port in TOLD.items() if port in outputs}
+    given = {column: outputs[port].ravel() for column, port in TOLD.items() if port in outputs}
     curves = {} if recording.axle_force is None else {"true": recording.axle_force}
     curves |= {"online": run.axle_force} if run.online else {}
     curves |= {label: replay.axle_force for label, replay in replays.items()}
@@ -385,7 +386,7 @@ def _force_columns(
             "delta_r_rad": recording.delta_r[part],
             **axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r, part)),
         }
-        columns |= {name: values[part] for name, values in told.items()}
+        columns |= {name: values[part] for name, values in given.items()}
         for name, force in curves.items():
             columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
         yield columns

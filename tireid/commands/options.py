@@ -39,12 +39,12 @@ from tireid.progress import say
 from tireid.verdicts import warn_of_stored
 
 
-def add_options(parser: Any, kind: type, told: Mapping[str, str | tuple[Any, str]]) -> None:
+def add_options(parser: Any, kind: type, table: Mapping[str, str | tuple[Any, str]]) -> None:
     """Add options of one kind to a parser or to a group of it; bool is a flag.
 
-    told : by "--word METAVAR" its help, or its default and its help.
+    table : by "--word METAVAR" its help, or its default and its help.
     """
-    for words, what in told.items():
+    for words, what in table.items():
         word, _, metavar = words.partition(" ")
         default, text = what if isinstance(what, tuple) else (None, what)
         if kind is bool:
