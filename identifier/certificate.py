@@ -53,12 +53,12 @@ class Certificate:
         return max((entry.status for entry in self.properties), key=_SEVERITY.index)
 
     def __repr__(self) -> str:
-        counts = f"{len(self.properties)} properties, {len(self.held)} boxes held"
+        counts = f"{len(self.properties)} properties, {len(self.held)} limits hold"
         return f"<Certificate: {self.verdict}; {counts}>"
 
     def __str__(self) -> str:
         lines = [f"{e.status}: {e.title}: {e.value:.4g} {e.unit}".rstrip() for e in self.properties]
-        lines += [f"held by construction: {name}: {value}" for name, value in self.held.items()]
+        lines += [f"limits by construction: {name}: {value}" for name, value in self.held.items()]
         return "\n".join([*lines, f"verdict: {self.verdict}"])
 
     def __getitem__(self, name: str) -> Property:

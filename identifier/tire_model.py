@@ -36,7 +36,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "what learning believes, not calibrated; run.tire checks it on the drive"
+UNCALIBRATED = "of the identifier, not calibrated; run.tire calibrates it on the drive"
 
 
 class _TireFunctions(NamedTuple):
@@ -50,7 +50,7 @@ class _TireFunctions(NamedTuple):
     dynamics: ca.Function
     """(x, delta, v_x) -> x_dot, axle_force (2,): what a collocation asks for."""
     step: ca.Function
-    """(x, delta, v_x, dt) -> x_next: one step of Runge-Kutta with δ and v_x held."""
+    """(x, delta, v_x, dt) -> x_next: one step of Runge-Kutta with δ and v_x constant."""
 
 
 class Fact(NamedTuple):
@@ -238,7 +238,7 @@ class TireModel(ABC):
         ValueError
             Where the ratio is not positive, or the model cannot be told for another friction.
         """
-        raise ValueError(f"a {type(self).__name__} cannot be told for a friction of {ratio:g}")
+        raise ValueError(f"a {type(self).__name__} cannot be scaled to a friction of {ratio:g}")
 
     def beside_v_y(self) -> "TireModel":
         """Return the model as one that goes on learning where a lateral velocity is told."""
@@ -634,7 +634,7 @@ class TireModel(ABC):
         missed = self.force_missed
         rows = [["", *AXLES]]
         if missed is not None:
-            fact = Fact("force missed in the drive that taught", 100.0 * missed, "%")
+            fact = Fact("model error on the identification drive", 100.0 * missed, "%")
             rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
         by_title: dict[str, dict[str, str]] = {}
         for one in self.estimates():

@@ -123,7 +123,7 @@ def diagnosis_section(
     else:
         blocks.append(page.Paragraph(text="Nothing was found."))
     blocks += [
-        page.Paragraph(text=page.printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen
+        page.Paragraph(text=page.printed(f"Not observable: {line}")) for line in diagnosis.unseen
     ]
     return page.Section(heading=heading, blocks=[*blocks, *more])
 
@@ -135,9 +135,9 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     """
     lines = [diagnosis_text(diagnosis, unseen=False)]
     if diagnosis.unseen[:1] == (WITHOUT_V_Y,):
-        lines.append(f"cannot be seen: {WITHOUT_V_Y}")
+        lines.append(f"not observable: {WITHOUT_V_Y}")
     if repair:
-        lines.append(f"repaired, in what was learnt on and replayed: {repair_text(repair)}")
+        lines.append(f"repaired, in identification and replay: {repair_text(repair)}")
     elif path is not None:
         lines.append("nothing is sure enough to be repaired")
     elif diagnosis.repair:
@@ -182,7 +182,7 @@ def write_doctor_report(
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
     sections = [
         diagnosis_section(diagnosis),
-        page.Section(heading="What the tires say", blocks=[drawn]),
+        page.Section(heading="Tire curves", blocks=[drawn]),
     ]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))

@@ -29,7 +29,7 @@ from tireid.run import Run
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 _COSTS, _TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
 UNCALIBRATED = (
-    "the band is as learning is told of its errors: begin with the model of a drive to calibrate it"
+    "the band assumes the declared sensor errors: begin with the model of a drive to calibrate it"
 )
 PARTS = (  # of an export: about how long each takes, and the option that asks for it
     ("the identifier", 1.0, ""),
@@ -55,7 +55,7 @@ class Exported:
         step = self.package.specialized
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
-        reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
+        reads += ", and v_y where it is measured; v_y is an output" if step.tells_v_y else ""
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
         return "\n".join([*lines, *self.told, reads, *told, wrote])
 

@@ -95,7 +95,7 @@ def plan(
         tires = PlausibleTires.told(vehicle, believed, steering_lag=steering_lag)
     else:
         if friction is not None:
-            raise PlanError("friction is known from what was learnt: leave one of them out")
+            raise PlanError("the model already has a friction: leave one of them out")
         tires = PlausibleTires.learnt(_of_car(after, vehicle), rng, steering_lag=steering_lag)
     return make_plan(tires, space, time, rng, progress)
 

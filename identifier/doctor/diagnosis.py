@@ -68,7 +68,7 @@ class Diagnosis:
         unseen : whether what the log cannot tell follows.
         """
         found = [f"{one.text} ({_certainty(one)})" for one in self.findings]
-        return found + [f"cannot be seen: {line}" for line in self.unseen if unseen]
+        return found + [f"not observable: {line}" for line in self.unseen if unseen]
 
     def summary(self) -> str:
         """Return the findings and what is unseen as lines of text."""

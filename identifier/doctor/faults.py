@@ -472,7 +472,7 @@ class Search:
                 least = f"{left * one.per_unit:.2g}{one.shown}"
                 if one.code in ("factor", "yaw_inertia"):
                     least = f"a factor of {1.0 + left:.2g}"
-                yield f"{one.name}: {least} would not be seen on this drive"
+                yield f"{one.name}: {least} is not observable on this drive"
 
 
 def _all_move(priors: Priors) -> Priors:

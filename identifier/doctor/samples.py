@@ -290,7 +290,7 @@ def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
         text=f"{name} reads exactly 0 {len(places)} times, for {size:.3g} s in all "
         f"({100.0 * float(np.mean(off)):.2g} % of the log), as from {recording.t[there.start]:.4g} "
         f"s on for {dt * (there.stop - there.start):.3g} s{slow}: an estimate that is switched off "
-        "there and no measurement; leave these stretches out of the log",
+        "there and no measurement; cut these segments out of the log",
     )
 
 

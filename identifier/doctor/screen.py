@@ -261,7 +261,8 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
             size=1.0 / size,
             confidence=confidence,
             text=f"this is the motion of a car with about {size * vehicle.wheelbase:.2g} m between "
-            f"the axles, the told one has {vehicle.wheelbase:.3g} m: name the right vehicle file"
+            f"the axles, the declared one has {vehicle.wheelbase:.3g} m: name the right vehicle "
+            f"file"
             f"{doubt}",
         )
     if change.code == "yaw_inertia":

@@ -199,7 +199,7 @@ SUSPECTS = (
     Suspect("a_y.place", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
             "the acceleration is measured {size} ahead of the center of gravity", " m"),
     Suspect("cg_shift", "center_of_gravity", "", "m", 0.2, 0.1, "length",
-            "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
+            "the center of gravity is declared {size} too far back (l_f and l_r)", " m"),
     Suspect("ln_inertia", "yaw_inertia", "", "", 0.5, 0.1, "",
             "the {origin} yaw inertia is {size} times the right one"),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "",

@@ -98,12 +98,12 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
             precision(name, single=single),
             defines(name, _switches(specialized)),
             defines(name, _numbers(specialized, about)),
-            "/* Time [s] without a sample that could be taken after which no force is told any\n"
-            f" * more; may be set by who compiles the library. */\n#ifndef {stale}\n"
-            f"#define {stale} ({_number(STALE_TIME)})\n#endif\n",
+            "/* Time [s] without a sample that could be taken after which no force is told "
+            "any\n * any more; may be set when the library is compiled. */\n#ifndef "
+            f"{{stale}}\n#define {stale} ({_number(STALE_TIME)})\n#endif\n",
             _structure(f"{name}_input", _inputs(specialized)),
             _structure(f"{name}_output", _declarations(output_members(specialized), name)),
-            _structure(f"{name}_weights", _declarations(learnt, name), "What is learnt."),
+            _structure(f"{name}_weights", _declarations(learnt, name), "What is identified."),
             _structure(
                 f"{name}_signals", _declarations(others, name), "What else is carried, but weights."
             ),
@@ -120,7 +120,9 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
 def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
     learnt, _ = _weights_and_others(specialized)
     if specialized.believed not in (None, GATE):
-        raise ValueError(f"the C looks for what was believed in {GATE}, not {specialized.believed}")
+        raise ValueError(
+            f"the C looks for the last plausible sample in {GATE}, not {specialized.believed}"
+        )
     count, order = len(rules(learnt)), covariance_order(learnt)
     ruled: dict[str, tuple[object, str]] = {
         "COVARIANCE": (f"{order}U", "rows of a covariance among the weights"),

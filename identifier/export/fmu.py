@@ -216,8 +216,8 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             "integer",
             "",
             "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is one "
-            "that no car can be in, not learnt from; 3 an input or 4 a result is not finite or "
-            "beyond what any car reaches, nothing is learnt; 6 that for half a second or more, "
+            "that no car can be in, ignored; 3 an input or 4 a result is not finite or "
+            "beyond what any car reaches, the weights hold; 6 that for half a second or more, "
             "forces are zero",
         ),
         _output(9, "samples", "integer", "", "number of samples taken, those ignored included"),

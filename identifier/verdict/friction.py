@@ -62,7 +62,7 @@ class Road(NamedTuple):
         """The stretch in words."""
         return (
             f"from {self.first:.4g} to {self.last:.4g} s the road has "
-            f"{with_doubt(self.ratio, self.sd)} of the friction of the drive that taught"
+            f"{with_doubt(self.ratio, self.sd)} of the friction of the identification drive"
         )
 
 

@@ -145,7 +145,7 @@ class Verdict:
             return ""
         front, rear = (f"{PERCENT * share:.1f}" for share in self.force_missed)
         return (
-            f"missed of the force that the motion shows: {front} / {rear} % (front / rear, limit "
+            f"model error over the force in the motion: {front} / {rear} % (front / rear, limit "
             f"{PERCENT * MOST_MISSED:.0f} %)"
         )
 

@@ -264,7 +264,7 @@ class ShiftedCenter:
 
     def __str__(self) -> str:
         """Return it in words."""
-        return f"c.g. told {100.0 * self.share:g} % of the wheelbase too far back"
+        return f"c.g. declared {100.0 * self.share:g} % of the wheelbase too far back"
 
     def tell(self, vehicle: Vehicle) -> Vehicle:
         """Return the car as it is told."""
@@ -280,7 +280,7 @@ class AnotherCar:
 
     def __str__(self) -> str:
         """Return it in words."""
-        return f"told to be {self.told.name}"
+        return f"declared as {self.told.name}"
 
     def tell(self, vehicle: Vehicle) -> Vehicle:
         """Return that other car, whatever car drove.

@@ -303,7 +303,8 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     if way.delimiter == "," and len(names) * 2 in (width, width + 1):
         raise RecordingError(
             f"{path}: line {lines[first].number} has {width} cells, the header has {len(names)}: "
-            "decimal commas cannot be told from commas between cells; export with semicolons"
+            "decimal commas cannot be distinguished from commas between cells; export with "
+            "semicolons"
         )
     while len(names) > width and (not names[-1] or names[-1] == "Comment") and len(names) > 1:
         names.pop()  # the header alone ends in a delimiter, or in LabVIEW's Comment

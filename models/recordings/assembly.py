@@ -321,7 +321,7 @@ def _gap_notes(stretches: list[Stretch]) -> tuple[str, ...]:
     times = [after.t[0] - before.t[-1] for before, after in pairwise(stretches)]
     longest = int(np.argmax(times))
     return (
-        f"gaps cut the log into {len(stretches)} stretches that are learnt on as one drive; the "
+        f"gaps cut the log into {len(stretches)} stretches that are used as one drive; the "
         f"longest lasts {times[longest]:.3g} s, after {stretches[longest].t[-1]:.6g} s",
     )
 
@@ -385,7 +385,7 @@ def _scale_note(
     try:
         return scale_text(wheel_scales(log, signals, log_map, run))
     except RecordingError as error:
-        return f"of the wheels nothing is learnt: {error}"
+        return f"the wheels are not used: {error}"
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:

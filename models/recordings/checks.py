@@ -539,7 +539,7 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
     together = correlation(alpha, a)
     if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
         return None
-    car = f"name the right vehicle, of which l_r = {l_r:g} m is told"
+    car = f"name the right vehicle; this file declares l_r = {l_r:g} m"
     place = "move vy to the center of gravity"
     remedy = f"change the sign of vy{other or f', or {car}'}, or {place}"
     if w.a_y is not None:

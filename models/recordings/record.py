@@ -109,7 +109,7 @@ class Recording:
             raise RecordingError(f"{self.name}: estimated may name v_y, not {self.estimated}")
         for piece in self.stretches:
             if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
-                whole = "a recording" if not self.breaks else "each stretch of a recording"
+                whole = "a recording" if not self.breaks else "each segment of a recording"
                 raise RecordingError(
                     f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
                     f"{max(min(piece.stop, n) - piece.start, 0)}"
@@ -148,7 +148,7 @@ class Recording:
                 )
             if piece.start and not self.t[piece.start] > self.t[piece.start - 1]:
                 raise RecordingError(
-                    f"{self.name}: t must rise from one stretch to the next, "
+                    f"{self.name}: t must rise from one segment to the next, "
                     f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
                 )
 
@@ -329,7 +329,7 @@ class Recording:
         whole = [piece for piece in pieces if piece.stop - piece.start >= MINIMUM_SAMPLES]
         if not whole:
             raise RecordingError(
-                f"{self.name}: each stretch of a recording needs at least {MINIMUM_SAMPLES} "
+                f"{self.name}: each segment of a recording needs at least {MINIMUM_SAMPLES} "
                 f"samples, of {len(self)} samples none is left that has them"
             )
         scraps = len(pieces) - len(whole)
@@ -421,8 +421,8 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     for one in recordings[1:]:
         if abs(one.dt - first.dt) > JITTER * first.dt / len(one):
             raise RecordingError(
-                f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs "
-                "that are learnt on together must be brought to one interval"
+                f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs that "
+                f"are used together need one sampling interval"
             )
         end = float(t[n - 1])
         moved = 0.0 if one.t[0] > end + first.dt else end + PAUSE - float(one.t[0])

@@ -1,4 +1,4 @@
-"""A drive in stretches: nothing is differenced from one to the next, and what was learnt stays."""
+"""A drive in stretches: nothing is differenced from one to the next, and the weights stay."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def test_a_recording_counts_its_stretches_and_not_the_gaps(log, cut) -> None:
 @pytest.mark.parametrize(
     ("change", "rule"),
     [
-        ({"breaks": (5,)}, "each stretch of a recording needs at least 10 samples, it has 5"),
+        ({"breaks": (5,)}, "each segment of a recording needs at least 10 samples, it has 5"),
         ({"breaks": ()}, "t must rise in equal steps"),
         ({"breaks": (400,)}, "t must rise in equal steps"),
     ],

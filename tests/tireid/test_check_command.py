@@ -172,7 +172,7 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     code, said = checked(capsys, "--json")
     assert (code, json.loads(said.out)) == (0, numbers)
     linear = checked(capsys, "--method", "linear")[1].out
-    assert "nothing is held by construction" in linear
+    assert "no limits are enforced by construction" in linear
     assert "verdict: not certified; no margin and no bound of its error is proven" in linear
 
 

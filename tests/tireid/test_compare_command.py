@@ -261,7 +261,7 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
     words.append("fit")
     assert main([*words, "--out", str(tmp_path / "refused")]) == 3
     assert "0 of 1" in (tmp_path / "refused" / "report.html").read_text(encoding="utf-8")
-    assert "default learnt on mirrored: verdict: NOT VALID" in capsys.readouterr().out
+    assert "default identified on mirrored: verdict: NOT VALID" in capsys.readouterr().out
     assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
     found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]
     assert found["mirrored"]["valid"] is False

@@ -53,7 +53,7 @@ def test_a_good_log_ends_with_0_and_says_what_it_cannot_tell(clinic, capsys):
     assert doctor(clinic, "good.csv") == 0
     told = capsys.readouterr().out
     assert "doctor: nothing found" in told
-    assert "cannot be seen: mass" in told
+    assert "not observable: mass" in told
 
 
 def test_a_faulty_log_ends_with_3_and_each_fault_has_a_line(clinic, capsys):
@@ -95,7 +95,7 @@ def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
     words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
     assert main([*words, "--repair", str(log_map), "--out", str(out)]) == 0
     told = capsys.readouterr().out
-    assert "repaired, in what was learnt on and replayed: factor.r" in told
+    assert "repaired, in identification and replay: factor.r" in told
     assert "verdict: valid" in told
     found = json.loads((out / "doctor.json").read_text())
     assert found["applied"] == LogMap.from_toml(log_map).repair.tables()

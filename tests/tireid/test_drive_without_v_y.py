@@ -88,7 +88,7 @@ def test_the_line_that_is_printed_says_how_right_it_was(result, bend, tmp_path, 
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out
     assert "no noise, no v_y" in printed
-    assert "frozen: v_y told to 0.0" in printed
+    assert "frozen: v_y estimated to 0.0" in printed
 
 
 def test_a_fault_of_what_is_not_measured_is_one_clear_line(bend, tmp_path, capsys):  # noqa: F811

@@ -170,7 +170,7 @@ def test_rows_are_grouped_by_what_they_say_and_a_log_counts_once():
     assert key_of(rows[4], ["week", "date"]) == (("week", "2026-W02"), ("date", "2026-01-05"))
     assert key_of(row_of(0, [], date="2024-12-30T10:00"), ["week"]) == (("week", "2025-W01"),)
     again = replace(rows[3], setting="otherwise")
-    with pytest.raises(MergeError, match=r"^003 was learnt with two settings, told and otherwise"):
+    with pytest.raises(MergeError, match=r"^003 has rows of two settings, told and otherwise"):
         merged([*rows, again], [])
     assert len(merged([*rows, again], ["setting"])) == 2
     assert merged([*rows, replace(rows[3], run="2")], [])[0].logs == 41

@@ -244,7 +244,7 @@ def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
     page = (result / "report.html").read_text(encoding="utf-8")
     tiles = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page)
     assert tiles[1][1] == f"{front} / {rear} %"
-    assert f"missed of the force that the motion shows: {front} / {rear} %" in printed
+    assert f"model error over the force in the motion: {front} / {rear} %" in printed
     curve = page.index("Figure 1.</b> ")
     assert re.match("(NOT VALID. )?Axle force over slip angle", page[curve + 14 :])
     notes = page.index('<ul class="warnings' if '<ul class="warnings' in page else "No warnings.")
@@ -460,7 +460,7 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
     log.write_text("\n".join([f"{header},run", *runs]))
     words = ["identify", f"{log}:a b", "--vehicle", logs / "car.toml"]
     line = refusal(capsys, [*words, "--replay", f"{log}:a/b", "--out", tmp_path / "out"])
-    assert "every recording needs a name of its own" in line
+    assert "every recording needs a different name" in line
 
 
 @pytest.mark.parametrize(
@@ -496,7 +496,7 @@ def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
 
 
 def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsys, unmade):
-    """What was learnt on the slalom serves from the first sample of the next drive."""
+    """Tires of the slalom serve from the first sample of the next drive."""
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--method", law, "--accept"]  # the paper's network needs a longer drive
     if law == "fit":
@@ -658,7 +658,7 @@ def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
     )
     words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml"]
     line = refusal(capsys, [*words, "--out", tmp_path / "out"])
-    assert "slalom: at 8 s no tires were learnt: axle forces must rise with slip" in line
+    assert "slalom: at 8 s no tires were identified: axle forces must rise with slip" in line
     assert list(tmp_path.iterdir()) == []
 
 
@@ -677,7 +677,7 @@ def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path
         assert verdict_of(tmp_path / name)["valid"] is False
         page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
         assert "NOT VALID" in page
-        assert "Is it good?" in page
+        assert "Verdict" in page
         assert '<div class="bad"><dt>the verdict' in page
         assert page.count('class="struck"') > 4, "numbers of the refused axles"
         assert '<div class="good">' not in page
@@ -689,7 +689,7 @@ def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path
 def test_a_valid_answer_says_so_with_what_each_number_is_worth(result, law):
     verdict = verdict_of(result)
     page = (result / "report.html").read_text(encoding="utf-8")
-    assert "Is it good?" in page
+    assert "Verdict" in page
     if law != "integral":
         assert verdict["valid"]
         assert json.loads((result / "weights.json").read_text())["valid"] is True

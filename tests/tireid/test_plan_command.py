@@ -75,7 +75,7 @@ def test_a_plan_follows_what_was_learnt(tmp_path, undrawn):
         (["--area", "12x8"], "the area must be"),
         (["--speed", "15kn"], "--speed wants"),
         (["--speed", "1e999"], "--speed wants"),
-        (["--speed", "2"], "nothing is learnt below"),
+        (["--speed", "2"], "no sample counts below"),
         (["--time", "nan"], "the time must be"),
         (["--mu", "9"], "--mu must lie between 0.05 and 3, it is 9"),
         (["--grip", "nan"], "--grip must lie between 20 and 97, it is nan"),

@@ -71,7 +71,7 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
         assert page.count("<img") == 4
         front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
         assert f"<dd>{front} / {rear} %</dd>" in page
-        assert f"missed of the force that the motion shows: {front} / {rear} %" in (
+        assert f"model error over the force in the motion: {front} / {rear} %" in (
             capsys.readouterr().out
         )
         assert '<div class="good"><dt>the verdict' in page
@@ -228,7 +228,7 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
     ti.identify(log, ti.sedan(), make_method("axle", ti.sedan())).freeze().save(unchecked)
     summary, _ = predicted(tmp_path / "out", unchecked, logs / "quick.csv")
     assert summary["friction"] is None and not (tmp_path / "out" / "friction.csv").exists()
-    assert "friction: cannot be told, the band is what learning" in capsys.readouterr().out
+    assert "friction: not observable, the band is what learning" in capsys.readouterr().out
 
 
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):

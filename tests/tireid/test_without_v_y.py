@@ -1,4 +1,4 @@
-"""Logs of an IMU, wheel speed and steering alone: read, learnt on, judged and predicted."""
+"""Logs of an IMU, wheel speed and steering alone: read, identified, judged and predicted."""
 
 import csv
 import json
@@ -185,7 +185,7 @@ def test_the_command_learns_and_tells_side_slip_with_its_deviation(log, exact, t
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr()
     assert "fit learns, and estimates it" in said.err
-    assert "side slip was told to ±" in said.out
+    assert "side slip was estimated to ±" in said.out
     assert "the log has no lateral velocity" in said.out
     with (tmp_path / "out" / "forces.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -18,12 +18,12 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "doctor": "what is wrong with a log or with its car's file, and a log.toml that mends it",
         "plan": "what to drive next: the steering that teaches most in the space there is",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
-        "predict": "axle forces of a drive by a stored model, and what they miss",
+        "predict": "axle forces of a drive by a stored model, and their error",
         "compare": "learn, freeze and replay with every method, side by side",
         "fleet": "thousands of logs in one command: learn, merge, where the next car starts, watch",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
-        "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
+        "drive": "steer a car along a path at the limit of grip, on the identified tires",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
     }
 )

@@ -55,10 +55,10 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
     ]
     lines = [f"{vehicle.name}: {name}{default}"]
     if rows:
-        lines += ["held after every sample, by construction, whatever is measured:"]
+        lines += ["limits enforced after every sample, by construction, for any measurement:"]
         lines += [text_table(rows)]
     else:
-        lines += ["nothing is held by construction"]
+        lines += ["no limits are enforced by construction"]
     if certificate.properties:
         told = f"at {driving.v_x:.3g} m/s on a friction of {driving.friction:g}"
         lines += [f"proven, of drops of friction {told}:", certificate_text(certificate, 1.0)]

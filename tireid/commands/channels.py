@@ -108,7 +108,7 @@ def _wheels(
         try:
             scales = wheel_scales(log, signals, told, run)
         except RecordingError as error:
-            return f"of the wheels nothing is learnt: {error}", _without_wheels(plain), True
+            return f"the wheels are not used: {error}", _without_wheels(plain), True
         wheels, scaled = with_scales(told.wheels, signals, scales)
         return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
     try:

@@ -1,13 +1,12 @@
 """The files of `tireid compare`: compare.json, whose keys are stable, tables, CSV and figures.
 
 compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or motion: mean forces
-over 0.3 s that the motion shows); methods: by name online_N by recording,
-frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
-recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
-methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio (null: it
-learns from whole logs); left_out: by
-name why a method is not compared.
-verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
+from the motion over 0.3 s); methods: by name online_N by recording, frozen_N by recording of
+identification and of replay (null: a signal, no model), diverged_at_s by recording, percent (means
+of both axles: online, in_sample, other), side_slip by recording of methods that estimate v_y
+(rms_deg, within_two_sigma_percent), step_s and step_ratio (null: it learns from whole logs);
+left_out: by name why a method is not compared.
+verdict: by recording, of the default identified there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
 """
 
@@ -37,7 +36,7 @@ from tireid.progress import say
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
     """Return the means over recordings of every method, best on other recordings first."""
-    lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
+    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
         online = [(rec, error) for rec, error in trial.online.items()]
@@ -52,7 +51,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
 
 SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
 NOT_TOLD = "-"
-_NOT_SHOWN = "shown no v_y; they tell it, and side slip is judged by the recorded one"
+_NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recorded one"
 
 
 def _slip_cells(trial: Trial) -> list[str]:
@@ -89,7 +88,7 @@ def remarks(comparison: Comparison) -> list[str]:
 
 
 def pair_tables(comparison: Comparison) -> str:
-    """Return one table for each recording learnt on and recording replayed."""
+    """Return one table for each recording identified on and recording replayed."""
     blocks = []
     for learnt in comparison.names:
         for replayed in comparison.names:
@@ -100,7 +99,7 @@ def pair_tables(comparison: Comparison) -> str:
                     error = frozen.get(learnt, {}).get(replayed)
                     cell = "diverged" if error is None else _cell_text(comparison, replayed, error)
                     lines.append([name, cell])
-            blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
+            blocks.append(_text(f"identified on {learnt}, frozen, replayed on {replayed}", lines))
     return "\n".join(blocks)
 
 

@@ -100,7 +100,7 @@ def _chassis(vehicle: Vehicle) -> dict[str, Any]:
 
 _NOT_COMPLETED = 1
 _EPILOG = (
-    "Without --weights or --network, frozen tires are learnt first: the same car drives on an "
+    "Without --weights or --network, frozen tires are identified first: the same car drives on an "
     f"open field for {DURATION:g} s, steered at random and ever harder until it slides, and what "
     "the identifier knows at the end steers. linear is the tire of the vehicle file, oracle the "
     "true tire of the plant, learning begins with what is frozen and goes on learning while it "
@@ -113,9 +113,9 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "drive",
         help=COMMANDS["drive"],
-        description="Learn the tires on one drive, freeze them, and let a model predictive tracker "
-        "that is told of them steer the car along a path; write report.html, summary.json, "
-        "every signal as CSV, figures and a film.",
+        description="Learn the tires on one drive, freeze them, and let a model predictive "
+        "tracker with them steer the car along a path; write report.html, summary.json, every "
+        "signal as CSV, figures and a film.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -137,7 +137,7 @@ def add_parser(commands: Any) -> None:
         action="append",
         default=[],
         metavar="S:MU",
-        help="friction from arc length S [m] on, known to nobody but oracle; may be repeated",
+        help="friction from arc length S [m] on, given to oracle only; may be repeated",
     )
     parser.add_argument(
         "--tires",
@@ -169,7 +169,7 @@ def add_parser(commands: Any) -> None:
         help="full: v_y is measured; imu: yaw rate and a_y of an inertial unit on the body (0.003 "
         "rad/s and 0.1 m/s² of noise, biases of 0.001 and 0.05), wheel speed (0.03 m/s), steering, "
         "position (2 cm) and heading (0.1 degrees) of a localization, and no v_y: an identifier "
-        "that learns while it drives tells it (%(default)s)",
+        "estimates it while driving (%(default)s)",
     )
     parser.add_argument(
         "--fault",
@@ -192,8 +192,8 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=0.0,
         metavar="SHARE",
-        help="of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
-        "plans with the least grip that its motion leaves possible (%(default)g)",
+        help="share of the tires' uncertainty that the tracker plans for: 0 none, 1 the least "
+        "grip that the motion leaves possible (%(default)g)",
     )
     shared.add_seed(parser, "noise and learning")
     parser.add_argument(

@@ -176,7 +176,7 @@ def _told_words(run: Run) -> str:
     told = told_scores(run.drive)
     assert told is not None
     return (
-        f"v_y told to {told.rms_error_m_s:.3f} m/s, side slip to {told.rms_error_deg:.2f} of "
+        f"v_y estimated to {told.rms_error_m_s:.3f} m/s, side slip to {told.rms_error_deg:.2f} of "
         f"{told.rms_deg:.2f} degrees rms; {100.0 * told.within_two_sd:.0f} % of the errors within "
         f"two standard deviations"
     )

@@ -41,14 +41,14 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--fmu", action="store_true", help="also FMUs 2.0 and 3.0, Co-Simulation")
     parser.add_argument("--onnx", action="store_true", help="also the model, frozen, as ONNX")
     parser.add_argument(
-        "--mpc", action="store_true", help="also a tracker that steers by what is learnt"
+        "--mpc", action="store_true", help="also a tracker that steers by the identified tires"
     )
     parser.add_argument(
         "--caution",
         type=float,
         default=0.0,
         metavar="SHARE",
-        help="of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
+        help="share of the tires' uncertainty that the tracker of --mpc plans for, from 0 to 1; a "
         "number of its parameters (%(default)g)",
     )
     shared.add_output(parser, "export")

@@ -32,7 +32,7 @@ def add_parser(commands: Any) -> None:
         "fleet",
         help=COMMANDS["fleet"],
         description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
-        "each log, and ask it: one model of many logs, where the next car starts, which car's "
+        "each log, and ask it: one model of many logs, prior for the next car, which car's "
         f"tires changed. {needs('A store', 'libraries', 'fleet')}.",
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
@@ -47,10 +47,10 @@ def _add_learn(tasks: Any) -> None:
     parser = tasks.add_parser(
         "learn",
         help="learn logs that the store does not hold yet",
-        description="Learn each log on its own and keep, per log, the frozen model, what it tells "
-        "of the tires as information matrix and vector, the verdict and how it was driven. A log "
-        "that cannot be used becomes a row with its error. Run it again after it was stopped, or "
-        "with more logs: only what is missing is learnt.",
+        description="Learn each log on its own and keep, per log, the frozen model, its "
+        "information matrix and vector of the tires, the verdict and how it was driven. A log "
+        "that cannot be used becomes a row with its error. Run it again after it was stopped, "
+        "or with more logs: only missing logs are identified.",
     )
     parser.add_argument(
         "logs", nargs="+", metavar="PATTERN", help="logs, quoted: 'logs/**/*.csv', s3://..."
@@ -75,21 +75,19 @@ def _add_learn(tasks: Any) -> None:
         metavar="DIR",
         help="name logs as they lie under this folder or address, not by their absolute paths",
     )
-    parser.add_argument(
-        "--weights", type=Path, metavar="FILE", help="fit or prior that is believed before"
-    )
+    parser.add_argument("--weights", type=Path, metavar="FILE", help="fit or prior to begin with")
     parser.add_argument(
         "--judge",
         choices=("motion", "none"),
         default="motion",
-        help="verdict of each log: does the model give its motion back, or none (%(default)s)",
+        help="verdict of each log: does the model reproduce its motion, or none (%(default)s)",
     )
     parser.add_argument(
         "--part",
         type=float,
         default=PART,
         metavar="S",
-        help="longest piece of a log that is kept as one [s] (%(default)g)",
+        help="longest piece of a log in one row [s] (%(default)g)",
     )
     parser.add_argument(
         "--again", action="store_true", help="also learn logs whose row holds an error"
@@ -97,7 +95,7 @@ def _add_learn(tasks: Any) -> None:
     parser.add_argument(
         "--replace",
         action="store_true",
-        help="take out of the store what these logs were learnt with before: another car or other "
+        help="take out of the store earlier rows of these logs: another car or other "
         "options, or another content of the same file",
     )
     add_log_map(parser)
@@ -122,7 +120,7 @@ def _add_question(parser: argparse.ArgumentParser) -> None:
         help="rows that count, by a condition on their columns: \"a_y_most > 4 and tires = 'x'\"",
     )
     parser.add_argument(
-        "--all", action="store_true", help="also logs whose answer the verdict refuses"
+        "--all", action="store_true", help="also logs whose model the verdict rejects"
     )
 
 
@@ -139,8 +137,8 @@ def _add_merge(tasks: Any) -> None:
     parser = tasks.add_parser(
         "merge",
         help="one model of the logs of each group",
-        description="Add up what logs tell, group by group, and write a model of each, as "
-        "weights.json is, and a table.",
+        description="Add up the information of the logs, group by group; write a model of each "
+        "group, as weights.json, and a table.",
     )
     _add_question(parser)
     _add_by(parser, "vehicle,tires")
@@ -154,9 +152,9 @@ def _add_merge(tasks: Any) -> None:
 def _add_prior(tasks: Any) -> None:
     parser = tasks.add_parser(
         "prior",
-        help="where the next car starts",
-        description="Learn from the cars of a store what they have in common and how they differ, "
-        "and write a model to begin with: tireid identify --weights FILE.",
+        help="prior for the next car",
+        description="Estimate the mean and the spread of a store's cars, and write a prior to "
+        "begin with: tireid identify --weights FILE.",
     )
     _add_question(parser)
     _add_by(parser, "vehicle,tires")
@@ -173,7 +171,7 @@ def _add_prior(tasks: Any) -> None:
 def _add_watch(tasks: Any) -> None:
     parser = tasks.add_parser(
         "watch",
-        help="whose tires changed, when, and to what it is likely due",
+        help="whose tires changed, when, and the likely cause",
         description="Compare each car's later logs with its first ones, its baseline, and tell of "
         "changes of stiffness and friction: wear, other tires, a wet road. Exit code 1 where one "
         "lasts. Logs are ordered by their date.",
@@ -296,7 +294,7 @@ def _learn(options: argparse.Namespace) -> int:
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)
     tell(
-        f"{became.of} logs, {hours:.3g} h: {became.learnt} learnt now, "
+        f"{became.of} logs, {hours:.3g} h: {became.learnt} identified now, "
         f"{became.of - became.learnt} before; "
         f"{refused} not valid, {len(errors)} could not be used"
         + (f", the column error of {options.out} says why" if errors else "")
@@ -323,7 +321,7 @@ class _Used:
         if not used:
             raise ValueError(
                 f"{self.options.store}: none of {of} logs can be used"
-                + ("" if self.options.all else "; --all takes those too that the verdict refuses")
+                + ("" if self.options.all else "; --all includes rejected ones")
             )
         if not self.told:
             say(f"{used} of {of} logs")
@@ -412,7 +410,7 @@ def _table(groups: list[Merged]) -> str:
 
 
 def _prior(options: argparse.Namespace) -> int:
-    """Write where the next car starts."""
+    """Write prior for the next car."""
     require_free(options.out, force=options.force)
     vehicle = Vehicle.from_toml(options.vehicle)
     prior = fleet_prior(_Used(options).groups)

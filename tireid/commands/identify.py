@@ -45,14 +45,13 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "identify",
         help=COMMANDS["identify"],
-        description="Learn axle forces over LOG sample by sample, freeze the weights, replay LOG "
-        "and other recordings; write report.html, summary.json, weights.json, curves as CSV and "
-        "figures.",
+        description="Identify the axle forces of LOG, freeze the model, replay LOG and other "
+        "recordings; write report.html, summary.json, weights.json, curves as CSV and figures.",
         epilog="LOG is a log of any format with the columns t [s], vx, vy [m/s], r [rad/s], "
         "delta_f [rad] and, where known, delta_r [rad], ay [m/s2], Fyf, Fyr [N] (or Fyf_inv, "
         "Fyr_inv: forces computed backwards from the motion), run; x forward, y left, delta and r "
-        "positive to the left. Other names, units and signs are told by --columns or --log; tireid "
-        "channels LOG lists what is there. Several logs are learnt on as one drive, in order.",
+        "positive to the left. --columns or --log give other names, units and signs; tireid "
+        "channels LOG lists what is there. Several logs are used as one drive, in order.",
     )
     parser.add_argument(
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
@@ -108,10 +107,12 @@ def run(options: argparse.Namespace) -> int:
     beside = options.network is not None  # of which something learns online
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
-        raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
+        raise ValueError("--freeze is for identified models: the network of --network is frozen")
     bound = None if options.bound is None else results.AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
-        raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
+        raise ValueError(
+            "--bound is for identified models: a network has no set of possible weights"
+        )
     start = None if options.weights is None else load_model(options.weights)
     if options.weights is not None:
         warn_of_stored(options.weights)
@@ -253,7 +254,7 @@ def _require_tires(learnt: History, t: float) -> None:
         require_alive(FrozenModelError, learnt.freeze(t))
     except FrozenModelError as error:
         raise FrozenModelError(
-            f"{learnt.recording.name}: at {freeze_key(t)} s no tires were learnt: {error}"
+            f"{learnt.recording.name}: at {freeze_key(t)} s no tires were identified: {error}"
         ) from None
 
 
@@ -299,7 +300,7 @@ def _require_distinct(recordings: list[Recording]) -> None:
         if files.count(name) > 1:
             raise ValueError(
                 f"{recording.name} is given twice, or its files would be named as those of another "
-                f"recording, {name}: every recording needs a name of its own"
+                f"recording, {name}: every recording needs a different name"
             )
 
 

@@ -239,7 +239,7 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
     parser.add_argument(
-        "--dbc", metavar="FILE", help="DBC that tells the signals in the frames of a CAN log"
+        "--dbc", metavar="FILE", help="DBC with the signals in the frames of a CAN log"
     )
     parser.add_argument(
         "--rate",
@@ -250,13 +250,13 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cut-holes",
         action="store_true",
-        help="leave cells without a value (NaN) out of the logs, which are refused else",
+        help="drop samples without a value (NaN); else such logs are rejected",
     )
     parser.add_argument(
         "--mend-clock",
         action="store_true",
-        help="sort samples by time, leave out those that share a stamp, and learn on what follows "
-        "where the clock starts again as after a gap; refused else",
+        help="sort samples by time, drop repeated stamps, and treat a clock that starts again "
+        "as a gap; else such logs are rejected",
     )
 
 
@@ -333,7 +333,7 @@ _CONVENTIONS = (
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option and what belongs to it."""
-    group = parser.add_argument_group("a tire network of your own", _CONVENTIONS)
+    group = parser.add_argument_group("your tire network", _CONVENTIONS)
     group.add_argument("--network", type=Path, metavar="FILE.onnx", help=what)
     group.add_argument(
         "--network-inputs",

@@ -43,9 +43,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--area", required=True, metavar="LxW", help="length and width [m], as 40x40"
     )
-    parser.add_argument(
-        "--speed", required=True, metavar="V", help="held throughout: 15 or 15m/s, 54km/h"
-    )
+    parser.add_argument("--speed", required=True, metavar="V", help="constant: 15 or 15m/s, 54km/h")
     parser.add_argument(
         "--time",
         type=float,
@@ -102,12 +100,12 @@ def add_parser(commands: Any) -> None:
         "--steering-ratio",
         type=float,
         metavar="RATIO",
-        help="hand wheel over front wheels: steering.csv tells the hand wheel too",
+        help="hand wheel over front wheels: steering.csv has the hand wheel too",
     )
     parser.add_argument(
         "--blind",
         action="store_true",
-        help="nobody holds the course, steering alone is played: takes more room",
+        help="open loop: steering without course correction; takes more room",
     )
     shared.add_seed(parser, "the search")
     shared.add_output(parser, "plan")

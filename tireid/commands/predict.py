@@ -35,11 +35,11 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "predict",
         help=COMMANDS["predict"],
-        description="Predict the axle forces of LOG with a stored model, which learns nothing from "
-        "it; write report.html, figures, forces.csv, summary.json and, where it can be told, "
-        "friction.csv, of the road over that of the drive that taught. Where LOG has true forces, "
-        "say how much is missed; else how much of the measured lateral and yaw acceleration the "
-        "forces explain, in means over 0.2 s.",
+        description="Predict the axle forces of LOG with a stored model, which stays as it is; "
+        "write report.html, figures, forces.csv, summary.json and, where observable, "
+        "friction.csv: friction of the road over that of the identification drive. Where LOG "
+        "has true forces, give the error; else how much of the measured lateral and yaw "
+        "acceleration the forces explain, in means over 0.2 s.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
@@ -109,8 +109,8 @@ def _model(options: argparse.Namespace) -> TireModel:
     if not model.scales_with_load:
         raise ValueError(
             f"{options.model} is of the car {model.vehicle.name!r} and cannot be mounted on "
-            f"{vehicle.name!r}, as models of the axle identifier can: leave --vehicle out to ask "
-            "it of its own car"
+            f"{vehicle.name!r}, as models of the axle identifier can: leave --vehicle out to use "
+            f"its stored car"
         )
     say(f"{options.model} is of the car {model.vehicle.name!r}: scaled by the axle loads")
     return model.mounted_on(vehicle)
@@ -241,7 +241,7 @@ def _prediction_text(
     if inside is not None:
         lines.append(
             f"in {100.0 * inside[0]:.0f} / {100.0 * inside[1]:.0f} % of the windows of 0.3 s the "
-            "force that the motion shows lies in the band of 90 % (front / rear)"
+            f"force in the motion lies in the band of 90 % (front / rear)"
         )
     held = truth_within_band(prediction, half)
     if held is not None:
@@ -253,12 +253,12 @@ def _prediction_text(
     if against is not None:
         lines.append(_contradiction_line(*against))
     if model.has_band and not model.band_calibrated:
-        lines.append(f"friction: cannot be told, the band is {UNCALIBRATED}")
+        lines.append(f"friction: not observable, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
         lines.append(
-            "friction: that of the drive that taught, as far as the tires show it"
+            "friction: that of the identification drive, as far as observable"
             if friction.as_taught
-            else "friction: the tires slide too little to show it"
+            else "friction: not observable, slip is too small"
         )
     return "\n".join(lines)
 

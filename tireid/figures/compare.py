@@ -57,7 +57,7 @@ def _ticks(low: float, high: float) -> list[float]:
     return ticks
 
 
-ONLINE, OWN, OTHER = "online", "frozen, where learnt", "frozen, other recordings"
+ONLINE, OWN, OTHER = "online", "frozen, same drive", "frozen, other recordings"
 KINDS = {
     ONLINE: (style.BLUE, "o", -0.22),
     OWN: (style.GREEN, "D", 0.0),

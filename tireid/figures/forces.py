@@ -310,7 +310,7 @@ def draw_diagnosis(
     for panel, title in zip(panels, style.AXLES, strict=True):
         panel.set_title(title)
         panel.set_xlabel("slip angle [deg]")
-        panel.set_ylabel("force that the motion shows [load]")
+        panel.set_ylabel("force from the motion [load]")
         panel.axhline(0.0, color=style.GREY, linewidth=0.5)
     style.legend_above(figure)
     return figure

@@ -25,7 +25,7 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
     for axle, name in enumerate(style.AXLES):
         upper, lower = panels[:, axle]
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
-        upper.plot(shown.t, seen, color=style.BLACK, label="shown by the motion", **POINTS)
+        upper.plot(shown.t, seen, color=style.BLACK, label="from the motion", **POINTS)
         upper.plot(shown.t, said, color=style.ORANGE, label="model", **POINTS)
         upper.set(title=name)
         lower.axhline(0.0, color=style.BLACK, linewidth=0.6)
@@ -50,7 +50,7 @@ def friction_figure(friction: RoadFriction) -> Figure:
     )
     upper.plot(t, ratio, color=style.BLUE, label="friction")
     upper.axhline(1.0, color=style.GREY, linewidth=0.8, linestyle="--", label="as taught")
-    upper.set(ylabel="friction over that\nof the drive that taught", ylim=(0.0, None))
+    upper.set(ylabel="friction over that of\nthe identification drive", ylim=(0.0, None))
     lower.plot(t, friction.another[some], color=style.ORANGE, label="another road")
     lower.plot(
         t,

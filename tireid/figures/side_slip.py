@@ -39,7 +39,7 @@ def side_slip_figure(
     drawn = list(recordings)[:MOST]
     told = {name: by_name for name, by_name in told.items() if by_name}
     if not told:
-        raise ValueError("no method told a lateral velocity")
+        raise ValueError("no method estimated a lateral velocity")
     with_band = [
         name
         for name, by_name in told.items()
@@ -117,7 +117,7 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
         "color": style.BLUE,
         "alpha": 0.2,
         "linewidth": 0.0,
-        "label": "told, two sigma",
+        "label": "estimate, two sigma",
     }
     told_look: Mapping[str, Any] = {**style.ONLINE, "label": "told"}
     alone: Mapping[str, Any] = {

@@ -448,7 +448,7 @@ class LearnSome:
 
     def died(self, task: _Task) -> Learnt:
         """Return the row of a log that processes die of."""
-        why = "the process that learnt it died, twice: it may want more memory than there is"
+        why = "its process died twice: it may need more memory than there is"
         return Learnt([replace(row_of(task, self.cars[task.vehicle]), error=why)], [])
 
 

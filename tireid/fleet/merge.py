@@ -153,7 +153,7 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, Lo
         setting = settings.setdefault((key, *row.key[:2]), row.setting)
         if setting != row.setting:
             raise MergeError(
-                f"{row.name} was learnt with two settings, {setting} and {row.setting}, and would "
+                f"{row.name} has rows of two settings, {setting} and {row.setting}, and would "
                 "count twice: merge --by setting, choose one by --where, or keep the newest by "
                 "fleet learn --replace"
             )

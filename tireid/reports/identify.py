@@ -49,7 +49,7 @@ def write_identify_report(
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
         verdicts.verdict_section(verdict),
-        page.Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
+        page.Section(heading="Identified tires", blocks=learnt_blocks(law, model, figures)),
         page.Section(
             heading="How well it predicts",
             blocks=[*_asked(asked), *_errors([runs[0], *parts, *runs[1:]], frozen, figures)],
@@ -68,7 +68,7 @@ def write_identify_report(
     ]
     notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, runs)]
     report = page.Report(
-        title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
+        title=f"Tires of {learnt.vehicle.name}, identified on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
             verdicts.verdict_headline(verdict, notes),
@@ -101,8 +101,8 @@ def _how_learnt(learnt: History) -> str:
     estimated = learnt.recording.logged_v_y is None
     lateral = "acceleration" if estimated else "velocity"
     told = side_slip_text(learnt)
-    more = f" Nobody measured lateral velocity: {told}." if estimated and told else ""
-    how = "learnt sample by sample" if learnt.online else "one estimate of tires and sensors"
+    more = f" Lateral velocity was not measured: {told}." if estimated and told else ""
+    how = "identified sample by sample" if learnt.online else "one estimate of tires and sensors"
     return (
         f"{learnt.recording.duration:.4g} s of driving, {how} from speed, "
         f"lateral {lateral}, yaw rate and steering.{more}"
@@ -117,7 +117,10 @@ def side_slip_text(learnt: History) -> str:
     sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
     seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
     median = float(np.degrees(np.median(sd)))
-    return f"side slip was told to ± {median:.2g} deg (median), observable {seen:.0f} % of the time"
+    return (
+        f"side slip was estimated to ± {median:.2g} deg (median), observable {seen:.0f} % of the "
+        "time"
+    )
 
 
 def identify_headlines(
@@ -125,10 +128,10 @@ def identify_headlines(
 ) -> list[page.Headline]:
     """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers = []
-    for kind, some in (("not learnt on", runs[1:]), ("learnt on", runs[:1])):
+    for kind, some in (("of validation", runs[1:]), ("of identification", runs[:1])):
         shares = [share for run in some if (share := _share(run, replays)) is not None]
         if shares:
-            meaning = f"of the rms force missed on drives {kind}, frozen"
+            meaning = f"of the rms force: error on drives {kind}, frozen"
             numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
     if model.known_slip is not None:
         front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
@@ -137,17 +140,17 @@ def identify_headlines(
 
 
 def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
-    """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
+    """Return on how many validation drives a model is valid, and its error."""
     if not asked:
         return []
     valid = sum(verdict.valid for verdict in asked.values())
     tone: page.Tone = "" if valid == len(asked) else "bad"
-    meaning = "replayed drives, not learnt on, whose motion the model gives back"
+    meaning = "replayed validation drives with a valid prediction"
     numbers = [page.Headline(f"{valid} of {len(asked)}", meaning, tone)]
     shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
     if shares:
         front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
-        meaning = "missed of the force that the motion of these drives shows, front / rear"
+        meaning = "error over the force in the motion of these drives, front / rear"
         numbers.append(page.Headline(f"{front} / {rear} %", meaning))
     return numbers
 
@@ -181,7 +184,7 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
             )
         said += _extrapolated(model, recording)
     if model.known_slip is None:
-        said.append("This kind of model cannot tell where it knows the tires and where it guesses.")
+        said.append("This kind of model does not report the slip range that it was identified for.")
     return said
 
 
@@ -215,14 +218,14 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     ]
     if facts:
         blocks.append(
-            page.Table(caption=f"What {law} knows of the tires.", header=["", *AXLES], rows=facts)
+            page.Table(caption=f"Parameters of the tires, {law}.", header=["", *AXLES], rows=facts)
         )
     for told in (band_sentence(model), guaranteed_sentence(model)):
         if told:
             blocks.append(page.Paragraph(text=told))
     captions = {
         "side_slip": "Side slip as it was estimated.",
-        "learnt": "What was learnt over time.",
+        "learnt": "Estimates over time.",
         "error": "Norm of the observer's error.",
         "weights": "Weights of the network.",
     }
@@ -241,7 +244,7 @@ def band_sentence(model: TireModel) -> str:
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
         f"width: {model.band_origin}. "
-        "Where slip is not known it widens to what was believed before the drive."
+        "Where slip is not known it widens to the prior."
     )
 
 
@@ -268,7 +271,7 @@ def guaranteed_sentence(model: TireModel) -> str:
 
 
 def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
-    """Return the verdicts on a model over drives that it was not learnt on, as a table."""
+    """Return the verdicts on a model over drives that it was of validation, as a table."""
     rows: list[list[page.Cell]] = []
     for name, verdict in asked.items():
         missed = verdict.force_missed or (None, None)
@@ -278,8 +281,8 @@ def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
     if not rows:
         return []
     caption = (
-        "The verdict on each replayed drive, as of tireid predict, and what is missed of the "
-        "force that the motion shows."
+        "The verdict on each replayed drive, as of tireid predict, and the error over the force "
+        "in the motion."
     )
     return [
         page.Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)
@@ -313,7 +316,7 @@ def _errors(
         blocks.append(drawing(figures["forces"], caption, read))
     for name, figure in figures.items():
         if name.startswith("replay_"):
-            caption = f"The frozen model asked about {name.removeprefix('replay_')}."
+            caption = f"The frozen model on {name.removeprefix('replay_')}."
             blocks.append(drawing(figure, caption, READ["replay"]))
     return blocks
 

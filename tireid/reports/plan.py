@@ -92,7 +92,7 @@ def write_plan_report(
                 ],
             ),
             Section(
-                heading="What it will teach",
+                heading="Expected gain",
                 blocks=[
                     drawing(
                         figures["band"], "The band of 90 % before and after.", READ["plan_band"]
@@ -120,7 +120,7 @@ def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
         "for possible, a wet place or a lower speed change the way."
     ]
     if not found.space.held:
-        said.append("Nobody holds the course: whatever pushes the car stays in its way.")
+        said.append("Open loop: disturbances of the course are not corrected.")
     if driven and least(driven) < 0.0:
         said.append(
             f"The double-track car of the vehicle file leaves the area by {-least(driven):.2g} m: "
@@ -138,7 +138,8 @@ def _how(found: Plan) -> str:
         "the time since the entry of each pass, and the course of the center of gravity that "
         "follows: X along the longer side of the area, Y to the left of it, both from the corner "
         f"in which the area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. "
-        f"The speed is held. {paths}: the course with a straight run-up, as tireid drive --path "
+        f"The speed is constant. {paths}: the course with a straight run-up, as tireid drive "
+        f"--path "
         f"path.csv --speed {space.speed:g}m/s and other path trackers read it; who tracks it well "
         "steers much the same."
     )

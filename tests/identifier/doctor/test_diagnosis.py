@@ -86,7 +86,7 @@ def test_a_diagnosis_is_ready_for_json_and_short_to_print(found):
     data = json.loads(json.dumps(found.to_dict()))
     assert data["findings"][0]["repair"] == data["repair"]
     assert repr(found).startswith("<Diagnosis of 'sedan, straight': steering_ratio delta_f")
-    assert "cannot be seen: mass" in found.summary()
+    assert "not observable: mass" in found.summary()
 
 
 def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():

@@ -223,7 +223,7 @@ def test_a_stored_model_is_gone_on_from(history, banked):
 
 
 def test_how_sure_a_stored_zero_of_the_steering_is_stays_known(history):
-    """What was learnt goes on as one number does: the same covariance, and not the first guess."""
+    """Covariances go on as one number does: the same covariance, and not the first guess."""
     stored = history.freeze()
     again = METHOD.frozen(CAR, METHOD.setup(CAR, stored).carry)
     np.testing.assert_allclose(again.covariance, stored.covariance, rtol=1e-9, atol=1e-15)

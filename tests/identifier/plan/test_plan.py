@@ -232,7 +232,7 @@ def test_where_a_car_can_turn_a_pass_has_no_end(tires):
     [
         ({"length": 20.0, "width": 14.0}, 3.0, "must be .* m long, or drive at"),
         ({"width": 3.0}, 3.0, "is 3 m wide and the car with its margins"),
-        ({"speed": 1.0}, 3.0, "nothing is learnt below"),
+        ({"speed": 1.0}, 3.0, "no sample counts below"),
         ({"length": 8.0, "speed": 5.0}, 3.0, "must be .* m long$"),
         ({}, 0.1, "the time must be 0.5 to 60 s"),
         ({"length": 300.0}, 0.6, "needed to steer three times at 15 m/s, the time is 0.6"),
