@@ -98,9 +98,9 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
             precision(name, single=single),
             defines(name, _switches(specialized)),
             defines(name, _numbers(specialized, about)),
-            "/* Time [s] without a sample that could be taken after which no force is told "
-            "any\n * any more; may be set when the library is compiled. */\n#ifndef "
-            f"{{stale}}\n#define {stale} ({_number(STALE_TIME)})\n#endif\n",
+            "/* Time [s] without a sample that could be taken after which no force is output any\n"
+            f" * more; may be set when the library is compiled. */\n#ifndef {stale}\n"
+            f"#define {stale} ({_number(STALE_TIME)})\n#endif\n",
             _structure(f"{name}_input", _inputs(specialized)),
             _structure(f"{name}_output", _declarations(output_members(specialized), name)),
             _structure(f"{name}_weights", _declarations(learnt, name), "What is identified."),

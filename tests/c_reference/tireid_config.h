@@ -33,7 +33,8 @@ typedef double tireid_real;
 #define TIREID_NOWHERE (1000000.0) /* speed of no car [m/s] */
 #define TIREID_VERSION "reference" /* name, hash, version of tireid */
 
-/* Time [s] without a sample that could be taken after which no force is told any * any more; may be set when the library is compiled. */
+/* Time [s] without a sample that could be taken after which no force is output any
+ * more; may be set when the library is compiled. */
 #ifndef TIREID_STALE_TIME
 #define TIREID_STALE_TIME (0.5)
 #endif

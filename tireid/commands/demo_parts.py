@@ -86,7 +86,7 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
         Paragraph(
             text="The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
             "can give: with the frozen model the tracker drives as well as with the true tires. "
-            "The film is {LANE_CHANGE}/drive.{FILM}."
+            f"The film is {LANE_CHANGE}/drive.{FILM}."
         ),
         _scores(lane),
         drawing(lane.figures["errors"], "Deviation and the rest along the lane change.",
