@@ -253,7 +253,7 @@ class Method(ABC):
         """Return the weights that the curve of a tire can have; None where it learns no curves."""
         return None
 
-    def believed_body(self, vehicle: Vehicle) -> "Body | None":
+    def body_prior(self, vehicle: Vehicle) -> "Body | None":
         """Return how a car's body is believed to roll; None where no accelerometer tells v_y.
 
         Parameters

@@ -70,7 +70,7 @@ class Estimate(NamedTuple):
     """A number of one axle that a drive may have decided.
 
     title, axle : what.   value, unit : how much.   sd : its standard deviation, None unknown.
-    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
+    declared : value in the vehicle file or None.   identified : whether the drive decided it.
     """
 
     title: str
@@ -78,14 +78,14 @@ class Estimate(NamedTuple):
     value: float
     sd: float | None
     unit: str
-    told: float | None
-    learnt: bool
+    declared: float | None
+    identified: bool
 
     @property
     def words(self) -> str:
         """Value and standard deviation in three digits, and whether the drive left it open."""
         value = printed_value(self.value, self.sd, self.unit)
-        return value if self.learnt else f"{value} ({NOT_IDENTIFIABLE})"
+        return value if self.identified else f"{value} ({NOT_IDENTIFIABLE})"
 
     def with_missed(self, share: float) -> "Estimate":
         """Return the number with the share that is missed of a force in its standard deviation.
@@ -613,10 +613,10 @@ class TireModel(ABC):
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
-        told = self.vehicle.bicycle[4:]
+        declared = self.vehicle.bicycle[4:]
         return tuple(
             Estimate(STIFFNESS, axle, float(C), None, "N/rad", before, not np.isclose(C, before))
-            for axle, C, before in zip(AXLES, self.stiffness, told, strict=True)
+            for axle, C, before in zip(AXLES, self.stiffness, declared, strict=True)
         )
 
     def facts(self) -> tuple[Fact, ...]:

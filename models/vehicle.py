@@ -522,13 +522,13 @@ class Vehicle:
         return self.chassis
 
     def origin(self, name: str) -> str:
-        """Return where a value comes from, in a word: "told", or "estimated" of what was left out.
+        """Return where a value comes from: "declared", or "estimated" where left out.
 
         Parameters
         ----------
         name : of the value.
         """
-        return "estimated" if name in self.estimated else "told"
+        return "estimated" if name in self.estimated else "declared"
 
     @property
     def estimates(self) -> str:

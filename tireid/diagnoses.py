@@ -85,13 +85,13 @@ def size_text(finding: Finding) -> str:
     return f"{with_doubt(scale * finding.size, doubt)} {unit}".strip()
 
 
-def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
+def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
         table = text_table([list(HEADER), *_finding_rows(diagnosis)], "<<<<")
-        return "\n".join([head, table, *diagnosis.lines(unseen=unseen)])
-    return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
+        return "\n".join([head, table, *diagnosis.lines(unobservable=unobservable)])
+    return "\n".join(["doctor: nothing found", *diagnosis.lines(unobservable=unobservable)])
 
 
 def _tone_of(diagnosis: Diagnosis) -> page.Tone:
@@ -123,7 +123,8 @@ def diagnosis_section(
     else:
         blocks.append(page.Paragraph(text="Nothing was found."))
     blocks += [
-        page.Paragraph(text=page.printed(f"Not observable: {line}")) for line in diagnosis.unseen
+        page.Paragraph(text=page.printed(f"Not observable: {line}"))
+        for line in diagnosis.unobservable
     ]
     return page.Section(heading=heading, blocks=[*blocks, *more])
 
@@ -133,8 +134,8 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
 
     path : of --repair, None where it was not asked for.
     """
-    lines = [diagnosis_text(diagnosis, unseen=False)]
-    if diagnosis.unseen[:1] == (WITHOUT_V_Y,):
+    lines = [diagnosis_text(diagnosis, unobservable=False)]
+    if diagnosis.unobservable[:1] == (WITHOUT_V_Y,):
         lines.append(f"not observable: {WITHOUT_V_Y}")
     if repair:
         lines.append(f"repaired, in identification and replay: {repair_text(repair)}")

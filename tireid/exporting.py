@@ -47,7 +47,7 @@ class Exported:
     folder: Path
     package: Package
     costs: tuple[Cost, ...]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def __str__(self) -> str:
         lines = [f"{cost.processor}, {cost.precision}: {cost.words}" for cost in self.costs]
@@ -57,7 +57,7 @@ class Exported:
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += ", and v_y where it is measured; v_y is an output" if step.tells_v_y else ""
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
-        return "\n".join([*lines, *self.told, reads, *told, wrote])
+        return "\n".join([*lines, *self.notes, reads, *told, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -154,7 +154,7 @@ def export(
                     version,
                 )
                 progress.step(2)
-    return Exported(folder=target, package=package, costs=tuple(costs), told=tuple(told))
+    return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(told))
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:

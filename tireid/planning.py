@@ -92,7 +92,7 @@ def plan(
         believed = FRICTION if friction is None else friction
         if not 0.05 <= believed <= 3.0:
             raise PlanError(f"friction must be 0.05 to 3, it is {believed:g}")
-        tires = PlausibleTires.told(vehicle, believed, steering_lag=steering_lag)
+        tires = PlausibleTires.declared(vehicle, believed, steering_lag=steering_lag)
     else:
         if friction is not None:
             raise PlanError("the model already has a friction: leave one of them out")

@@ -33,7 +33,7 @@ def _marked_number(verdict: Verdict, number: Number | None) -> Marked:
     """
     if number is None:
         return Marked("")
-    if not number.learnt:
+    if not number.identified:
         return Marked(number.words, "unknown", NOT_IDENTIFIABLE)
     if not number.valid:
         return Marked(number.words, "struck", "not valid")
@@ -153,7 +153,7 @@ def verdict_section(verdict: Verdict) -> Section:
         [title, *(_marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
-    lines = (verdict.headline, verdict.missed_line, *verdict.unseen)
+    lines = (verdict.headline, verdict.missed_line, *verdict.unobservable)
     blocks: list[Block] = [
         Paragraph(
             text="The frozen model is replayed over the drive and must reproduce the force in "

@@ -85,7 +85,7 @@ class BandCalibration:
             raise ValueError(f"speed of the band must be positive, it is {self.speed} m/s")
 
     @classmethod
-    def told(cls, speed: float) -> Self:
+    def declared(cls, speed: float) -> Self:
         """Return that of a model whose errors are as learning is told, of a speed.
 
         Parameters

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
-from identifier.doctor.pieces import stretches_of
+from identifier.doctor.pieces import segments_of
 from identifier.doctor.suspects import NOTES, SUSPECTS, TURNING, Suspect
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
@@ -42,9 +42,9 @@ class Rules:
     longest: float = 60.0  # [s] that are looked at of a log,
     pieces: int = 4  # and from how many parts of a longer one
     logs: int = 3  # that are looked at as long, of several,
-    log: float = 10.0  # and what a stretch must last to be one [s]
+    log: float = 10.0  # and what a segment must last to be one [s]
     shortest: float = 5.0  # [s] that must be driven
-    margin: float = 0.4  # [s] at both ends of a stretch that do not count: a delay may need them
+    margin: float = 0.4  # [s] at both ends of a segment that do not count: a delay may need them
     gain: float = 12.0  # [nats] that a fault must bring
     promise: float = 0.4  # of it, that one Gauss-Newton step must promise of what is fitted
     fitted: int = 4  # suspects in a round
@@ -85,7 +85,7 @@ class Examination(NamedTuple):
     """Findings, what explains most first; what the log cannot tell; codes and channels taken in."""
 
     findings: tuple[Finding, ...] = ()
-    unseen: tuple[str, ...] = ()
+    unobservable: tuple[str, ...] = ()
     taken: frozenset[tuple[str, str]] = frozenset()
 
 
@@ -120,7 +120,7 @@ class _Taken(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class Search:
-    """The search for what is wrong with some stretches of a drive.
+    """The search for what is wrong with some segments of a drive.
 
     Parameters
     ----------
@@ -465,7 +465,7 @@ class Search:
             note=suspect.code in NOTES,
         )
 
-    def unseen(self, post: Posterior) -> Iterator[str]:
+    def unobservable(self, post: Posterior) -> Iterator[str]:
         """Yield what this drive tells next to nothing of, beside what was found."""
         for one, _, _, left in self.steps(post):
             if left > RULES.untold * one.scaled(one.wide, self.vehicle):
@@ -484,13 +484,13 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
 
     Parameters
     ----------
-    recording : as it was logged, of one drive or of several joined; of a long one lively stretches
+    recording : as it was logged, of one drive or of several joined; of a long one lively segments
         are looked at.
     vehicle : as it was told; its cornering stiffnesses are not looked at.
     """
     search = prepared(recording, vehicle)
     if search is None:
-        return Examination(unseen=(SLOW,))
+        return Examination(unobservable=(SLOW,))
     post = search.run()
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
     worst = search.problem.share_missed(post.p)
@@ -502,24 +502,24 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     found = list(search.findings(post))
     if search.accelerometer is not None:
         found = _of_one_device(found, vehicle)
-    return Examination(tuple(found), tuple(search.unseen(post)), taken)
+    return Examination(tuple(found), tuple(search.unobservable(post)), taken)
 
 
 def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
     """Return the search of a drive, None where too little is driven."""
-    whole = sum((one.stop - one.start) * recording.dt > RULES.log for one in recording.stretches)
+    whole = sum((one.stop - one.start) * recording.dt > RULES.log for one in recording.segments)
     logs = min(max(whole, 1), RULES.logs)
-    stretches = stretches_of(
+    segments = segments_of(
         recording, vehicle, longest=logs * RULES.longest, pieces=logs * RULES.pieces
     )
     fastest = min(RULES.interval, RULES.interval * math.sqrt(vehicle.wheelbase / SEDAN) + 0.004)
-    bare = [replace(one, a_y=None) for one in stretches]
+    bare = [replace(one, a_y=None) for one in segments]
     drives = [_inside(Drive.of(one, vehicle, fastest=fastest)) for one in bare]
     if sum(np.count_nonzero(one.counts) * one.dt for one in drives) < RULES.shortest:
         return None
     priors, accelerometer = Priors.of(vehicle), None
     if recording.a_y is not None:
-        accelerometer = Accelerometer(stretches, drives, vehicle)
+        accelerometer = Accelerometer(segments, drives, vehicle)
         accelerometer.line(priors.mean, dict.fromkeys(OF_A_Y[:4], 1.0))
     problem = Problem(drives, vehicle, priors, every=True)
     return Search(problem=problem, accelerometer=accelerometer)

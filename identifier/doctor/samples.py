@@ -36,7 +36,7 @@ CERTAIN = 0.99
 
 
 class Runs(NamedTuple):
-    """Stretches of equal neighbors of a channel: index of the first sample, and length, (k,)."""
+    """Segments of equal neighbors of a channel: index of the first sample, and length, (k,)."""
 
     first: NDArray[np.intp]
     length: NDArray[np.intp]
@@ -78,7 +78,7 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:
-    """Return what is wrong with the samples of one stretch."""
+    """Return what is wrong with the samples of one segment."""
     signals = channels(recording)
     found = list(_copies(signals))
     named = {one.channel for one in found} | set(_still(signals))
@@ -356,7 +356,7 @@ def _runs_on(name: str, noisy: bool, recording: Recording, first: int, length: i
 
 
 def _moves(name: str, recording: Recording, first: int, length: int, usual: float) -> bool:
-    """Whether the car changes its turn over a stretch, by the channels that are not judged."""
+    """Whether the car changes its turn over a segment, by the channels that are not judged."""
     width = max(1, min(round(0.2 / recording.dt), length // 2))
     turn = _turning(name, recording)[first : first + length]
     smooth = np.convolve(turn, np.ones(width) / width, "valid")

@@ -49,7 +49,7 @@ class Screened:
     repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
-    unseen : what gross faults this log cannot tell, a line each.
+    unobservable : what gross faults this log cannot tell, a line each.
     without : the same if the velocity sensor is where it should be, where that alone makes gross
         findings of it: to be asked where no size tells that it is elsewhere; None else.
     """
@@ -57,7 +57,7 @@ class Screened:
     findings: tuple[Finding, ...]
     repair: Repair
     blind: str = ""
-    unseen: tuple[str, ...] = ()
+    unobservable: tuple[str, ...] = ()
     without: "Screened | None" = None
 
 
@@ -106,7 +106,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             findings=(*gross, *samples, *told),
             repair=before_sizes((*samples, *gross)),
             blind="the car is another one" if other else "",
-            unseen=tuple(
+            unobservable=tuple(
                 f"unit of {name}: it hardly swings more than its noise on this drive"
                 for name in sorted(motion.hidden)
             ),

@@ -193,7 +193,7 @@ class CompiledPackage:
     def run(self, recording: Recording) -> ShippedRun:
         """Run a whole recording, from the state that the instance is in.
 
-        Between stretches of it samples are missing, as they are on a car.
+        Between segments of it samples are missing, as they are on a car.
 
         Raises
         ------

@@ -84,10 +84,10 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
     """Return what is proven of a method, as the manifest says it."""
     if method.judged_by:
         verdict = f"judged by {method.judged_by}"
-        return {"verdict": verdict, "properties": {}, "held_by_construction": {}}
+        return {"verdict": verdict, "properties": {}, "limits": {}}
     found = method.certify(vehicle)
     told = found.to_dict()
-    return {name: told[name] for name in ("verdict", "properties", "held_by_construction")}
+    return {name: told[name] for name in ("verdict", "properties", "limits")}
 
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
@@ -113,7 +113,7 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
             f"`{method.judged_by}` on its\n"
             "design file gives the certificate. None is part of this package."
         )
-    verdict, held = proven["verdict"], proven["held_by_construction"]
+    verdict, held = proven["verdict"], proven["limits"]
     proven_of = proven["properties"].values()
     if proven_of:
         lines = [f"Certificate of this method, for the interval it was built for: **{verdict}**.\n"]

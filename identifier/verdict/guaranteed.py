@@ -40,7 +40,7 @@ _OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
 class BoundViolatedError(TireidError, ValueError):
-    """No tire's curve keeps the bound that was told: the drive contradicts it."""
+    """No tire's curve satisfies the given bound: the drive contradicts it."""
 
 
 def strips_of(model: TireModel, recording: Recording, road: Array | None = None) -> Strips | None:
@@ -115,7 +115,7 @@ def guaranteed(
     Raises
     ------
     BoundViolatedError
-        Where no curve keeps a bound that was told; with the least one that any does.
+        Where no curve satisfies the given bound; with the least bound that fits.
     DivergedError
         Where the law had diverged by then.
     CannotFreezeError
@@ -123,7 +123,7 @@ def guaranteed(
     ValueError
         Where the recording begins after that time, or the bound is impossible.
     """
-    told = None if bound is None else ForceBound.of(bound)
+    given = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
     carries, box = run.model if model is None else model, history.design.possible_tires()
     if box is None or not isinstance(carries, AxleModel):
@@ -133,7 +133,7 @@ def guaranteed(
         strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))
     if strips is None or len(strips.t) < FEWEST:
         return carries
-    chosen = _estimated_bound(strips, box) if told is None else told
+    chosen = _estimated_bound(strips, box) if given is None else given
     corners = []
     for axle in range(2):
         found = possible_weights(strips, axle, chosen, box)
@@ -142,7 +142,7 @@ def guaranteed(
         corners.append(found)
     guarantee = Guarantee(
         bound=chosen,
-        told=told is not None,
+        given=given is not None,
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
         fastest=fastest(strips),

@@ -12,7 +12,7 @@ from identifier.verdict.friction import RoadFriction
 MOST_MISSED = 0.12  # share of the force, rms, that the frozen model may miss at an axle
 PERCENT = 100.0
 
-UNSEEN = (
+UNOBSERVABLE = (
     "a wrong mass, which scales all forces alike: weigh the car",
     "l_f and l_r where all changes are slow, as for a small car: measure them",
 )
@@ -45,11 +45,11 @@ class Objection(NamedTuple):
 
 
 class Number(NamedTuple):
-    """A number that was learnt, or not.
+    """A number of one axle, identified or not.
 
     title, axle : what.   value, unit : how much.   sd : its standard deviation ±, None unknown.
-    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
-    valid : whether it is learnt, within its bounds, and nothing was found against its axle.
+    declared : value in the vehicle file or None.   identified : whether the drive decided it.
+    valid : whether it is identified, within its bounds, and nothing was found against its axle.
     """
 
     title: str
@@ -57,8 +57,8 @@ class Number(NamedTuple):
     value: float
     sd: float | None
     unit: str
-    told: float | None
-    learnt: bool
+    declared: float | None
+    identified: bool
     valid: bool
 
     @property
@@ -69,7 +69,7 @@ class Number(NamedTuple):
     @property
     def state(self) -> str:
         """What it is: "valid", "not valid", or "not identifiable from this drive"."""
-        if not self.learnt:
+        if not self.identified:
             return NOT_IDENTIFIABLE
         return "valid" if self.valid else "not valid"
 
@@ -150,15 +150,15 @@ class Verdict:
         )
 
     @property
-    def unseen(self) -> tuple[str, ...]:
+    def unobservable(self) -> tuple[str, ...]:
         """What nobody can see, a line each."""
-        return tuple(f"not seen: {text}" for text in (*UNSEEN, *self.blind))
+        return tuple(f"not observable: {text}" for text in (*UNOBSERVABLE, *self.blind))
 
     @property
     def lines(self) -> tuple[str, ...]:
         """Headline, what is missed, a line for each finding, and what nobody can see."""
         missed = (self.missed_line,) if self.missed_line else ()
-        return (self.headline, *missed, *(one.line for one in self.findings), *self.unseen)
+        return (self.headline, *missed, *(one.line for one in self.findings), *self.unobservable)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain numbers and words, ready for JSON."""
@@ -168,7 +168,7 @@ class Verdict:
             "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
             "measures": dict(self.measures),
             "reach": self.reach,
-            "unseen": [*UNSEEN, *self.blind],
+            "not_observable": [*UNOBSERVABLE, *self.blind],
         }
 
     def __repr__(self) -> str:

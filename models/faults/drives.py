@@ -274,13 +274,13 @@ class ShiftedCenter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnotherCar:
-    """Another car told than the one that drove: the file of a 1:10 car for one of two tons."""
+    """Another declared car than the one that drove: the file of a 1:10 car for one of two tons."""
 
-    told: Vehicle
+    declared: Vehicle
 
     def __str__(self) -> str:
         """Return it in words."""
-        return f"declared as {self.told.name}"
+        return f"declared as {self.declared.name}"
 
     def tell(self, vehicle: Vehicle) -> Vehicle:
         """Return that other car, whatever car drove.
@@ -290,4 +290,4 @@ class AnotherCar:
         vehicle : that drove; not looked at.
         """
         del vehicle
-        return self.told
+        return self.declared

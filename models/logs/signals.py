@@ -72,7 +72,7 @@ SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
-def told_by(signals: Iterable[str]) -> set[str]:
+def given_by(signals: Iterable[str]) -> set[str]:
     """Return what signals tell, by name; beta tells v_y, wheels v_x, a pose v_x, v_y and r."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
     told = {stands_for.get(name, name) for name in signals}

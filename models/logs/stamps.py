@@ -230,7 +230,7 @@ def _is_beside(
     return abs(steps[0] / steps[1] - 1.0) > _OTHER_RATE
 
 
-def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
+def given_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
     """Return a column that is said to be the time; None where its cells are none.
 
     Parameters

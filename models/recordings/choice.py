@@ -23,9 +23,9 @@ from models.logs.signals import (
     SPARED,
     WHEELS,
     Signal,
+    given_by,
     require_fitting,
     signal_name,
-    told_by,
 )
 from models.logs.spelling import without_unit
 from models.logs.units import SI
@@ -120,9 +120,9 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     sure = {name: one for name, one in proposal.signals().items() if name not in told}
     if has_wheels(told):
         sure.pop("v_x", None)
-    if "v_y" in told_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
+    if "v_y" in given_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
         sure = {name: one for name, one in sure.items() if name not in POSE}
-    if "v_x" in told_by(told) or "v_x" in proposal.guesses:
+    if "v_x" in given_by(told) or "v_x" in proposal.guesses:
         sure = {name: one for name, one in sure.items() if name not in WHEELS}
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
@@ -216,12 +216,12 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
 
 def has_v_y(signals: Mapping[str, Signal]) -> bool:
     """Return whether a lateral velocity is read, or the sideslip angle in its place."""
-    return "v_y" in told_by(signals)
+    return "v_y" in given_by(signals)
 
 
 def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     """Return the needed signals that are not there; without v_y it is estimated from a_y."""
-    there = told_by(signals) | ({"v_y"} if "a_y" in signals else set())
+    there = given_by(signals) | ({"v_y"} if "a_y" in signals else set())
     return [name for name in NEEDED if name not in there]
 
 

@@ -30,10 +30,10 @@ from models.logs.signals import (
     NEEDED,
     QUANTITIES,
     Signal,
+    given_by,
     quantity_of,
     require_fitting,
     signal_name,
-    told_by,
 )
 from models.logs.units import to_si
 from models.recordings.repair import Repair
@@ -128,7 +128,7 @@ class LogMap:
     @property
     def is_complete(self) -> bool:
         """Whether every signal that is needed is told: then only what is told is read."""
-        return set(NEEDED) <= told_by(self.signals)
+        return set(NEEDED) <= given_by(self.signals)
 
     def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
         """Return the map with some signals told otherwise; v_y and beta replace one another.
@@ -296,7 +296,7 @@ def _value(value: Any) -> str:
 # Signals as a command line tells them: NAME=CHANNEL [UNIT] /RATIO.
 
 
-def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
+def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
     """Return signals as they are told on a command line.
 
     "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
@@ -321,7 +321,7 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
             raise RecordingError(f"{shown(name)} is no column of ours: {known}")
         if ours in found:
             raise RecordingError(f"--columns tells {name} twice")
-        found[ours] = told_channel(rest)
+        found[ours] = given_channel(rest)
     require_fitting(found, "--columns: ")
     return found
 
@@ -331,7 +331,7 @@ _SIGN = re.compile(r"\s*(?:\*\s*)?\bsign\((?P<channel>.+)\)(?:\s*\*)?\s*")
 _UNIT = re.compile(r"\s+\[(?P<unit>[^\[\]]*)\]$")
 
 
-def told_channel(text: str) -> Signal:
+def given_channel(text: str) -> Signal:
     """Return what stands behind the name in one word of a command line."""
     pair = text
     given: dict[str, Any] = {}

@@ -12,7 +12,7 @@ from models.logs.log import LogFile, RecordingError
 from models.logs.memory import ArrayLog
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
-from models.recordings.map import MEND, LogMap, told_channel, told_signals
+from models.recordings.map import MEND, LogMap, given_channel, given_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
@@ -152,10 +152,10 @@ def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
             f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
         )
     signals = {name: words for name, words in columns.items() if name != "t"}
-    told = told.with_signals(told_signals([f"{a}={b}" for a, b in signals.items()]))
+    told = told.with_signals(given_signals([f"{a}={b}" for a, b in signals.items()]))
     if "t" not in columns:
         return told
-    clock = told_channel(columns["t"])
+    clock = given_channel(columns["t"])
     return replace(told, clock=" + ".join(clock.channel), clock_unit=clock.unit, rate=None)
 
 

@@ -203,8 +203,8 @@ def test_channels_of_several_rates_and_a_gap_are_read_from_one_table(log, tmp_pa
         rows.append(f"{k / 100:.2f},{vx},{vy},{r},{delta}")
     (tmp_path / "slow.csv").write_text("\n".join(rows) + "\n")
     got = read_recording(tmp_path / "slow.csv")
-    assert len(got.stretches) == 2 and got.dt == 0.01
-    assert "2 stretches" in got.notes[-1]
+    assert len(got.segments) == 2 and got.dt == 0.01
+    assert "2 segments" in got.notes[-1]
     at = np.round(got.t * 100).astype(int)
     assert np.array_equal(got.r, log.r[at])
     every = at % 5 == 0
@@ -275,7 +275,7 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     read = read_recording(path, log_map=by)
     assert read.breaks == (1000,) and len(read) == 3700
     assert "cells without a value are cut out: 301 of vy" in read.notes
-    assert any("gaps cut the log into 2 stretches" in note for note in read.notes)
+    assert any("gaps cut the log into 2 segments" in note for note in read.notes)
     kept = np.r_[0 : lost.start, lost.stop : len(log)]
     known = kept != single
     assert np.array_equal(read.v_y[known], log.v_y[kept][known])

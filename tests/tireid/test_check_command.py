@@ -163,12 +163,12 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     assert code == 0
     assert said.out.startswith("sedan: axle, the default in a car\n")
     assert said.out.splitlines()[-1] == "verdict: pass"
-    held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).held
+    held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).limits
     least, most = held["grip_static_axle_loads"]
     assert re.search(rf"grip_static_axle_loads +{number(least)} to {number(most)}\n", said.out)
     assert set(held) <= set(said.out.split())
     numbers = json.loads((tmp_path / "judged" / "certificate.json").read_text(encoding="utf-8"))
-    assert numbers["held_by_construction"] == held
+    assert numbers["limits"] == held
     code, said = checked(capsys, "--json")
     assert (code, json.loads(said.out)) == (0, numbers)
     linear = checked(capsys, "--method", "linear")[1].out

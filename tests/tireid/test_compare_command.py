@@ -165,9 +165,9 @@ def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
     for row in rows:
         method = numbers["methods"][row["method"]]
         if row["kind"] == "frozen":
-            error = method["frozen_N"][row["learnt_on"]][row["replayed_on"]]
+            error = method["frozen_N"][row["identified_on"]][row["replayed_on"]]
         else:
-            assert row["learnt_on"] == row["replayed_on"]
+            assert row["identified_on"] == row["replayed_on"]
             error = method["online_N"][row["replayed_on"]]
         assert_shares(row, error, numbers["recordings"][row["replayed_on"]]["rms_force_N"])
 

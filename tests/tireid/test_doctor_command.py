@@ -127,7 +127,7 @@ def test_what_is_found_in_a_log_that_its_map_repairs_is_taken_out_after_that(tmp
     halved = Finding(
         code="factor", channel="r", confidence=1.0, repair=Repair(factor={"r": 0.5}), sure=True
     )
-    diagnosis = Diagnosis(name="log", findings=(halved,), unseen=())
+    diagnosis = Diagnosis(name="log", findings=(halved,), unobservable=())
     written = write_repair(tmp_path / "log.toml", told, diagnosis)
     assert LogMap.from_toml(tmp_path / "log.toml") == written
     assert written.repair == Repair(
@@ -156,7 +156,7 @@ def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():
     fine, nothing = Verdict(findings=(), numbers=(), measures={}), Repair()
 
     def said(*findings, repair=nothing):
-        return with_doctor(fine, Diagnosis(name="log", findings=findings, unseen=()), repair)
+        return with_doctor(fine, Diagnosis(name="log", findings=findings, unobservable=()), repair)
 
     assert said(doubtful) == fine
     noted = said(late)

@@ -24,7 +24,7 @@ from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX
 from identifier.tire_model import load_model
-from identifier.verdict import judge_taught
+from identifier.verdict import judge_identification
 from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tireid.cli import main
@@ -121,7 +121,7 @@ def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
     assert (good.vehicle, good.tires, good.date) == ("blue", "summer", "2026-03-01")
     assert isinstance(good.frozen, FittedModel) and good.parts[0].seconds > 3.0
     assert good.frozen.cornering_stiffness[0] == good.stiffness_front
-    assert good.told_car.name == "blue" and good.valid is not None
+    assert good.declared_car.name == "blue" and good.valid is not None
 
 
 def test_a_store_is_read_without_the_threads_of_a_dataset(store):
@@ -193,7 +193,7 @@ def test_a_row_whose_numbers_do_not_fit_is_named_with_its_column(store, name, ch
 def test_a_car_and_a_reach_that_are_none_are_named(store):
     row = next(row for row in Store(store).rows() if row.parts)
     with pytest.raises(StoreError, match=r"bucket-.*: car is none: vehicle\.mass is missing"):
-        _ = replace(row, car="{}").told_car
+        _ = replace(row, car="{}").declared_car
     with pytest.raises(StoreError, match="reach must hold 8 numbers, not 7"):
         merge(lambda: iter([replace(row, reach=row.reach[1:])]), [])
 
@@ -384,7 +384,7 @@ def test_a_row_tells_how_its_log_was_driven_and_what_was_learnt(store, logs):
         assert getattr(row, f"relaxation_{axle}") == model.relaxation_length[i]
         assert getattr(row, f"known_{axle}") == model.known_slip[i]
     assert row.reach == [*model.driven, *model.speeds, *model.a_x, *model.unexplained]
-    judged = judge_taught(model, log)
+    judged = judge_identification(model, log)
     assert row.valid is judged.valid and len(row.findings) == len(judged.findings)
     assert [row.missed_front, row.missed_rear] == list(judged.measures["force_missed"])
     assert all(one.code in told for one, told in zip(judged.findings, row.findings, strict=True))

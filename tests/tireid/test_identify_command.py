@@ -74,7 +74,7 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
         assert rmse["frozen_against_online"]["8"] == {"slalom": None, "quick": None}
     elif summary["law"] == "axle":
         assert certificate["verdict"] == "pass"
-        assert certificate["held_by_construction"]["grip_static_axle_loads"] == [0.1, 3.0]
+        assert certificate["limits"]["grip_static_axle_loads"] == [0.1, 3.0]
     else:
         assert certificate["verdict"] in ("pass", "warn", "fail")
     quick = read_recording(logs / "quick.csv")

@@ -233,5 +233,5 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
 
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):
     summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
-    assert summary["friction"] == {"as_taught": True, "roads": []}
+    assert summary["friction"] == {"unchanged": True, "roads": []}
     assert "friction: that of the drive that taught" in capsys.readouterr().out

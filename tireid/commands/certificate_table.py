@@ -51,7 +51,7 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
     default = ", the default in a car" if name == LIVE else ""
     rows = [
         [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
-        for title, value in certificate.held.items()
+        for title, value in certificate.limits.items()
     ]
     lines = [f"{vehicle.name}: {name}{default}"]
     if rows:

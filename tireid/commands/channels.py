@@ -14,14 +14,14 @@ from models.files import write_atomically
 from models.logs.clock import holes
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, told_by
-from models.logs.units import SI, is_told
+from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, given_by
+from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.options import add_force, add_log_map, told_map
+from tireid.commands.options import add_force, add_log_map, given_map
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
@@ -50,7 +50,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 1 where a signal that is needed is missing or not sure."""
     path, named = split_log_argument(options.log)
-    told = told_map(options)
+    told = given_map(options)
     if options.write is not None:
         if options.write.suffix.lower() != ".toml":
             raise ValueError(f"{options.write}: the name must end in .toml")
@@ -190,7 +190,7 @@ def _meaning(
                     f"{choice.column_of(name)}, not read beside {choice.column_of(INSTEAD[name])}"
                 )
             if channel in one.channel and name not in signals:
-                unit = f" in {one.unit}" if one.unit and not is_told(listed.unit) else ""
+                unit = f" in {one.unit}" if one.unit and not is_given(listed.unit) else ""
                 hand = ", of the hand wheel: tell its ratio" if one.hand else ""
                 doubt = "; another is as likely" if name in proposal.rivals else ""
                 return f"perhaps {choice.column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
@@ -217,7 +217,7 @@ def missing_text(
 ) -> str:
     """Return what is missing, and the words that would tell it."""
     if not missing:
-        there = told_by(signals)
+        there = given_by(signals)
         needed = [name for name in NEEDED if name in there]
         if "v_y" not in there:
             needed.append("a_y")

@@ -160,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
     driving = replace(natural_driving(vehicle), **_overrides(options))
     certificate = certify(method, vehicle, driving)
     if options.along is not None:
-        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
+        drive = shared.read_log(options.along, vehicle, shared.given_map(options), dt=method.dt)
         along = method.certify_along(identify(drive, vehicle, method))
         if not along.properties:
             raise ValueError(f"--along: nothing is proven of {name} along a drive")
@@ -229,7 +229,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     certificate = certify(design, vehicle, driving)
     drive = None
     if options.along is not None:
-        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=design.dt)
+        drive = shared.read_log(options.along, vehicle, shared.given_map(options), dt=design.dt)
     if options.tune is not None:
         require_free(options.tune, force=options.force)
     numbers = {

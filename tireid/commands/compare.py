@@ -127,7 +127,7 @@ def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    told = shared.told_map(options)
+    told = shared.given_map(options)
     recordings = [
         shared.read_log(log, vehicle, told, check=not options.no_check) for log in options.logs
     ]

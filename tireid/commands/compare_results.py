@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Trial, where_learnt_and_elsewhere
+from identifier.compare.course import Trial, same_and_other
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
@@ -124,7 +124,7 @@ def _frozen_cells(comparison: Comparison, trial: Trial) -> list[str]:
         return ["a signal, no model", ""]
     if trial.diverged_at:
         return ["diverged", "diverged"]
-    return [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(trial.frozen)]
+    return [_mean(comparison, pairs) for pairs in same_and_other(trial.frozen)]
 
 
 def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
@@ -220,7 +220,7 @@ def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
 ERROR_COLUMNS = (
     "method",
     "kind",
-    "learnt_on",
+    "identified_on",
     "replayed_on",
     "front_N",
     "rear_N",

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
         if options.repair.suffix.lower() != ".toml":
             raise ValueError(f"{options.repair}: the name must end in .toml")
         require_free(options.repair, force=options.force)
-    vehicle, told = shared.read_vehicle(options), shared.told_map(options)
+    vehicle, told = shared.read_vehicle(options), shared.given_map(options)
     recording = shared.read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
@@ -74,7 +74,7 @@ def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis |
         tell(f"nothing is sure enough to be repaired: with {options.repair} the log stays as it is")
         return
     tell(f"repaired: {repair_text(repair)}")
-    tell(f"after the repair, {diagnosis_text(after, unseen=False)}")
+    tell(f"after the repair, {diagnosis_text(after, unobservable=False)}")
 
 
 def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> dict[str, Any]:

@@ -226,7 +226,7 @@ def run(options: argparse.Namespace) -> int:
             asked=asked,
         )
     if repair:
-        write_repair(options.repair, shared.told_map(options), diagnosis)
+        write_repair(options.repair, shared.given_map(options), diagnosis)
         say(f"wrote {options.repair}")
     tell(told)
     say(f"wrote {options.out}/")
@@ -285,7 +285,7 @@ def _read(
     recording = shared.read_log(
         log,
         vehicle,
-        shared.told_map(options),
+        shared.given_map(options),
         run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,

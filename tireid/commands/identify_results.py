@@ -54,7 +54,7 @@ def _certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any] | N
     if design.whole:
         return None
     certificate = certify(design, vehicle)
-    return {"verdict": certificate.verdict, "held_by_construction": certificate.held}
+    return {"verdict": certificate.verdict, "limits": certificate.limits}
 
 
 def summarize(
@@ -103,9 +103,9 @@ def summarize(
 
 
 class AskedBound(NamedTuple):
-    """That a guaranteed band is asked for; told: under which bound, None estimates it."""
+    """A request for a guaranteed band; given: its bound, None estimates it."""
 
-    told: ForceBound | None
+    given: ForceBound | None
 
     @classmethod
     def of(cls, numbers: Sequence[float]) -> "AskedBound":
@@ -135,7 +135,7 @@ Frozen = Mapping[float, Mapping[str, Replay]]
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 TOLD = {  # columns of forces.csv by the outputs of methods that estimate v_y
-    "v_y_told_m_s": "v_y",
+    "v_y_estimated_m_s": "v_y",
     "v_y_sd_m_s": "v_y_sd",
     "side_slip_observable": "side_slip_observable",
 }
@@ -164,7 +164,7 @@ def write_results(
     """
     tire = calibrated(learnt, max(frozen), verdict)
     if bound is not None:
-        tire = guaranteed(learnt, bound.told, max(frozen), tire)
+        tire = guaranteed(learnt, bound.given, max(frozen), tire)
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
     summary = summarize(law, [learnt, *parts, *others], by_key, verdict, asked)
     write_json(folder / "summary.json", summary)

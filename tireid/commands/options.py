@@ -271,7 +271,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
     return path
 
 
-def told_map(options: argparse.Namespace) -> LogMap:
+def given_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
     told = with_columns(map_of(_map_path(options)), _column_words(options.columns))
     if options.cut_holes:

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     recording = shared.read_log(
         options.log,
         model.vehicle,
-        shared.told_map(options),
+        shared.given_map(options),
         run_name=options.run_name,
         check=not options.no_check,
     )
@@ -182,7 +182,7 @@ def summary(
         "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
         "friction": None
         if friction is None
-        else {"as_taught": friction.as_taught, "roads": [one._asdict() for one in friction.roads]},
+        else {"unchanged": friction.unchanged, "roads": [one._asdict() for one in friction.roads]},
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
@@ -257,7 +257,7 @@ def _prediction_text(
     if friction is not None and not friction.roads:
         lines.append(
             "friction: that of the identification drive, as far as observable"
-            if friction.as_taught
+            if friction.unchanged
             else "friction: not observable, slip is too small"
         )
     return "\n".join(lines)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from codegen.escape import mathtext
-from identifier.compare.course import where_learnt_and_elsewhere
+from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.reproducibility import AxleRmse
 from tireid.figures import style
@@ -110,7 +110,7 @@ def _frozen_errors(comparison: Comparison, frozen: Frozen) -> dict[str, list[flo
     course = comparison.course
     return {
         kind: [course.share(name, error) for name, error in pairs]
-        for kind, pairs in zip((OWN, OTHER), where_learnt_and_elsewhere(frozen), strict=True)
+        for kind, pairs in zip((OWN, OTHER), same_and_other(frozen), strict=True)
     }
 
 

@@ -109,8 +109,8 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the v_y that was told over the true one, and its error, each with the band of two
     sigma.
     """
-    told, band = drive.told["v_y"], SIGMAS * drive.told["v_y_sd"]
-    inertial = drive.told["inertial_v_y"]
+    told, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
+    inertial = drive.estimates["inertial_v_y"]
     figure = style.new_figure(style.PAGE, 3.6)
     above, below = figure.subplots(2, 1, sharex=True)
     shade: Mapping[str, Any] = {

@@ -38,7 +38,7 @@ from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
 from identifier.run import identify
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict import judge_taught
+from identifier.verdict import judge_identification
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
@@ -387,7 +387,7 @@ def conditions(recording: Recording) -> dict[str, Any]:
 
 
 def _judged(model: FittedModel, recording: Recording) -> dict[str, Any]:
-    verdict = judge_taught(model, recording)
+    verdict = judge_identification(model, recording)
     codes = [f"{one.code}{f' {one.axle}' if one.axle else ''}" for one in verdict.findings]
     missed = verdict.measures.get("force_missed")
     each = missed if isinstance(missed, tuple) else (None, None)

@@ -63,7 +63,7 @@ class Merged:
     key: Key
     logs: int
     elsewhere: int
-    told: Information
+    information: Information
     model: FittedModel
 
     @property
@@ -177,7 +177,7 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
     for _ in range(ROUNDS):
         for key, row in grouped(rows(), by):
             if key not in sums:
-                sums[key] = _Sum(row.told_car)
+                sums[key] = _Sum(row.declared_car)
             sums[key].add(row)
         for one in sums.values():
             one.end_round()
@@ -201,7 +201,7 @@ class _Sum:
 
     def _begin_round(self) -> None:
         self.logs = self.elsewhere = 0
-        self.told, self.reach = Information.nothing(), Reach()
+        self.information, self.reach = Information.nothing(), Reach()
 
     def end_round(self) -> None:
         """Go on to the next round; the last one stays."""
@@ -219,7 +219,7 @@ class _Sum:
             own = self._on_its_road(one)
             if own is not one:
                 self.elsewhere = before + 1
-            self.told += own
+            self.information += own
         slip, speeds, a_x, unexplained = row.numbers("reach", 4, 2)
         seconds = float(sum(row.part_seconds))
         self.reach = self.reach.with_(Reach(slip, speeds, a_x, seconds * unexplained**2, seconds))
@@ -243,7 +243,7 @@ class _Sum:
 
     def settled(self) -> tuple[Array, Array]:
         """Return the optimum and its covariance, as of `settled`."""
-        return settled(self.beliefs.after(self.told), self.beliefs.mean)
+        return settled(self.beliefs.after(self.information), self.beliefs.mean)
 
     def merged(self, key: Key) -> Merged:
         p, covariance = self.settled()
@@ -259,7 +259,11 @@ class _Sum:
             unexplained=self.reach.unexplained,
         )
         return Merged(
-            key=key, logs=self.logs, elsewhere=self.elsewhere, told=self.told, model=model
+            key=key,
+            logs=self.logs,
+            elsewhere=self.elsewhere,
+            information=self.information,
+            model=model,
         )
 
 
@@ -358,7 +362,7 @@ def _of_size(one: Merged) -> tuple[Array, Array, Array, Array]:
     """
     model = one.model
     usual, size = Priors.of(model.vehicle), sizes(model.vehicle)
-    _, slope, H = one.told.around(model.p)
+    _, slope, H = one.information.around(model.p)
     known = H[np.ix_(OFF, OFF)] + usual.information[np.ix_(OFF, OFF)]
     across = H[np.ix_(TIRES, OFF)]
     matrix = H[np.ix_(TIRES, TIRES)] - across @ np.linalg.solve(known, across.T)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from models.files import digest
 from mpc.handover.rules import Verdict
-from mpc.loop.record import told_scores
+from mpc.loop.record import estimate_scores
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
@@ -70,7 +70,7 @@ def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
         )
         for run in runs[1:]
     ]
-    told = told_scores(runs[0].drive)
+    told = estimate_scores(runs[0].drive)
     if told is not None:
         numbers.append(
             Headline(

@@ -144,7 +144,7 @@ def _groups_table(groups: Sequence[Merged]) -> Table:
     for one in groups:
         known = map(float, np.degrees(one.model.known_slip))
         C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
-        rows.append([one.name, one.logs, one.told.seconds / 60.0, *C, *known])
+        rows.append([one.name, one.logs, one.information.seconds / 60.0, *C, *known])
     return Table(
         caption=f"Merged models{_first(len(rows))}.",
         header=["group", "logs", "learning [min]", "stiffness front [kN/rad]", "rear [kN/rad]",

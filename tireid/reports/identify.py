@@ -266,7 +266,7 @@ def guaranteed_sentence(model: TireModel) -> str:
         f"{late_rear:.0f} ms times how fast it changes. Where slip is beyond that of the drive, "
         f"or a force changes faster than there, by more than {fast_front:.1f} / {fast_rear:.1f} "
         "static axle loads a second, the difference may be as much larger. That bound was "
-        f"{'told' if given.told else 'estimated from the drive'}."
+        f"{'given' if given.given else 'estimated from the drive'}."
     )
 
 

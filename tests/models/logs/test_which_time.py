@@ -149,11 +149,11 @@ def test_a_told_clock_may_have_a_unit_be_words_and_is_not_forgotten(tmp_path, to
     cells = [at(t, "%d-%b-%Y %H:%M:%S.%3") for t in T] if told == "clock" else numbers(1000 * T)
     columns = {told.partition(" ")[0]: cells, "lap time": numbers(T % 2.0)}
     path = written(tmp_path / "log.csv", columns)
-    told_map = with_columns(LogMap(), {"t": told})
-    steps(told_map.opened(path))
-    told_map.to_toml(tmp_path / "log.toml")
+    given_map = with_columns(LogMap(), {"t": told})
+    steps(given_map.opened(path))
+    given_map.to_toml(tmp_path / "log.toml")
     again = LogMap.from_toml(tmp_path / "log.toml")
-    assert again == told_map and read_recording(path, log_map=again).duration == pytest.approx(
+    assert again == given_map and read_recording(path, log_map=again).duration == pytest.approx(
         T[-1]
     )
 
