@@ -231,17 +231,17 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        ratio : friction over that of the drive that taught, positive [-].
+        ratio : friction over that of the identification drive, positive [-].
 
         Raises
         ------
         ValueError
-            Where the ratio is not positive, or the model cannot be told for another friction.
+            Where the ratio is not positive, or the model cannot be scaled to another friction.
         """
         raise ValueError(f"a {type(self).__name__} cannot be scaled to a friction of {ratio:g}")
 
     def beside_v_y(self) -> "TireModel":
-        """Return the model as one that goes on learning where a lateral velocity is told."""
+        """Return the model as the beginning of a method with a given lateral velocity."""
         return self
 
     def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
@@ -334,31 +334,31 @@ class TireModel(ABC):
 
     @property
     def known_slip(self) -> Array | None:
-        """Slip [rad] up to which the forces were learnt, (2,); None where the model cannot tell."""
+        """Slip [rad] up to which the forces were identified, (2,); None where unknown."""
         return None
 
     @property
     def known_speeds(self) -> Array | None:
-        """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
+        """Least and largest speed [m/s] of the identification drives, (2,); None where unknown."""
         return None
 
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
+        """Return at which times `t` [s], (n,), of the identification drive the road was another."""
         return np.zeros(t.shape, dtype=bool)
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
-        """What the drives that taught showed beside the tires: code and one line of each."""
+        """Findings of the identification drives beside the tires: code and one line of each."""
         return ()
 
     def at_bounds(self) -> "tuple[Reached, ...]":
-        """Return the learnt numbers that rest at their bounds."""
+        """Return the estimates at active bounds."""
         return ()
 
     def relative_sd(self, alpha: Array) -> Array | None:
         """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.
 
-        Standard deviation of the force over that before learning: 1 is what was believed.
+        Standard deviation of the force over that before learning: 1 is the prior.
 
         Parameters
         ----------
@@ -384,8 +384,8 @@ class TireModel(ABC):
 
     @property
     def force_missed(self) -> Array | None:
-        """Share [-] of the force that the motion of the drive that taught shows and the model
-        misses, rms, white noise taken off, (2,); None where nobody looked: `calibrated` does.
+        """Error of the model over the force in the motion of the identification drive [-], rms,
+        white noise subtracted, (2,); None where not computed: `calibrated` does.
         """
         return None
 
@@ -403,7 +403,7 @@ class TireModel(ABC):
     def band_calibrated(self) -> bool:
         """Whether the width of `band` was found on parts of the drive that did not teach.
 
-        As of `Run.tire`, where enough was driven; else it is what learning believes.
+        As of `Run.tire`, where enough was driven; else that of the identifier.
         """
         return False
 
@@ -414,8 +414,8 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        calibration : None takes errors to be as learning is told.
-        force_missed : of the drive that taught, (2,); None where nobody looked.
+        calibration : None assumes the declared errors.
+        force_missed : of the identification drive, (2,); None where not computed.
         """
         del calibration, force_missed
         return self
@@ -441,8 +441,7 @@ class TireModel(ABC):
     def half_band_of_curves(self, recording: Recording, level: float = 0.9) -> Array | None:
         """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
 
-        Of the steady forces, without noise of the drive's sensors. None where the model cannot
-        tell.
+        Of the steady forces, without noise of the drive's sensors. None where unknown.
 
         Parameters
         ----------
@@ -454,12 +453,12 @@ class TireModel(ABC):
     def half_band(
         self, alpha: Array, level: float = 0.9, *, v_x: float | Array | None = None
     ) -> Array | None:
-        """Return half the width of `band`, (k, 2) [N]; None where the model cannot tell.
+        """Return half the width of `band`, (k, 2) [N]; None where unknown.
 
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
-        v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
+        v_x : speed [m/s], a number or (k,), positive; None takes that of the identification drive.
         """
         del alpha, level, v_x
         return None
@@ -467,7 +466,7 @@ class TireModel(ABC):
     def half_band_over(self, recording: Recording, level: float = 0.9) -> Array | None:
         """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
 
-        None where the model cannot tell.
+        None where unknown.
 
         Parameters
         ----------
@@ -501,14 +500,13 @@ class TireModel(ABC):
     ) -> tuple[float, float] | tuple[Array, Array] | None:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
 
-        None where the model cannot tell how sure it is; `band_calibrated` says whether it is so in
-        that share of cases, or as learning believes.
+        None where the model has no band; `band_calibrated` says whether that share was calibrated.
 
         Parameters
         ----------
         alpha, axle : as of `force`.
         level : in which share of cases it shall, above 0 and below 1.
-        v_x : speed [m/s], positive; None takes that of the drive that taught.
+        v_x : speed [m/s], positive; None takes that of the identification drive.
 
         Raises
         ------
@@ -626,7 +624,7 @@ class TireModel(ABC):
         return (Fact("known up to a slip of", np.degrees(self.known_slip), "deg"),)
 
     def summary(self) -> str:
-        """Return what was learnt, in a few lines; ± is one standard deviation.
+        """Return the estimates, in a few lines; ± is one standard deviation.
 
         It begins with the share of the force that the model misses where that is known: of a
         model of `calibrated`, also stored and read again. Without, ± knows of noise only.
@@ -705,7 +703,7 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        valid : the verdict on it, told to whoever reads the file; None where there is none.
+        valid : the verdict on it, stored in the file; None where there is none.
         """
         told = {} if valid is None else {"valid": valid}
         write_atomically(path, json.dumps(self.to_dict() | told, indent=2) + "\n")

@@ -395,7 +395,7 @@ class Vehicle:
         return told
 
     def moves_as(self, other: "Vehicle") -> bool:
-        """Return whether another file tells the same car: its bicycle and its downforce."""
+        """Return whether another file declares the same car: its bicycle and its downforce."""
         return self.bicycle == other.bicycle and self.downforce == other.downforce
 
     def without_chassis(self) -> "Vehicle":
@@ -405,7 +405,7 @@ class Vehicle:
 
     @property
     def drag(self) -> float:
-        """Deceleration by the air over v_x^2 [1/m]; of a passenger car where no area is told."""
+        """Deceleration by the air over v_x^2 [1/m]; of a passenger car without a declared area."""
         area = self.drag_area
         if area is None:
             area = _DRAG_AREA if self.wheelbase >= FULL_SIZE else 0.0
@@ -587,7 +587,7 @@ class Vehicle:
             raise VehicleError(f"{file}: {error}") from None
 
     def to_toml(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-        """Write the vehicle so that `from_toml` gives back an equal one, bit for bit.
+        """Write the vehicle so that `from_toml` returns an equal one, bit for bit.
 
         What is estimated is left out, as it was in the file; so is a downforce of zero.
 

@@ -95,7 +95,7 @@ def export(
         calibrated, of a model as far as that is.
     fmu : also FMUs 2.0 and 3.0 for Co-Simulation.
     onnx : also the model, frozen, as ONNX.
-    mpc : also a tracker that steers by what is learnt.
+    mpc : also a tracker that steers by the identified tires.
     caution : of that tracker, from 0 to 1, as `drive` has it.
     overwrite : replace the folder if it exists.
 

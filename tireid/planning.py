@@ -46,9 +46,8 @@ def plan(
     area : length and width of what may be driven on [m].
     speed : that is held [m/s].
     time : of steering, over all passes through the area [s].
-    after : what was learnt already, of a fit or the axle identifier; None knows nothing.
-    friction : believed of tires and road, within 30 % [-]; None takes 0.8. What was learnt knows
-        it better: they exclude each other.
+    after : a model so far, of a fit or the axle identifier; None: nothing is known.
+    friction : prior of tires and road, within 30 % [-]; None takes 0.8. Not together with `after`.
     share : of the grip that is used at most, 0.2 to 0.97.
     margin : from the car to the edge of the area [m]; None takes 0.35 wheelbases.
     rate_limit : of the front wheels [rad/s]; None takes 0.4/sqrt(L/g).

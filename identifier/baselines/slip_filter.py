@@ -266,7 +266,7 @@ class SlipFilter(Method):
     @property
     def remark(self) -> str:
         """Say which tires it stands on."""
-        on = "learnt tires of Dugoff" if self.learns else "the vehicle's linear tires"
+        on = "identified tires of Dugoff" if self.learns else "the vehicle's linear tires"
         return f"on {on}"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:

@@ -66,7 +66,7 @@ class Course:
                 )
             size = self.size(recording)
             if not min(size.front, size.rear) > 0.0:
-                what = "that the motion shows of" if self.by_motion else "of"
+                what = "in the motion of" if self.by_motion else "of"
                 raise ValueError(f"{recording.name}: the force {what} an axle is always zero")
 
     @property

@@ -37,7 +37,7 @@ NEVER = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Diagnosis:
-    """What is wrong with a log or with what is told of its car, and what takes it out.
+    """What is wrong with a log or with the declaration of its car, and the repair.
 
     Parameters
     ----------
@@ -95,12 +95,12 @@ def _certainty(one: Finding) -> str:
 
 
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
-    """Return what is wrong with a log or with what is told of its car, from the log alone.
+    """Return what is wrong with a log or with the declaration of its car, from the log alone.
 
     Parameters
     ----------
-    recording : as it was read; its axle forces are not looked at.
-    vehicle : as it was told.
+    recording : as it was read; its axle forces are not used.
+    vehicle : as it was declared.
     """
     world = world_axes(recording)
     if world is not None:  # nothing that follows would be of this car

@@ -104,14 +104,12 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
             _structure(f"{name}_input", _inputs(specialized)),
             _structure(f"{name}_output", _declarations(output_members(specialized), name)),
             _structure(f"{name}_weights", _declarations(learnt, name), "What is identified."),
-            _structure(
-                f"{name}_signals", _declarations(others, name), "What else is carried, but weights."
-            ),
+            _structure(f"{name}_signals", _declarations(others, name), "Other states."),
             _structure(
                 f"{name}_values",
                 (f"    {name}_weights weights;\n" if learnt else "")
                 + f"    {name}_signals signals;\n",
-                "What is carried from step to step.",
+                "The state.",
             ),
         ],
     )

@@ -26,7 +26,7 @@ WITHOUT_V_Y = (
 
 
 class Objection(NamedTuple):
-    """What speaks against an answer.
+    """A finding on a model.
 
     code : for machines.   axle : that it is about, None for the car or the drive.
     text : what it means and the likely cause, one line.   refuses : whether it makes it not valid.
@@ -77,7 +77,7 @@ class Number(NamedTuple):
 class WindowForces(NamedTuple):
     """Forces over the windows that an answer is judged by [static axle loads].
 
-    t : middle of each window (m,) [s].   measured : mean force that the motion shows (m, 2).
+    t : middle of each window (m,) [s].   measured : mean force in the motion (m, 2).
     modelled : that of the model (m, 2).
     """
 
@@ -88,18 +88,18 @@ class WindowForces(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Verdict:
-    """Whether an answer is good, and all that speaks against it.
+    """Whether a model is valid, and the findings.
 
     Parameters
     ----------
-    findings : those that refuse first.
-    numbers : what was learnt, each with its doubt.
+    findings : rejections first.
+    numbers : the estimates, each with its standard deviation.
     measures : what was measured on the way, by name, front and rear or one value.
     reach : range of speed and slip that the drives covered, in words; empty where unknown.
-    blind : what more nobody can see of this drive.
-    friction : of the drive's road over that of the drive that taught a stored model, window by
-        window; None of a run, and where nobody can tell.
-    shown : what the motion shows and what the model says, window by window; None where too little
+    blind : what else is not observable in this drive.
+    friction : of the road over that of the identification drive, window by window; None of a run,
+        and where not observable.
+    shown : force in the motion and of the model, window by window; None where too little
         is driven.
     """
 
@@ -113,7 +113,7 @@ class Verdict:
 
     @property
     def valid(self) -> bool:
-        """Whether nothing was found that refuses the answer."""
+        """Whether no finding rejects the model."""
         return not any(finding.refuses for finding in self.findings)
 
     @property
@@ -131,7 +131,7 @@ class Verdict:
 
     @property
     def force_missed(self) -> tuple[float, ...] | None:
-        """Share [-] of the force that the motion shows which the model misses, front and rear.
+        """Error of the model over the force in the motion [-], front and rear.
 
         None where too little is driven.
         """
@@ -151,12 +151,12 @@ class Verdict:
 
     @property
     def unobservable(self) -> tuple[str, ...]:
-        """What nobody can see, a line each."""
+        """What is not observable, a line each."""
         return tuple(f"not observable: {text}" for text in (*UNOBSERVABLE, *self.blind))
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Headline, what is missed, a line for each finding, and what nobody can see."""
+        """Headline, model error, a line for each finding, and what is not observable."""
         missed = (self.missed_line,) if self.missed_line else ()
         return (self.headline, *missed, *(one.line for one in self.findings), *self.unobservable)
 

@@ -252,13 +252,13 @@ def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
         if "a_y" in found or a_y is None or a_y.confidence < HINT:
             return ""
         likely, word = likely_text("a_y", proposal), column_word("a_y", proposal)
-        return f"ay is left aside, as it is not sure: {likely}; tell it by --columns {word}"
+        return f"ay is left aside, as it is not sure: {likely}; declare it by --columns {word}"
     said = "no lateral velocity is read: vy is to be estimated"
     name = next(iter(stand_ins("v_y", proposal)), "a_y")
     if name == "a_y":
         return said
     likely, word = likely_text(name, proposal), column_word(name, proposal)
-    return f"{said}; if {likely} is one, tell it by --columns {word}"
+    return f"{said}; if {likely} is one, declare it by --columns {word}"
 
 
 def aside_signals(found: Mapping[str, Signal], proposal: Proposal) -> list[str]:
@@ -288,7 +288,7 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
         columns = columns.replace("vy", "vy (or ay, from which it is estimated)", 1)
     said = f"{log.path}: column {columns} is missing; "
     if parts:
-        said += f"did you mean {', '.join(parts)}? tell it by --columns {' '.join(words)}; "
+        said += f"did you mean {', '.join(parts)}? declare it by --columns {' '.join(words)}; "
     else:
         said += f"tireid channels {log.path} lists what is there; "
     return said + listing(names)

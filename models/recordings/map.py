@@ -59,8 +59,8 @@ class LogMap:
     run : which of the file's runs; empty where there is one.
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
     clock : channel that is the time, where it is not what the format takes for it; empty else.
-    clock_unit : of that channel; empty takes that of the file, seconds where it tells none.
-    rate : of the samples [Hz], where no channel is a time; None where none is told.
+    clock_unit : of that channel; empty takes that of the file, seconds where it has none.
+    rate : of the samples [Hz], where no channel is a time; None where not declared.
     longest_gap : the log is cut where a channel has no sample for longer [s].
     holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
         has no sample there.
@@ -70,7 +70,7 @@ class LogMap:
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
     wheels : what they are, where v_x is made of their speeds.
-    repair : what is taken out of the recording, and told of the car, after reading.
+    repair : corrections of the recording and of the car, after reading.
 
     Raises
     ------
@@ -127,11 +127,11 @@ class LogMap:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every signal that is needed is told: then only what is told is read."""
+        """Whether every needed signal is declared: then no other is read."""
         return set(NEEDED) <= given_by(self.signals)
 
     def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
-        """Return the map with some signals told otherwise; v_y and beta replace one another.
+        """Return the map with some signals declared otherwise; v_y and beta replace one another.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class LogMap:
         Parameters
         ----------
         folder : where the log.toml shall lie: a DBC file in it, or below, is named from there, any
-            other by its whole path. None names it as it is told.
+            other by its whole path. None names it as given.
         """
         if self.dbc and folder is not None:
             return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
@@ -339,7 +339,7 @@ def given_channel(text: str) -> Signal:
     while found := _CHANGE.search(text):
         key, text = keys[found["sign"]], text[: found.start()]
         if key in given:
-            raise RecordingError(f"--columns tells the {key} of {shown(pair)} twice")
+            raise RecordingError(f"--columns gives the {key} of {shown(pair)} twice")
         try:
             given[key] = float(found["number"])
         except ValueError:

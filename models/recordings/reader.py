@@ -40,7 +40,7 @@ def read_recording(
     run (text); a unit that the file tells is converted. Others are ignored. Where there are no Fyf
     and Fyr, the
     columns Fyf_inv and Fyr_inv (forces computed backwards from the motion) stand in for them.
-    Signals of other names are told by `columns` or a map; where neither tells them and names and
+    `columns` or a map declare signals of other names; where neither has them and names and
     units leave no doubt, they are taken and the recording's notes say so.
 
     Parameters
@@ -99,7 +99,7 @@ def read_repaired(
     Parameters
     ----------
     path : a log of any format.
-    vehicle : as it was told.
+    vehicle : as it was declared.
     run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
     columns, log_map : as of `read_recording`.

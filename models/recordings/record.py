@@ -79,8 +79,7 @@ class Recording:
         None when there is no truth.
     breaks : index of the first sample of each segment but the first, rising.
     notes : what was taken or done in reading beyond the words of the file, one sentence each.
-    estimated : names of signals that no sensor showed but a method told: of v_y only. No method
-        is shown them.
+    estimated : signals that a method estimated, not a sensor: v_y only. No method gets them.
 
     Raises
     ------
@@ -187,7 +186,7 @@ class Recording:
         return None if "v_y" in self.estimated else self.v_y
 
     def as_logged(self) -> "Recording":
-        """Return it without signals that were estimated, as methods are shown it."""
+        """Return it without estimated signals, as the input of methods."""
         return replace(self, v_y=self.logged_v_y, estimated=()) if self.estimated else self
 
     def needed(self, name: str) -> Array:

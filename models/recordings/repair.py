@@ -26,7 +26,7 @@ SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, o
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repair:
-    """Numbers that bring a log, and the car told with it, to what was driven; SI throughout.
+    """Corrections of a log and of its declared car; SI throughout.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Repair:
     velocity_sensor_angle : by which that sensor is turned to the left [rad].
     acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
     sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
-    vehicle : numbers of the car in place of the told ones, by their names in `Vehicle`.
+    vehicle : numbers of the car in place of the declared ones, by their names in `Vehicle`.
 
     Raises
     ------
@@ -84,7 +84,7 @@ class Repair:
         Parameters
         ----------
         recording : as it was logged.
-        vehicle : as it was told.
+        vehicle : as it was declared.
 
         Raises
         ------
@@ -146,11 +146,11 @@ class Repair:
         return signal
 
     def on(self, vehicle: Vehicle) -> Vehicle:
-        """Return the car with the numbers that are told in place of its own.
+        """Return the car with the corrected numbers.
 
         Parameters
         ----------
-        vehicle : as it was told.
+        vehicle : as it was declared.
 
         Raises
         ------
@@ -232,7 +232,7 @@ class Repair:
         if other.sideslip and (self.sideslip or self.offset.get("v_y")):
             raise RecordingError(
                 "repair: what is left is read as a sideslip angle, so nothing may be taken off "
-                "v_y before, and it must not have been one: tell both repairs as one"
+                "v_y before, and it must not have been one: combine both repairs"
             )
         factor = other.factor.get
         f_x, f_y, f_r, f_a = (factor(name, 1.0) for name in ("v_x", "v_y", "r", "a_y"))

@@ -264,7 +264,7 @@ def _sources(speeds: Mapping[str, Array], wheels: Wheels) -> list[tuple[str, ...
             found.append(there)
         elif there:
             raise RecordingError(
-                f"{there[0]} is alone on its axle: tell its place by [wheels] track, in m"
+                f"{there[0]} is alone on its axle: give its place by [wheels] track, in m"
             )
     return found
 

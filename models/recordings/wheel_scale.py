@@ -54,7 +54,7 @@ def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
         return 1.0
     if radius is None:
         raise RecordingError(
-            f"{what} is in {unit.strip()}, a rate of turns: tell the radius of the wheels, in m, "
+            f"{what} is in {unit.strip()}, a rate of turns: give the radius of the wheels, in m, "
             "by [wheels] radius in a log.toml (--log FILE)"
         )
     return radius

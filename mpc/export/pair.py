@@ -91,7 +91,7 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     if model.tells_v_y:  # beside it the share of the sway is none of what is learnt
         share = repr(float(model.own[0, 1]))
         numbers |= {
-            "SWAY_SHARE": (share, "of the sway of the body, which is not learnt"),
+            "SWAY_SHARE": (share, "of the sway of the body, not identified"),
             "STEERING": (f"{SENSORS.index('steering')}U", "which of the sensors' errors it is"),
         }
     return numbers, {

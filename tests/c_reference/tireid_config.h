@@ -69,7 +69,7 @@ typedef struct {
     tireid_real kept[2][7];
 } tireid_weights;
 
-/* What else is carried, but weights. */
+/* Other states. */
 typedef struct {
     /* last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck samples in a row [SI] */
     tireid_real gate[9];
@@ -82,7 +82,7 @@ typedef struct {
     tireid_real filters[2][9];
 } tireid_signals;
 
-/* What is carried from step to step. */
+/* The state. */
 typedef struct {
     tireid_weights weights;
     tireid_signals signals;

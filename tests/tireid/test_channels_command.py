@@ -102,7 +102,7 @@ def test_an_error_shows_the_word_that_mends_it(folder, capsys):
     assert main(words) == 2
     said = capsys.readouterr().err
     assert "column delta_f is missing; did you mean 'Steered Angle' of the hand wheel" in said
-    assert 'tell it by --columns "delta_f=Steered Angle [deg] /RATIO"' in said
+    assert 'declare it by --columns "delta_f=Steered Angle [deg] /RATIO"' in said
     assert "delta_fr" not in said
 
 
@@ -369,7 +369,7 @@ def test_two_channels_that_may_be_a_y_are_named_beside_a_v_y_that_is_read(log, t
     assert got.a_y is None and got.v_y is not None
     note = (
         "ay is left aside, as it is not sure: 'INS_AccLateral [m/s^2]' or 'ESP_LatAcc [m/s^2]' for "
-        'ay, equally; tell it by --columns "ay=INS_AccLateral [m/s^2]"'
+        'ay, equally; declare it by --columns "ay=INS_AccLateral [m/s^2]"'
     )
     assert note in got.notes
     assert main(["channels", str(path)]) == 0
@@ -386,7 +386,7 @@ def test_two_channels_that_may_be_a_y_are_named_where_no_v_y_is_there(log, tmp_p
     said = str(caught.value)
     assert "column vy (or ay, from which it is estimated) is missing; did you mean 'INS_Acc" in said
     assert "'ESP_LatAcc [m/s^2]' for ay, equally?" in said
-    assert 'tell it by --columns "ay=INS_AccLateral [m/s^2]"' in said
+    assert 'declare it by --columns "ay=INS_AccLateral [m/s^2]"' in said
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
     said = capsys.readouterr().out
     assert "vy (lateral velocity) is missing, ay would stand in for it: 'INS_AccLateral" in said

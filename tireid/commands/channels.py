@@ -191,7 +191,7 @@ def _meaning(
                 )
             if channel in one.channel and name not in signals:
                 unit = f" in {one.unit}" if one.unit and not is_given(listed.unit) else ""
-                hand = ", of the hand wheel: tell its ratio" if one.hand else ""
+                hand = ", of the hand wheel: give its ratio" if one.hand else ""
                 doubt = "; another is as likely" if name in proposal.rivals else ""
                 return f"perhaps {choice.column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
     return ""
@@ -236,7 +236,7 @@ def missing_text(
         )
         told = [choice.column_word(one, proposal) for one in likely]
         words += told or [f'"{choice.column_of(name)}=CHANNEL"']
-    return "\n".join([*lines, f"tell it: tireid channels {log} --columns {' '.join(words)}"])
+    return "\n".join([*lines, f"declare it: tireid channels {log} --columns {' '.join(words)}"])
 
 
 def _unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:

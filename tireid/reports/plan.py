@@ -124,7 +124,7 @@ def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     if driven and least(driven) < 0.0:
         said.append(
             f"The double-track car of the vehicle file leaves the area by {-least(driven):.2g} m: "
-            "its tires are not among those planned for. Tell --mu, or ask for less --grip."
+            "its tires are not among those planned for. Set --mu, or ask for less --grip."
         )
     return said
 
