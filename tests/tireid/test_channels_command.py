@@ -57,7 +57,7 @@ def test_it_lists_what_is_there_and_what_is_missing(folder, capsys):
     row = next(line for line in said.splitlines() if line.startswith("Vel Lat"))
     assert "km/h" in row and "vy: lateral velocity (95%)" in row and " 100 " in row
     row = next(line for line in said.splitlines() if line.startswith("Steered Angle"))
-    assert "perhaps delta_f" in row and "tell its ratio" in row
+    assert "perhaps delta_f" in row and "give its ratio" in row
     assert '--columns "delta_f=Steered Angle [deg] /RATIO"' in said
     assert main(["channels", str(folder / "plain.csv")]) == 0
     assert "all that is needed is there" in capsys.readouterr().out

@@ -300,7 +300,7 @@ def test_what_was_learnt_otherwise_is_told_of_and_replaced_where_asked(garage, m
     assert learns("logs/*.csv", "store", "--part", "60") == 0
     assert len(rows_in("store")) == 9
     assert main(["fleet", "merge", "store", "--out", "merged"]) == 2
-    assert "was learnt with two settings" in capsys.readouterr().err
+    assert "has rows of two settings" in capsys.readouterr().err
     for _ in range(2):
         assert learns("logs/*.csv", "store", "--part", "60", "--replace") == 0
     assert len(rows_in("store")) == 4 and len({row.setting for row in rows_in("store")}) == 1

@@ -219,7 +219,7 @@ def test_another_road_is_told_with_its_friction(model, tmp_path, capsys):
     assert 10.0 < road["first"] < 14.0 and abs(road["ratio"] - 0.5) < 3.0 * road["sd"]
     table = np.genfromtxt(out / "friction.csv", delimiter=",", names=True)
     assert table["another"][table["t_s"] > road["first"] + 1.0].min() > 0.5
-    assert "of the friction of the drive that taught" in capsys.readouterr().out
+    assert "of the friction of the identification drive" in capsys.readouterr().out
 
 
 def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
@@ -234,4 +234,4 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):
     summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
     assert summary["friction"] == {"unchanged": True, "roads": []}
-    assert "friction: that of the drive that taught" in capsys.readouterr().out
+    assert "friction: that of the identification drive" in capsys.readouterr().out

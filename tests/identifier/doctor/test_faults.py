@@ -57,7 +57,7 @@ def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
     car, log, _ = driven
     said = examine(log, car)
     assert said.findings == ()
-    assert all("would not be seen" in line for line in said.unobservable)
+    assert all("is not observable" in line for line in said.unobservable)
     assert len(said.unobservable) < 3
 
 

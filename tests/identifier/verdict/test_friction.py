@@ -125,7 +125,7 @@ def test_forces_that_no_friction_makes_are_told_as_such(tires, same):
 def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
     verdict = judge_prediction(tires, wetter)
     assert "another_road" in [one.code for one in verdict.findings if not one.refuses]
-    assert any("of the friction of the drive that taught" in line for line in verdict.lines)
+    assert any("of the friction of the identification drive" in line for line in verdict.lines)
     slippery = judge_prediction(tires, driven(5, Friction(scale=0.5), 0.05))
     assert {one.code for one in slippery.findings if one.refuses} == {"force_missed"}
     assert "another_road" in [one.code for one in slippery.findings]
