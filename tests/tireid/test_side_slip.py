@@ -74,7 +74,7 @@ def test_the_table_has_a_column_of_side_slip_and_a_dash_for_methods_that_read_it
         assert rows[name][0] in page
     names = ", ".join(TOLD)
     for file in ("report.html", "tables.txt"):
-        assert f"{names}: shown no " in (result / file).read_text(encoding="utf-8")
+        assert f"{names}: get no " in (result / file).read_text(encoding="utf-8")
     assert "Side slip estimated by methods without a lateral velocity." in page
     assert faults_of((result / "report.html").read_text(encoding="utf-8")) == []
     assert (result / "side_slip.png").read_bytes().startswith(b"\x89PNG")
