@@ -55,7 +55,7 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
         const=Path("log.toml"),
         type=Path,
         metavar="FILE",
-        help=f"take out what is sure, {what} FILE (log.toml)",
+        help=f"repair what is sure, {what} FILE (log.toml)",
     )
 
 
@@ -107,14 +107,14 @@ def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
 
 
 def diagnosis_section(
-    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Is the log right?"
+    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Doctor"
 ) -> page.Section:
     """Return the section of a report that holds a diagnosis."""
     rows = _finding_rows(diagnosis)
     blocks: list[page.Block] = [
         page.Paragraph(
-            text="What is wrong with the log, or with what is declared of its car, by the log "
-            "alone. ± is one standard deviation."
+            text="Faults of the log, or of its declared car, from the log alone. ± is one "
+            "standard deviation."
         )
     ]
     if rows:
@@ -140,9 +140,9 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     if repair:
         lines.append(f"repaired, in identification and replay: {repair_text(repair)}")
     elif path is not None:
-        lines.append("nothing is sure enough to be repaired")
+        lines.append("no sure repair")
     elif diagnosis.repair:
-        lines.append("what is sure is taken out with --repair")
+        lines.append("sure findings are repaired with --repair")
     return "\n".join(lines)
 
 

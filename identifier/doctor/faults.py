@@ -70,12 +70,12 @@ _SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
     (
         "delta_f",
-        "no tire explains the front axle, whichever fault is taken out: a steering angle that "
+        "no tire explains the front axle, with any fault removed: a steering angle that "
         "was commanded and not measured, play, or several faults at once",
     ),
     (
         "",
-        "no tire explains the rear axle, whichever fault is taken out: several faults at once, or "
+        "no tire explains the rear axle, with any fault removed: several faults at once, or "
         "another car",
     ),
 )
@@ -448,7 +448,7 @@ class Search:
         size = suspect.size(one.value)
         text = suspect.words(size, deviation, vehicle)
         if alike:
-            text += f"; this drive cannot tell it from: {', '.join(x.suspect.name for x in alike)}"
+            text += f"; on this drive it looks like: {', '.join(x.suspect.name for x in alike)}"
         repair = suspect.repair(size, vehicle)
         real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
         return Finding(
@@ -496,7 +496,7 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     worst = search.problem.share_missed(post.p)
     if worst.max() > RULES.unexplained:
         channel, text = UNEXPLAINED[int(np.argmax(worst))]
-        share = f"{100.0 * worst.max():.0f} % of its force is missed (usual: below 12 %)"
+        share = f"{100.0 * worst.max():.0f} % model error (typical: below 12 %)"
         one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")
         return Examination((one,), (_SIZES_BLIND,), taken)
     found = list(search.findings(post))

@@ -212,8 +212,8 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
             deviation=size / z,
             unit="s",
             confidence=0.9,
-            text=f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped where "
-            "they arrive, not where they are taken",
+            text=f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped on "
+            "arrival, not on sampling",
         )
 
 

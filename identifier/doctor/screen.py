@@ -107,7 +107,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             repair=before_sizes((*samples, *gross)),
             blind="the car is another one" if other else "",
             unobservable=tuple(
-                f"unit of {name}: it hardly swings more than its noise on this drive"
+                f"unit of {name}: its signal hardly exceeds its noise on this drive"
                 for name in sorted(motion.hidden)
             ),
             without=None if found.without is None else screened(found.without),

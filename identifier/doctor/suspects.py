@@ -203,8 +203,8 @@ SUSPECTS = (
     Suspect("ln_inertia", "yaw_inertia", "", "", 0.5, 0.1, "",
             "the {origin} yaw inertia is {size} times the right one"),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "",
-            "the road falls by {size} to the left, or wind pushes so", "°", DEGREES),
+            "the road falls by {size} to the left, or there is side wind", "°", DEGREES),
     Suspect("downforce_f", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "",
-            "the tires push more at speed, as by a downforce of {size}",
+            "forces grow with speed, as by a downforce of {size}",
             " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),
 )  # fmt: skip

@@ -189,9 +189,7 @@ def _check_turns(w: Means) -> str | None:
             return f"r contradicts ay: {law}; r must be positive to the left, change its sign"
         if turned_a:
             return f"{law}; change the sign of ay (positive to the left)"
-        return (
-            f"r and ay contradict one another: {law}; nobody can tell which, look at one left turn"
-        )
+        return f"r and ay contradict one another: {law}; ambiguous, look at one left turn"
     if r_delta.sign < 0 and a_delta.sign >= 0 and r_a.sign > 0:
         return _check_two(r_delta)  # a_y says nothing of the steering
     if (

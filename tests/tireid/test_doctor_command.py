@@ -99,7 +99,7 @@ def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
     assert "verdict: valid" in told
     found = json.loads((out / "doctor.json").read_text())
     assert found["applied"] == LogMap.from_toml(log_map).repair.tables()
-    assert "Is the log right?" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Doctor" in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, tmp_path, capsys):

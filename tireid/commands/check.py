@@ -108,13 +108,13 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
-        description="Say what is certified of an identifier; without options, of the axle "
-        "identifier, the default in a car: boxes, curve, jumps, the time to follow a drop of "
-        "friction; with --along LOG, also of the tires that it learns there: sector, and the "
-        "largest error of the force. Gains of the paper's laws (--paper, --method NAME, --design "
-        "FILE) are judged at the worst regressor: poles, sampling, gain and phase margin, damping, "
-        "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
-        "--tune, find gains and write them.",
+        description="Certify an identifier; with no option the axle identifier, the default in "
+        "a car: limits, curve, jumps, the time to follow a drop of friction; with --along LOG "
+        "also the tires identified there: sector, and the largest force error. Gains of the "
+        "paper's laws (--paper, --method NAME, --design FILE) are judged at the worst "
+        "regressor: poles, sampling, gain and phase margin, damping, drift, proven bounds. Exit "
+        "code 0: nothing fails, 1: something does, 2: bad input. With --tune, find gains and "
+        "write them.",
     )
     shared.add_vehicle(parser)
     shared.add_method(parser, LIVE)

@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
 def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
     """Say what the repair is, and what is left after it."""
     if after is None:
-        tell(f"nothing is sure enough to be repaired: with {options.repair} the log stays as it is")
+        tell(f"no sure repair: with {options.repair} the log stays as it is")
         return
     tell(f"repaired: {repair_text(repair)}")
     tell(f"after the repair, {diagnosis_text(after, unobservable=False)}")

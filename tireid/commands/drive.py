@@ -137,7 +137,7 @@ def add_parser(commands: Any) -> None:
         action="append",
         default=[],
         metavar="S:MU",
-        help="friction from arc length S [m] on, given to oracle only; may be repeated",
+        help="friction from arc length S [m] on, known to oracle only; may be repeated",
     )
     parser.add_argument(
         "--tires",

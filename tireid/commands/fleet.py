@@ -46,8 +46,8 @@ def add_parser(commands: Any) -> None:
 def _add_learn(tasks: Any) -> None:
     parser = tasks.add_parser(
         "learn",
-        help="learn logs that the store does not hold yet",
-        description="Learn each log on its own and keep, per log, the frozen model, its "
+        help="identify logs that are not in the store yet",
+        description="Identify each log separately and store, per log, the frozen model, its "
         "information matrix and vector of the tires, the verdict and how it was driven. A log "
         "that cannot be used becomes a row with its error. Run it again after it was stopped, "
         "or with more logs: only missing logs are identified.",
@@ -90,7 +90,7 @@ def _add_learn(tasks: Any) -> None:
         help="longest piece of a log in one row [s] (%(default)g)",
     )
     parser.add_argument(
-        "--again", action="store_true", help="also learn logs whose row holds an error"
+        "--again", action="store_true", help="also identify logs whose row has an error"
     )
     parser.add_argument(
         "--replace",

@@ -73,28 +73,27 @@ def add_parser(commands: Any) -> None:
         action="extend",
         default=[],
         metavar="LOG[:RUN]",
-        help="recordings to predict, each with a verdict",
+        help="validation drives to predict, each with a verdict",
     )
     parser.add_argument(
         "--bound",
         nargs="*",
         type=float,
         metavar="E",
-        help="state forces that are guaranteed where no force differs from the best curve by more "
-        "than E static axle loads, or, with a second number, is late by more [s] (estimated)",
+        help="guaranteed forces, if no force differs from the best curve by more than E static "
+        "axle loads; a second number: lateness [s] (estimated)",
     )
     shared.add_log_reading(parser)
-    add_repair(parser, "learn on what is left, and write it to")
-    shared.add_weights(parser, "begin learning with it")
+    add_repair(parser, "identify the repaired log, and write the repair to")
+    shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
-    shared.add_network_arguments(parser, "freeze nothing, judge this network instead")
+    shared.add_network_arguments(parser, "judge this network instead")
     shared.add_accept(parser)
     parser.add_argument(
         "--curves",
         choices=("csv", "parquet"),
         default="csv",
-        help="as what curves over time are written (csv); parquet is smaller, sooner written and "
-        "has all digits",
+        help="format of curves over time (csv); parquet is smaller and faster, with all digits",
     )
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)

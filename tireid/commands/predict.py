@@ -223,10 +223,10 @@ def _prediction_text(
     """
     motion, lines = prediction.motion, []
     if prediction.against_truth is None:
-        lines.append("no true forces in the log: what the forces miss cannot be said in newtons")
+        lines.append("no true forces in the log: the error cannot be given in newtons")
     if motion is not None:
         lines.append(
-            f"of the measured motion they miss {motion.lateral:.3g} of {motion.lateral_rms:.3g} "
+            f"error over the measured motion: {motion.lateral:.3g} of {motion.lateral_rms:.3g} "
             f"m/s² lateral and {motion.yaw:.3g} of {motion.yaw_rms:.3g} rad/s² yaw acceleration, "
             f"rms, sensor noise included; {prediction.motion_text()}"
         )
@@ -266,7 +266,7 @@ def _prediction_text(
 def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
     """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
-        return "no moment of the drive contradicts the forces that are guaranteed"
+        return "no moment of the drive contradicts the guaranteed forces"
     front, rear = 100.0 * broken.mean(axis=0)
     return (
         f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "

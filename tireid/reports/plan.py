@@ -73,7 +73,7 @@ def write_plan_report(
 ) -> None:
     words = plan_words(found, driven)
     report = Report(
-        title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",
+        title=f"Maneuver in {found.space.length:g} x {found.space.width:g} m",
         summary=words[0],
         numbers=[
             Headline(f"{100.0 * found.error:.1f} %", "expected error of the forces over the grip"),
@@ -84,10 +84,10 @@ def write_plan_report(
         warnings=_plan_warnings(found, driven),
         sections=[
             Section(
-                heading="What to drive",
+                heading="Maneuver",
                 blocks=[
-                    drawing(figures["area"], "The passes in the area.", READ["plan_area"]),
-                    drawing(figures["steering"], "What to steer.", READ["plan_steering"]),
+                    drawing(figures["area"], "Passes in the area.", READ["plan_area"]),
+                    drawing(figures["steering"], "Steering.", READ["plan_steering"]),
                     Paragraph(text=_how(found)),
                 ],
             ),
@@ -101,7 +101,7 @@ def write_plan_report(
                     _rivals(found),
                 ],
             ),
-            Section(heading="How safe it is", blocks=[Paragraph(text=text) for text in words[2:]]),
+            Section(heading="Safety", blocks=[Paragraph(text=text) for text in words[2:]]),
             origin(
                 command,
                 found.tires.vehicle,
@@ -170,9 +170,9 @@ def rival_rows(found: Plan) -> list[list[str]]:
 def _rivals(found: Plan) -> Table:
     """Return the plan beside slalom and random steering."""
     return Table(
-        caption="The plan beside maneuvers of the same length at the same share of the grip, error "
-        "in parts of the grip; their room is what the car takes on an open field, without margins; "
-        "random is the median of eight.",
+        caption="The plan beside maneuvers of the same length at the same share of the grip, "
+        "error over the grip; their room is that on an open field, without margins; random is "
+        "the median of eight.",
         header=RIVALS,
         rows=rival_rows(found),
     )
