@@ -99,7 +99,7 @@ def test_without_truth_it_says_what_of_the_motion_is_explained(model, logs, tmp_
     assert not [name for name in columns if "true" in name]
     assert 0.9 < summary["motion"]["explained_lateral"] <= 1.0
     said = capsys.readouterr().out
-    assert "cannot be said in newtons" in said
+    assert "cannot be given in newtons" in said
     share = 100.0 * summary["motion"]["explained_lateral"]
     assert f"explained are {share:.1f} % of the lateral" in said
 
