@@ -39,7 +39,7 @@ class Prediction:
             return f"<Prediction of {name!r}: no true forces to compare with{told}>"
         front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
         return (
-            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
+            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms error, "
             f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
 

@@ -187,7 +187,7 @@ class History:
             Where the run is online: then `identify` runs over the other recording, too.
         """
         if self.online:
-            raise ValueError("an online run is beside another drive as of identify")
+            raise ValueError("an online run cannot be compared with another drive of identify")
         model = self.freeze(t)
         recording, outputs = _with_v_y(recording.as_logged(), model)
         force = model.axle_force(recording)

@@ -516,8 +516,8 @@ class Vehicle:
         if self.chassis is None:
             raise VehicleError(
                 f"vehicle '{self.name}' has no [chassis] table, which a simulated car needs: "
-                "`tireid init car.toml` writes one to fill in, docs/driving.md (The car that is "
-                "driven) says what it holds"
+                "`tireid init car.toml` writes one to fill in, see docs/driving.md (The car that "
+                "is driven)"
             )
         return self.chassis
 

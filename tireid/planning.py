@@ -118,7 +118,7 @@ def _of_car(model: TireModel, vehicle: Vehicle) -> AxleModel:
     model = model.in_units()
     if not isinstance(model, AxleModel):
         raise ValueError(
-            "a plan needs to know how sure a model is, as a fit and the axle identifier do: "
-            f"this one is of kind {kind!r}"
+            "a plan needs a model with a covariance, of a fit or the axle identifier: this one "
+            f"is of kind {kind!r}"
         )
     return model if model.vehicle == vehicle else model.mounted_on(vehicle)

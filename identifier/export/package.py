@@ -127,7 +127,7 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
     else:
         lines = [f"This method is **{verdict}**: no margin and no bound of its error is proven."]
     if held:
-        lines.append("What holds by construction after every sample, whatever is measured, in both")
+        lines.append("Limits by construction after every sample, for any measurement, in both")
         lines.append("precisions, of what it learns:\n")
         lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
     return "\n".join(lines)
@@ -391,7 +391,7 @@ def _modes(specialized: SpecializedStep) -> str:
     learnt = ", ".join(specialized.learnt)
     return (
         f"`{name}_set_adaptation(&state, false)` freezes what is identified ({learnt});\n"
-        "observers and filters go on, so that it may be switched on again at any time. "
+        "observers and filters continue, so that it may be switched on again at any time. "
         f"`{name}_get_weights` and\n`{name}_set_weights` store it and bring it back, "
         f"`{name}_reset` begins anew with it, `{name}_init`\nforgets it."
     )

@@ -61,7 +61,7 @@ _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is told, "" SI.
 UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
-_OBLIQUE = "its box lies oblique: no axis of it is one of the car"
+_OBLIQUE = "its box is mounted obliquely: no axis of it is one of the car"
 SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 

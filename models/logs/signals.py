@@ -219,7 +219,7 @@ def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
         if (signal.table or signal.ratio != 1.0) and name not in ("delta_f", "delta_r"):
             raise RecordingError(f"{where}signals.{name} can have no ratio or table: no steering")
     if BETA in signals and "v_y" in signals:
-        raise RecordingError(f"{where}signals.beta stands in for v_y: give one of them")
+        raise RecordingError(f"{where}signals.beta replaces v_y: give one of them")
     if 0 < len(set(POSE) & set(signals)) < len(POSE):
         raise RecordingError(f"{where}x, y and heading are a pose together: give all three")
     if ("Fyf" in signals) != ("Fyr" in signals):

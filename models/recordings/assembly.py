@@ -425,8 +425,9 @@ def _on_wheels(
         gated, held, n = gated + told.gated, held + told.held, n + one.t.size
     names = ", ".join(name for name in WHEELS if name in segments[0].signals)
     return found, (
-        f"vx is made of {names}: at {100.0 * gated / n:.2g} % of the samples a wheel slipped and "
-        f"was left out, at {100.0 * held / n:.2g} % all were, and the speed went on as before"
+        f"vx is computed from {names}: at {100.0 * gated / n:.2g} % of the samples a wheel "
+        f"slipped and was left out, at {100.0 * held / n:.2g} % all were, and the speed went on "
+        "as before"
     )
 
 

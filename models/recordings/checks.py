@@ -41,7 +41,7 @@ _COPY = 1e-4  # of a channel, rms, that is left of it beside another one which i
 _LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
 _SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
 _LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
-DOCTOR = "tireid doctor LOG --vehicle FILE says what else may be wrong, and repairs it"
+DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
 LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 
 
@@ -128,7 +128,7 @@ def _check_signs_are_there(recording: Recording) -> str | None:
         if min(on_left, on_right) > 1.5 * max(between, 0.0) and min(on_left, on_right) > 0.0:
             return (
                 f"{name} must be negative to the right, it never is, and as large there as to the "
-                f"left: an amount whose sign stands in a channel of its own? multiply by that"
+                f"left: an amount with its sign in another channel? multiply by that"
             )
     return None
 

@@ -242,7 +242,7 @@ def _lost_text(told: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tupl
     if "v_x" not in told or "v_x" in listed:
         return ()
     channels = " + ".join(told["v_x"].channel)
-    return (f"there is no column {shown(channels)}: vx is made of the wheels",)
+    return (f"there is no column {shown(channels)}: vx is computed from the wheels",)
 
 
 def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:

@@ -103,7 +103,7 @@ class LogMap:
         if self.rate is not None and not 0.0 < self.rate < math.inf:
             raise RecordingError(f"rate must be positive and finite, in Hz, it is {self.rate}")
         if self.rate is not None and self.clock:
-            raise RecordingError("rate stands in for a time: give it or the channel of the clock")
+            raise RecordingError("rate replaces a time: give it or the channel of the clock")
         if self.holes not in (_REFUSE, CUT):
             raise RecordingError(f"holes must be {_REFUSE} or {CUT}, not {shown(self.holes)}")
         if self.order not in (_REFUSE, MEND):

@@ -37,7 +37,7 @@ def frozen_start(package: Package) -> TireModel:
     specialized = package.specialized
     if specialized.vehicle.has_downforce:
         raise NoHandoverError(
-            f"{specialized.vehicle.name} has downforce, of which the handover in C does not know: "
+            f"{specialized.vehicle.name} has downforce, which the handover in C does not model: "
             "export the identifier alone"
         )
     try:

@@ -136,7 +136,9 @@ def test_a_log_without_the_second_speed_is_read_by_the_same_map(run, wheels, tmp
     turns = columns(run, wheels, 1.0 / RADIUS)
     later = read_recording(turns, log_map=told)
     np.testing.assert_allclose(later.v_x, run.v_x, atol=0.5)
-    assert any("there is no column 'gnss': vx is made of the wheels" in one for one in later.notes)
+    assert any(
+        "there is no column 'gnss': vx is computed from the wheels" in one for one in later.notes
+    )
     first = read_recording({**turns, "gnss": run.v_x}, log_map=told)
     np.testing.assert_array_equal(first.v_x, run.v_x)
 

@@ -548,7 +548,7 @@ def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch
 
 
 def test_no_method_goes_on_from_a_curve(tires, tmp_path):
-    with pytest.raises(ValueError, match="no method can go on learning from a CurveModel"):
+    with pytest.raises(ValueError, match="no method can continue a CurveModel"):
         ti.export(tires["linear"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

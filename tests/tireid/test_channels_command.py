@@ -352,7 +352,7 @@ def test_a_channel_that_may_be_v_y_is_named_where_the_log_is_read_without(log, t
     note = next(one for one in got.notes if one.startswith("no lateral velocity is read"))
     word = '--columns "vy=Seitwärts [km/h]"'
     assert "if 'Seitwärts [km/h]' for vy (by a word of its name and its unit) is one" in note
-    assert note.endswith(f"tell it by {word}")
+    assert note.endswith(f"declare it by {word}")
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 0
     said = capsys.readouterr().out
     assert note in said and "perhaps vy (50%)" in said
@@ -389,7 +389,7 @@ def test_two_channels_that_may_be_a_y_are_named_where_no_v_y_is_there(log, tmp_p
     assert 'declare it by --columns "ay=INS_AccLateral [m/s^2]"' in said
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
     said = capsys.readouterr().out
-    assert "vy (lateral velocity) is missing, ay would stand in for it: 'INS_AccLateral" in said
+    assert "vy (lateral velocity) is missing, ay can replace it: 'INS_AccLateral" in said
     assert '--columns "ay=INS_AccLateral [m/s^2]"\n' in said
     assert "# [signals.a_y]" in (tmp_path / "log.toml").read_text(encoding="utf-8")
 
@@ -405,7 +405,9 @@ def test_words_that_are_proposed_for_a_log_without_units_read_it(log, tmp_path, 
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
     said = capsys.readouterr().out
     assert "perhaps r in deg/s (70%)" in said
-    words = re.findall(r'"([^"]+)"', next(x for x in said.splitlines() if x.startswith("tell it")))
+    words = re.findall(
+        r'"([^"]+)"', next(x for x in said.splitlines() if x.startswith("declare it"))
+    )
     assert words == [
         "beta=Slip_Angle [deg]",
         "ay=Lat_Acc [g]",

@@ -304,7 +304,7 @@ def test_what_was_learnt_otherwise_is_told_of_and_replaced_where_asked(garage, m
     for _ in range(2):
         assert learns("logs/*.csv", "store", "--part", "60", "--replace") == 0
     assert len(rows_in("store")) == 4 and len({row.setting for row in rows_in("store")}) == 1
-    assert "taken out of the store, as were 4 others" in capsys.readouterr().err
+    assert "removed from the store, as were 4 others" in capsys.readouterr().err
     assert main(["fleet", "merge", "store", "--out", "merged"]) == 0
 
 

@@ -137,8 +137,10 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     words = ["identify", alone, "--vehicle", str(tmp_path / "car.toml"), "--log", str(told)]
     assert main([*words, "--out", str(out), "--accept"]) == 0
     captured = capsys.readouterr()
-    assert "there is no column 'Ground Speed [km/h]': vx is made of the wheels" in captured.err
-    assert "vx is made of wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
+    assert (
+        "there is no column 'Ground Speed [km/h]': vx is computed from the wheels" in captured.err
+    )
+    assert "vx is computed from wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
     assert "a log has no lateral velocity: fit learns" in captured.err
     assert json.loads((out / "summary.json").read_text())
 

@@ -24,7 +24,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "C for a microcontroller, FMU and ONNX for simulators",
         "drive": "steer a car along a path at the limit of grip, on the identified tires",
-        "paper": "Tables I and II of the paper, beside ours, over many seeds",
+        "paper": "Tables I and II of the paper and ours, over many seeds",
     }
 )
 

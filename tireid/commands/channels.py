@@ -26,7 +26,7 @@ from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 _MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
-_CUT_BY_MAP = "refused but with --cut-holes, or by a map that says so, as --write makes it"
+_CUT_BY_MAP = "an error without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
@@ -116,7 +116,7 @@ def _wheels(
             wheel_factor(choice.column_of(name), name, unit, told.wheels)
     except RecordingError as error:
         return str(error), plain, False
-    return "vx is made of the wheels", plain, True
+    return "vx is computed from the wheels", plain, True
 
 
 def _without_wheels(told: LogMap) -> LogMap:
@@ -227,7 +227,7 @@ def missing_text(
     for name in missing:
         likely = choice.stand_ins(name, proposal)
         texts = " or ".join(choice.likely_text(one, proposal) for one in likely)
-        instead = ", ay would stand in for it" if likely == ["a_y"] and name != "a_y" else ""
+        instead = ", ay can replace it" if likely == ["a_y"] and name != "a_y" else ""
         lines.append(
             f"{choice.column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
             f"{instead}: {texts}"

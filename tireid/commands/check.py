@@ -140,9 +140,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--keep",
         choices=KEEPINGS,
-        help="for --tune: what keeps the weights over hours, the paper's leakage (which forgets "
-        "them), a leakage with a dead zone, or a projection in its place "
-        f"({DEFAULT_KEEPING})",
+        help="for --tune: bound of the weights over hours: the paper's leakage (which forgets "
+        f"them), a leakage with a dead zone, or a projection in its place ({DEFAULT_KEEPING})",
     )
     shared.add_output(parser, None)
     parser.set_defaults(run=run)
@@ -191,7 +190,7 @@ def _require_drive(options: argparse.Namespace) -> None:
     }
     for option, value in told.items():
         if value and options.along is None:
-            raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
+            raise ValueError(f"{option} is for a drive: give one by --along LOG")
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
@@ -216,7 +215,7 @@ def _refuse_gains(options: argparse.Namespace, name: str) -> None:
     for option in _OF_GAINS:
         if getattr(options, option) is not None:
             raise ValueError(
-                f"--{option.replace('_', '-')} asks about the gains of the paper's laws, which "
+                f"--{option.replace('_', '-')} is for the gains of the paper's laws, which "
                 f"{name} has not: add --paper, --method {'|'.join(VARIANTS)} or --design FILE"
             )
 
@@ -310,7 +309,7 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
         return told + (f", but for {changed}" if changed else "")
     if driving == design.driving:
         return "conditions: as stored in the design"
-    return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
+    return f"conditions: as stored in the design, but for {changed}: not the verdict of the file"
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:

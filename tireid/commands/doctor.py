@@ -20,11 +20,11 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "doctor",
         help=COMMANDS["doctor"],
-        description="Find what is wrong with LOG, or with what --vehicle says of its car, in the "
-        "log alone: units, signs, steering-wheel angle, offsets, delays, sensors that sit or look "
-        "elsewhere, frozen or lost samples, another car. Exit code 3 where something was found "
-        "that matters. --repair writes the log.toml with which other commands read it as it should "
-        "be (--log FILE).",
+        description="Find faults of LOG, or of its car as declared by --vehicle, in the log "
+        "alone: units, signs, steering-wheel angle, offsets, delays, sensors at other places or "
+        "angles, frozen or lost samples, another car. Exit code 3 where something was found "
+        "that matters. --repair writes the log.toml with which other commands read it as it "
+        "should be (--log FILE).",
     )
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     shared.add_vehicle(parser, required=True)

@@ -100,12 +100,11 @@ def _chassis(vehicle: Vehicle) -> dict[str, Any]:
 
 _NOT_COMPLETED = 1
 _EPILOG = (
-    "Without --weights or --network, frozen tires are identified first: the same car drives on an "
-    f"open field for {DURATION:g} s, steered at random and ever harder until it slides, and what "
-    "the identifier knows at the end steers. linear is the tire of the vehicle file, oracle the "
-    "true tire of the plant, learning begins with what is frozen and goes on learning while it "
-    "drives. "
-    "Exit code 0 where the first of the cars reached the end of the path, else 1."
+    "Without --weights or --network, frozen tires are identified first: the same car drives on "
+    f"an open field for {DURATION:g} s, steered at random and ever harder until it slides, and "
+    "the tires at the end are used. linear is the tire of the vehicle file, oracle the true tire "
+    "of the plant, learning begins with the frozen tires and updates them while driving. Exit "
+    "code 0 where the first of the cars reached the end of the path, else 1."
 )
 
 
@@ -184,8 +183,8 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=0.0,
         metavar="M",
-        help="weave by at most so much about the path, to learn from it; where the car goes on "
-        "learning the weave fades as the tires become known (%(default)g: off)",
+        help="largest weave about the path, for excitation; with learning tires it fades as "
+        "their uncertainty falls (%(default)g: off)",
     )
     parser.add_argument(
         "--caution",

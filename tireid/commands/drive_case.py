@@ -240,6 +240,6 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
     )
     raise ValueError(
         f"{mine}{driven.name!r} ({apart}): give that car by --vehicle FILE, with its table "
-        "[chassis] (tireid init writes one, docs/driving.md says what it holds), or leave "
-        "--weights out to learn on the car that is driven"
+        "[chassis] (tireid init writes one, see docs/driving.md), or leave --weights out to "
+        "identify the driven car"
     )

@@ -31,9 +31,9 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "fleet",
         help=COMMANDS["fleet"],
-        description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
-        "each log, and ask it: one model of many logs, prior for the next car, which car's "
-        f"tires changed. {needs('A store', 'libraries', 'fleet')}.",
+        description="Identify thousands of logs into a store, a Parquet dataset with a row for "
+        "each log. From it: one model of many logs, a prior for the next car, cars whose tires "
+        f"changed. {needs('A store', 'libraries', 'fleet')}.",
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
     _add_learn(tasks)
@@ -61,13 +61,15 @@ def _add_learn(tasks: Any) -> None:
         metavar="FILE",
         help="car as TOML; {name} in it stands for a tag: cars/{vehicle}.toml",
     )
-    parser.add_argument("--out", required=True, metavar="STORE", help="folder or address to keep")
+    parser.add_argument(
+        "--out", required=True, metavar="STORE", help="folder or address of the store"
+    )
     parser.add_argument(
         "--tags",
         default="",
         metavar="PATTERN",
         help="what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
-        "(2026-03-31) are known by name, the others stand in the column tags",
+        "(2026-03-31) are known by name, others are in the column tags",
     )
     parser.add_argument(
         "--root",
@@ -95,7 +97,7 @@ def _add_learn(tasks: Any) -> None:
     parser.add_argument(
         "--replace",
         action="store_true",
-        help="take out of the store earlier rows of these logs: another car or other "
+        help="remove earlier rows of these logs from the store: another car or other "
         "options, or another content of the same file",
     )
     add_log_map(parser)
@@ -112,7 +114,7 @@ def _add_learn(tasks: Any) -> None:
 
 
 def _add_question(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("store", metavar="STORE", help="that fleet learn keeps")
+    parser.add_argument("store", metavar="STORE", help="of fleet learn")
     parser.add_argument(
         "--where",
         default="",
@@ -215,7 +217,7 @@ def _watching(options: argparse.Namespace) -> Watching:
 def _add_report(tasks: Any) -> None:
     parser = tasks.add_parser(
         "report",
-        help="a page on what the store holds, with figures",
+        help="a report on the store, with figures",
         description="Write report.html: merged models, how stiffness went log by log, what "
         "changed, and which logs were left out.",
     )
@@ -286,10 +288,10 @@ def _learn(options: argparse.Namespace) -> int:
     if became.others:
         count, first = len(became.others), became.others[0].name
         say(
-            f"{first}: taken out of the store, as were {count - 1} others"
+            f"{first}: removed from the store, as were {count - 1} others"
             if options.replace
-            else f"{first} and {count - 1} others stand in the store with another car, other "
-            "options or another content: fleet learn --replace takes them out"
+            else f"{first} and {count - 1} others are in the store with another car, other options or "
+            "another content: fleet learn --replace removes them"
         )
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)
@@ -297,7 +299,7 @@ def _learn(options: argparse.Namespace) -> int:
         f"{became.of} logs, {hours:.3g} h: {became.learnt} identified now, "
         f"{became.of - became.learnt} before; "
         f"{refused} not valid, {len(errors)} could not be used"
-        + (f", the column error of {options.out} says why" if errors else "")
+        + (f", see the column error of {options.out}" if errors else "")
     )
     say(f"wrote {options.out} in {clock.seconds:.0f} s")
     return FAILS if errors else DONE

@@ -56,8 +56,8 @@ def read_vehicle(options: argparse.Namespace) -> Vehicle:
     path: Path | None = options.vehicle
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
-            f"--vehicle {path}: wants the .toml of a car, by its ending; tireid init writes one to "
-            "fill in"
+            f"--vehicle {path}: must be the .toml of a car, by its ending; tireid init writes one "
+            "to fill in"
         )
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
     say_estimates(vehicle, options.vehicle)
@@ -202,7 +202,9 @@ def chosen_method(
     method_is_given(options)
     if options.design is not None:
         if seed is not None:
-            raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
+            raise ValueError(
+                f"--seed is for a method: the seed is in {options.design} stands in it"
+            )
         design = read_design(options.design)
         return Chosen(design.law, design)
     usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
@@ -265,8 +267,8 @@ def _map_path(options: argparse.Namespace) -> Path | None:
     path: Path | None = getattr(options, "log_map", None)
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
-            f"--log {path}: wants a log.toml that says how logs are read, by its ending; a log "
-            "itself stands behind the command (check: behind --along)"
+            f"--log {path}: must be a log.toml, by its ending; give a log after the command "
+            "(check: after --along)"
         )
     return path
 

@@ -93,7 +93,7 @@ def add_parser(commands: Any) -> None:
         "--steering-lag",
         type=float,
         metavar="S",
-        help="time constant from the angle asked for to that of the front wheels, a guess within "
+        help="time constant from the command to the front wheel angle, a guess within "
         f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)",
     )
     parser.add_argument(

@@ -135,7 +135,7 @@ def identify_headlines(
             numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
     if model.known_slip is not None:
         front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
-        numbers.append(page.Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
+        numbers.append(page.Headline(f"{front} / {rear}°", "identified slip range, front / rear"))
     return numbers
 
 
@@ -179,8 +179,7 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
             said.append(f"{name}: learning diverged at {freeze_key(run.diverged_at)} s.")
         if recording.axle_force is None and run.online:
             said.append(
-                f"{name} has no true forces: errors are against what was identified online over "
-                "it, which asks only whether the model agrees with itself."
+                f"{name} has no true forces: errors are against the forces identified online."
             )
         said += _extrapolated(model, recording)
     if model.known_slip is None:
@@ -213,7 +212,7 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     blocks: list[page.Block] = [
         page.Paragraph(
             text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
-            "left. curve.csv holds the curve with what is known of it, weights.json the model."
+            "left. curve.csv has the curve with its uncertainty, weights.json the model."
         )
     ]
     if facts:

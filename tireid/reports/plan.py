@@ -124,7 +124,7 @@ def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     if driven and least(driven) < 0.0:
         said.append(
             f"The double-track car of the vehicle file leaves the area by {-least(driven):.2g} m: "
-            "its tires are not among those planned for. Set --mu, or ask for less --grip."
+            "its tires are outside the planned set. Set --mu, or ask for less --grip."
         )
     return said
 
@@ -134,7 +134,7 @@ def _how(found: Plan) -> str:
     space, lag = found.space, 1e3 * float(found.tires.steering_lag[0])
     paths = "path.csv" if len(found.passes) == 1 else "path.csv, path_2.csv, ..."
     how = (
-        "steering.csv holds the angle asked of the front wheels [rad], to the left positive, over "
+        "steering.csv has the front wheel angle [rad], to the left positive, over "
         "the time since the entry of each pass, and the course of the center of gravity that "
         "follows: X along the longer side of the area, Y to the left of it, both from the corner "
         f"in which the area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. "
@@ -147,7 +147,7 @@ def _how(found: Plan) -> str:
         return how
     hold = hold_of(found.tires, space.speed)
     return (
-        f"{how} Who plays steering.csv, a robot or a person, also holds the course, slowly: add "
+        f"{how} The robot or driver of steering.csv also corrects the course, slowly: add "
         f"{hold.heading:.3g} rad per rad of heading that is missing and {hold.aside:.3g} rad per "
         "meter that the car is off to the right."
     )
@@ -170,7 +170,7 @@ def rival_rows(found: Plan) -> list[list[str]]:
 def _rivals(found: Plan) -> Table:
     """Return the plan beside slalom and random steering."""
     return Table(
-        caption="The plan beside maneuvers of the same length at the same share of the grip, "
+        caption="The plan and maneuvers of the same length at the same share of the grip, "
         "error over the grip; their room is that on an open field, without margins; random is "
         "the median of eight.",
         header=RIVALS,

@@ -97,7 +97,7 @@ def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
         )
     if prediction.model.known_slip is not None:
         front, rear = (with_doubt(float(x)) for x in np.degrees(prediction.model.known_slip))
-        numbers.append(page.Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
+        numbers.append(page.Headline(f"{front} / {rear}°", "identified slip range, front / rear"))
     return numbers
 
 
