@@ -70,7 +70,7 @@ def test_logs_are_joined_in_their_order_and_overlapping_clocks_are_moved(log) ->
     assert "moved by" in both.notes[-1]
     later = joined([first, log.between(7.0, 9.0)])
     assert later.t[len(first)] == log.between(7.0, 9.0).t[0] and not later.notes
-    with pytest.raises(RecordingError, match="one interval"):
+    with pytest.raises(RecordingError, match="one sampling interval"):
         joined([first, replace(second, t=2.0 * second.t)])
 
 

@@ -129,7 +129,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
         ("[signals.delta_f]\nchannel = 'a'\nratio = 2\ntable = [[0, 0], [1, 1]]\n", "give one of"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [[0, 0], [1, -1]]\n", "that rise"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "table must be pairs"),
-        ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta stands in for v_y"),
+        ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),
         ("[filters]\nlow_pass = 0\n", "low_pass must be positive and finite, it is 0"),
@@ -180,7 +180,7 @@ def test_a_word_of_the_command_line_tells_a_signal(word: str, name: str, signal:
         (["r=a", "r=b"], "tells r twice"),
         (["r=a *1 *2"], "tells the factor of"),
         (["vy=a /3"], "signals.v_y can have no ratio"),
-        (["vy=a", "beta=b"], "beta stands in for v_y"),
+        (["vy=a", "beta=b"], "beta replaces v_y"),
         (["r=a *0"], "factor must be finite and not zero"),
     ],
 )

@@ -73,7 +73,7 @@ def test_our_names_without_a_unit_are_in_si(run, wheels):
 
 
 def test_the_notes_say_of_what_the_speed_is_made_and_what_was_left_out(run, wheels):
-    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is made" in one)
+    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is computed" in one)
     assert "wheel_fl, wheel_fr, wheel_rl, wheel_rr" in note
     share = float(note.split(" % of the samples")[0].split()[-1])
     assert 8.0 < share < 13.0  # 2 of 20 s

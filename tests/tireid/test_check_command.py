@@ -272,7 +272,7 @@ def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--log", "drive.csv"], "wants a log.toml"),
+        (["--log", "drive.csv"], "must be a log.toml"),
         (["--columns", "r=yaw"], "--columns is for a drive: give one by --along LOG"),
         (["--dbc", "car.dbc"], "--dbc says how a drive is read"),
     ],

@@ -683,7 +683,7 @@ def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path
         assert '<div class="good">' not in page
     ask = ["predict", str(tmp_path / "refused" / "weights.json"), str(logs / "quick.csv")]
     assert main([*ask, "--accept", "--out", str(tmp_path / "asked")]) == 0
-    assert "was found not valid when it was learnt" in capsys.readouterr().err
+    assert "was not valid on its identification drive" in capsys.readouterr().err
 
 
 def test_a_valid_answer_says_so_with_what_each_number_is_worth(result, law):

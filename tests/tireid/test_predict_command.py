@@ -87,7 +87,7 @@ def test_a_refused_answer_looks_refused(model, logs, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
     assert "NOT VALID. Axle force over slip angle" in page
-    assert '<li class="bad">' in page and "was found not valid when it was learnt" in page
+    assert '<li class="bad">' in page and "was not valid on its identification drive" in page
     assert '<div class="good">' not in page
 
 

@@ -290,8 +290,8 @@ def _learn(options: argparse.Namespace) -> int:
         say(
             f"{first}: removed from the store, as were {count - 1} others"
             if options.replace
-            else f"{first} and {count - 1} others are in the store with another car, other options or "
-            "another content: fleet learn --replace removes them"
+            else f"{first} and {count - 1} others are in the store with another car, other "
+            "options or another content: fleet learn --replace removes them"
         )
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)

@@ -77,7 +77,9 @@ def test_a_log_over_distance_is_refused_with_the_reason(tmp_path, name):
 def test_of_several_columns_that_rise_evenly_none_is_taken(tmp_path):
     columns = {"alpha": numbers(0.02 * np.arange(N)), "gamma": numbers(0.5 * np.arange(N))}
     path = written(tmp_path / "log.csv", columns)
-    with pytest.raises(RecordingError, match=r"several columns rise evenly \(alpha, gamma\): tell"):
+    with pytest.raises(
+        RecordingError, match=r"several columns rise evenly \(alpha, gamma\): declare"
+    ):
         open_log(path).read(["vx"])
     steps(open_log(path, clock="alpha"))
 
