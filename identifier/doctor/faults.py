@@ -70,8 +70,8 @@ _SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
     (
         "delta_f",
-        "no tire explains the front axle, with any fault removed: a steering angle that "
-        "was commanded and not measured, play, or several faults at once",
+        "no tire explains the front axle, with any fault removed: a steering angle that was "
+        "commanded and not measured, play, or several faults at once",
     ),
     (
         "",

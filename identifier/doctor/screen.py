@@ -260,10 +260,9 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
             code="other_car",
             size=1.0 / size,
             confidence=confidence,
-            text=f"this is the motion of a car with about {size * vehicle.wheelbase:.2g} m between "
-            f"the axles, the declared one has {vehicle.wheelbase:.3g} m: name the right vehicle "
-            f"file"
-            f"{doubt}",
+            text=f"this is the motion of a car with about {size * vehicle.wheelbase:.2g} m "
+            f"between the axles, the declared one has {vehicle.wheelbase:.3g} m: name the right "
+            f"vehicle file{doubt}",
         )
     if change.code == "yaw_inertia":
         factor = factors["inertia"]

@@ -215,8 +215,8 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             "status",
             "integer",
             "",
-            "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is one "
-            "that no car can be in, ignored; 3 an input or 4 a result is not finite or "
+            "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is "
+            "one that no car can be in, ignored; 3 an input or 4 a result is not finite or "
             "beyond what any car does, the weights stay; 6 that for half a second or more, "
             "forces are zero",
         ),

@@ -179,8 +179,8 @@ def _violated(strips: Strips, axle: int, bound: ForceBound, box: HalfSpaces) -> 
     least, late = least_bound(strips, axle, box)
     return BoundViolatedError(
         f"the bound of {bound.error[axle]:g} static axle loads and {bound.lateness[axle]:g} s is "
-        f"violated at the {AXLES[axle]} axle: no curve satisfies it from "
-        f"{strips.t[last - 1]:g} s on; the least one that fits is {least:.3g} and {late:.3g} s"
+        f"violated at the {AXLES[axle]} axle: no curve satisfies it from {strips.t[last - 1]:g} s "
+        f"on; the least one that fits is {least:.3g} and {late:.3g} s"
     )
 
 

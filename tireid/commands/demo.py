@@ -109,12 +109,11 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
             ),
             page.Paragraph(
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
-                "saturates. Slip is lagged by the relaxation of the tire, which is identified too, "
-                "and "
-                "moved by the sway of the body. The curves are identified by recursive least "
-                "squares from motion alone; where nothing was excited the prior remains. It works "
-                "sample by sample, in a car too; tireid identify makes one "
-                "estimate of a whole log."
+                "saturates. Slip is lagged by the relaxation of the tire, which is identified "
+                "too, and moved by the sway of the body. The curves are identified by recursive "
+                "least squares from motion alone; where nothing was excited the prior remains. "
+                "It works sample by sample, in a car too; tireid identify makes one estimate of "
+                "a whole log."
             ),
             curve_drawing(figures, verdict),
             *learnt_blocks("the axle identifier", model, figures)[1:],
@@ -248,10 +247,10 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
     return [
         page.Subheading(text="The frozen-weight reproducibility test: step steer"),
         page.Paragraph(
-            text="The step is held from 29 s on and goes back to half its angle at 36 s. By "
-            "the paper's measure the order of the laws is the reverse of the slalom's; against "
-            "truth it is not: what the integral law said online on the ramp was further from "
-            "the truth than what its frozen weights say of it. After 36 s, at an angle outside the "
+            text="The step is held from 29 s on and goes back to half its angle at 36 s. By the "
+            "paper's measure the order of the laws is the reverse of the slalom's; against truth "
+            "it is not: what the integral law said online on the ramp was further from the truth "
+            "than what its frozen weights say of it. After 36 s, at an angle outside the "
             "identification drive, all have a larger error than the linear tire."
         ),
         page.Table(

@@ -222,8 +222,7 @@ def frozen_tires(
     learnt = run.tire if conditions.caution > 0.0 else run.freeze()
     return (
         f"frozen ones identified by {law} on {recording.duration:.0f} s of random steering on an "
-        f"open "
-        f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
+        f"open field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
     ), learnt
 
 

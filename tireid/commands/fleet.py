@@ -97,8 +97,8 @@ def _add_learn(tasks: Any) -> None:
     parser.add_argument(
         "--replace",
         action="store_true",
-        help="remove earlier rows of these logs from the store: another car or other "
-        "options, or another content of the same file",
+        help="remove earlier rows of these logs from the store: another car or other options, "
+        "or another content of the same file",
     )
     add_log_map(parser)
     parser.add_argument(
@@ -297,8 +297,7 @@ def _learn(options: argparse.Namespace) -> int:
     refused = sum(row.valid is False for row in rows)
     tell(
         f"{became.of} logs, {hours:.3g} h: {became.learnt} identified now, "
-        f"{became.of - became.learnt} before; "
-        f"{refused} not valid, {len(errors)} could not be used"
+        f"{became.of - became.learnt} before; {refused} not valid, {len(errors)} could not be used"
         + (f", see the column error of {options.out}" if errors else "")
     )
     say(f"wrote {options.out} in {clock.seconds:.0f} s")

@@ -93,8 +93,8 @@ def add_parser(commands: Any) -> None:
         "--steering-lag",
         type=float,
         metavar="S",
-        help="time constant from the command to the front wheel angle, a guess within "
-        f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)",
+        help="time constant from the command to the front wheel angle, a guess within 30 %% "
+        f"(the vehicle file's, {STEERING_LAG:g} where it has none)",
     )
     parser.add_argument(
         "--steering-ratio",

@@ -242,8 +242,7 @@ def band_sentence(model: TireModel) -> str:
     return (
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
-        f"width: {model.band_origin}. "
-        "Where slip is not known it widens to the prior."
+        f"width: {model.band_origin}. Where slip is not known it widens to the prior."
     )
 
 

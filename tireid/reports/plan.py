@@ -134,14 +134,13 @@ def _how(found: Plan) -> str:
     space, lag = found.space, 1e3 * float(found.tires.steering_lag[0])
     paths = "path.csv" if len(found.passes) == 1 else "path.csv, path_2.csv, ..."
     how = (
-        "steering.csv has the front wheel angle [rad], to the left positive, over "
-        "the time since the entry of each pass, and the course of the center of gravity that "
-        "follows: X along the longer side of the area, Y to the left of it, both from the corner "
-        f"in which the area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. "
-        f"The speed is constant. {paths}: the course with a straight run-up, as tireid drive "
-        f"--path "
-        f"path.csv --speed {space.speed:g}m/s and other path trackers read it; who tracks it well "
-        "steers much the same."
+        "steering.csv has the front wheel angle [rad], to the left positive, over the time since "
+        "the entry of each pass, and the course of the center of gravity that follows: X along "
+        "the longer side of the area, Y to the left of it, both from the corner in which the "
+        f"area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. The speed is "
+        f"constant. {paths}: the course with a straight run-up, as tireid drive --path path.csv "
+        f"--speed {space.speed:g}m/s and other path trackers read it; who tracks it well steers "
+        "much the same."
     )
     if not space.held:
         return how
@@ -170,9 +169,9 @@ def rival_rows(found: Plan) -> list[list[str]]:
 def _rivals(found: Plan) -> Table:
     """Return the plan beside slalom and random steering."""
     return Table(
-        caption="The plan and maneuvers of the same length at the same share of the grip, "
-        "error over the grip; their room is that on an open field, without margins; random is "
-        "the median of eight.",
+        caption="The plan and maneuvers of the same length at the same share of the grip, error "
+        "over the grip; their room is that on an open field, without margins; random is the "
+        "median of eight.",
         header=RIVALS,
         rows=rival_rows(found),
     )
