@@ -271,7 +271,7 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     assert main(["channels", str(path), "--write", str(by)]) == 0
     said = capsys.readouterr().out
     assert "vy has no value in 301 of 4000 cells of 'vy', the first in line 1002" in said
-    assert "they are refused but with --cut-holes" in said
+    assert "they are rejected without --cut-holes" in said
     read = read_recording(path, log_map=by)
     assert read.breaks == (1000,) and len(read) == 3700
     assert "cells without a value are cut out: 301 of vy" in read.notes

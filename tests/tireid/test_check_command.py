@@ -274,7 +274,7 @@ def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
     [
         (["--log", "drive.csv"], "must be a log.toml"),
         (["--columns", "r=yaw"], "--columns is for a drive: give one by --along LOG"),
-        (["--dbc", "car.dbc"], "--dbc says how a drive is read"),
+        (["--dbc", "car.dbc"], "--dbc is for a drive"),
     ],
 )
 def test_words_about_a_drive_want_a_drive(capsys, words, said):

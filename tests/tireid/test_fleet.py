@@ -137,15 +137,15 @@ def test_a_store_is_read_without_the_threads_of_a_dataset(store):
 def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_path, capsys):
     store = shutil.copytree(store, tmp_path / "store")
     assert learnt(store) == 1
-    assert "0 learnt now, 13 before" in capsys.readouterr().out
+    assert "0 identified now, 13 before" in capsys.readouterr().out
     assert learnt(store, "--again") == 1
-    assert "1 learnt now, 12 before" in capsys.readouterr().out
+    assert "1 identified now, 12 before" in capsys.readouterr().out
     extra = fleet / "blue" / "summer" / "2026-03-20-more.csv"
     extra.write_bytes((fleet / "blue/summer/2026-03-01-quick.csv").read_bytes() + b"\n" * 9)
     try:
         before = digest(store)
         assert learnt(store) == 1
-        assert "1 learnt now, 13 before" in capsys.readouterr().out
+        assert "1 identified now, 13 before" in capsys.readouterr().out
         changed = {name for name, one in digest(store).items() if before.get(name) != one}
         assert len(changed) == 1  # its bucket alone
     finally:
@@ -203,7 +203,7 @@ def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):
     runs = [f"{one},{k}" for k, some in enumerate(lines) for one in some[1:]]
     (tmp_path / "two.csv").write_text("\n".join([f"{lines[0][0]},run", *runs]) + "\n")
     words = ["fleet", "learn", str(tmp_path / "*.csv"), "--vehicle", "cars/red.toml", "--jobs", "1"]
-    for told in ("1 learnt now, 0 before", "0 learnt now, 1 before"):
+    for told in ("1 identified now, 0 before", "0 identified now, 1 before"):
         assert main([*words, "--out", str(tmp_path / "store")]) == 0
         assert told in capsys.readouterr().out
     rows = Store(str(tmp_path / "store")).rows()
@@ -237,10 +237,10 @@ def learns(pattern, out, *more, vehicle="car.toml"):
 def test_the_same_logs_from_another_folder_are_known_and_counted_once(garage, monkeypatch, capsys):
     store, car, merged = garage / "store", garage / "one" / "car.toml", garage / "merged"
     for folder, pattern, told in (
-        (garage, garage / "one" / "logs" / "*.csv", "4 learnt now, 0 before"),
-        (garage / "two", garage / "one" / "logs" / "*.csv", "0 learnt now, 4 before"),
-        (garage / "one" / "logs", "*.csv", "0 learnt now, 4 before"),
-        (garage, "two/../one/logs/*.csv", "0 learnt now, 4 before"),
+        (garage, garage / "one" / "logs" / "*.csv", "4 identified now, 0 before"),
+        (garage / "two", garage / "one" / "logs" / "*.csv", "0 identified now, 4 before"),
+        (garage / "one" / "logs", "*.csv", "0 identified now, 4 before"),
+        (garage, "two/../one/logs/*.csv", "0 identified now, 4 before"),
     ):
         monkeypatch.chdir(folder)
         assert learns(pattern, store, vehicle=car) == 0
@@ -258,9 +258,9 @@ def test_two_cars_whose_folders_look_alike_lose_no_log(garage, monkeypatch, caps
     for car in ("one", "two"):
         monkeypatch.chdir(garage / car)
         assert learns("logs/*.csv", garage / "named", "--root", "logs") == 0
-        assert "4 learnt now, 0 before" in capsys.readouterr().out
+        assert "4 identified now, 0 before" in capsys.readouterr().out
         assert learns("logs/*.csv", store) == 0
-        assert "4 learnt now, 0 before" in capsys.readouterr().out
+        assert "4 identified now, 0 before" in capsys.readouterr().out
     assert len(rows_in(store)) == 8
     names = [row.log for row in rows_in(garage / "named")]
     assert names == sorted(2 * [f"{day}.csv" for day in range(4)])
@@ -283,7 +283,7 @@ def test_a_copy_counts_once_whichever_is_learnt_and_is_named(garage, monkeypatch
     capsys.readouterr()
     assert learns("logs/b.csv", "store") == 0
     printed = capsys.readouterr()
-    assert "1 logs" in printed.out and "0 learnt now, 1 before" in printed.out
+    assert "1 logs" in printed.out and "0 identified now, 1 before" in printed.out
     assert f"{garage}/one/logs/b.csv: is in the store as {garage}/one/logs/2.csv" in printed.err
 
 
@@ -295,8 +295,8 @@ def test_what_was_learnt_otherwise_is_told_of_and_replaced_where_asked(garage, m
     capsys.readouterr()
     assert learns("logs/*.csv", "store") == 0
     printed = capsys.readouterr()
-    assert "1 learnt now, 3 before" in printed.out and len(rows_in("store")) == 5
-    assert "3.csv and 0 others stand in the store with another car, other options" in printed.err
+    assert "1 identified now, 3 before" in printed.out and len(rows_in("store")) == 5
+    assert "3.csv and 0 others are in the store with another car, other options" in printed.err
     assert learns("logs/*.csv", "store", "--part", "60") == 0
     assert len(rows_in("store")) == 9
     assert main(["fleet", "merge", "store", "--out", "merged"]) == 2

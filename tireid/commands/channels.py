@@ -26,7 +26,7 @@ from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 _MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
-_CUT_BY_MAP = "an error without --cut-holes or a map with that key, as of --write"
+_CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
