@@ -320,7 +320,7 @@ def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
             known = ", ".join(QUANTITIES)
             raise RecordingError(f"{shown(name)} is no column of ours: {known}")
         if ours in found:
-            raise RecordingError(f"--columns tells {name} twice")
+            raise RecordingError(f"--columns gives {name} twice")
         found[ours] = given_channel(rest)
     require_fitting(found, "--columns: ")
     return found

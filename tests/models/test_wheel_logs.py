@@ -170,7 +170,7 @@ def test_axes_and_signs_that_a_map_turns_are_turned_before_wheels_are_brought_ov
 @pytest.mark.parametrize(
     ("change", "told", "rule"),
     [
-        ({}, {"wheel_fl": "wheel_fl [rpm]"}, "is in rpm, a rate of turns: tell the radius"),
+        ({}, {"wheel_fl": "wheel_fl [rpm]"}, "is in rpm, a rate of turns: give the radius"),
         ({}, {"wheel_fl": "wheel_fl [bar]"}, "must be in a unit of a speed"),
         ({"wheel_fl": np.nan}, {}, "wheel_fl must be finite, 1 of 2000 values"),
         ({"wheel_fl": 1e6}, {}, "wheel_fl must be of a car"),

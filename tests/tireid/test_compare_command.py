@@ -84,7 +84,7 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
 def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
     out, names = tmp_path / "out", ("linear", "textbook_ekf", "magic_formula_ekf")
     assert main([*words, "--method", *names, "--out", str(out)]) == 0
-    learnt = "magic_formula_ekf: lag of the tires and offsets of the sensors are learnt"
+    learnt = "magic_formula_ekf: lag of the tires and offsets of the sensors are identified"
     without = "textbook_ekf: the textbook's, without lag and offsets"
     for text in (
         capsys.readouterr().out,

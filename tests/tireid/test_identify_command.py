@@ -472,7 +472,7 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
         (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
-        (["--vehicle", "slalom.csv"], "--vehicle slalom.csv: wants the .toml of a car"),
+        (["--vehicle", "slalom.csv"], "--vehicle slalom.csv: must be the .toml of a car"),
     ],
 )
 def test_wrong_words_are_one_clear_line_and_leave_nothing(logs, tmp_path, capsys, extra, said):
