@@ -219,7 +219,7 @@ def test_channels_of_several_rates_and_a_gap_are_read_from_one_table(log, tmp_pa
         (["plain.csv", "--write", "log.json"], "must end in .toml"),
         (["plain.csv", "--run", "lap"], "so no run 'lap'; leave it out"),
         (["plain.csv", "--columns", "speed=vx"], "'speed' is no column of ours"),
-        (["plain.csv", "--columns", "r=a", "r=b"], "tells r twice"),
+        (["plain.csv", "--columns", "r=a", "r=b"], "gives r twice"),
         (["plain.csv", "--log", "nowhere.toml"], "nowhere.toml"),
     ],
 )

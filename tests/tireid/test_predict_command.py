@@ -228,7 +228,7 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
     ti.identify(log, ti.sedan(), make_method("axle", ti.sedan())).freeze().save(unchecked)
     summary, _ = predicted(tmp_path / "out", unchecked, logs / "quick.csv")
     assert summary["friction"] is None and not (tmp_path / "out" / "friction.csv").exists()
-    assert "friction: not observable, the band is what learning" in capsys.readouterr().out
+    assert "friction: not observable, the band is of the identifier" in capsys.readouterr().out
 
 
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):
