@@ -318,7 +318,7 @@ def _column_words(pairs: Sequence[str]) -> dict[str, str]:
         if not (name and equals and column):
             raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
         if name in columns:
-            raise ValueError(f"--columns tells {name} twice")
+            raise ValueError(f"--columns gives {name} twice")
         columns[name] = column
     return columns
 
