@@ -23,8 +23,8 @@ from identifier.compare.course import (
     Shares,
     Trial,
     cross_replay,
+    same_and_other,
     shares,
-    where_learnt_and_elsewhere,
 )
 from identifier.compare.study import Comparison, Frozen, run_comparison
 from identifier.method import Method
@@ -322,7 +322,7 @@ def _floors(course: Course) -> Frozen:
 
 def _elsewhere(course: Course, frozen: Frozen) -> tuple[list[float], tuple[float, float]]:
     """Errors on runs that were not learnt: of both axles, by run, and the mean of each [%]."""
-    _, other = where_learnt_and_elsewhere(frozen)
+    _, other = same_and_other(frozen)
     by_name = {recording.name: recording for recording in course.recordings}
     axles = np.mean([_percent(course, by_name[name], error) for name, error in other], axis=0)
     return [course.share(name, error) for name, error in other], (float(axles[0]), float(axles[1]))

@@ -201,7 +201,7 @@ def cases(vehicle: Vehicle) -> Mapping[str, Case]:
         "inertia/10": Case(told=WrongNumber(field="yaw_inertia", factor=10.0)),
         "center/0.05": Case(told=ShiftedCenter(share=0.05)),
         "swapped": Case(told=SwappedAxles()),
-        "other_car": Case(told=AnotherCar(told=other_car(vehicle))),
+        "other_car": Case(told=AnotherCar(declared=other_car(vehicle))),
         "straight": Case(StraightOnly(sensors=good_sensors(vehicle))),
         "v_y_zero": Case(SensorFault(channel="v_y", kind="zero")),
     }
@@ -239,7 +239,7 @@ def _random_told(vehicle: Vehicle, rng: np.random.Generator) -> Told:
         ),
         lambda: ShiftedCenter(share=sign * rng.uniform(0.01, 0.08)),
         SwappedAxles,
-        lambda: AnotherCar(told=other_car(vehicle)),
+        lambda: AnotherCar(declared=other_car(vehicle)),
     )
     return makes[int(rng.integers(len(makes)))]()
 

@@ -187,7 +187,7 @@ def _straight(vehicle: Vehicle, rng: np.random.Generator) -> Gross:
 
 
 def _another(vehicle: Vehicle, _: np.random.Generator) -> Gross:
-    return Gross(Case(told=AnotherCar(told=other_car(vehicle))), (("other_car", ""),))
+    return Gross(Case(told=AnotherCar(declared=other_car(vehicle))), (("other_car", ""),))
 
 
 def _inertia(_: Vehicle, rng: np.random.Generator) -> Gross:

@@ -28,7 +28,7 @@ from identifier.compare.work import spread
 from identifier.tire_model import TireModel
 from mpc.handover.learner import Learner
 from mpc.handover.rules import Verdict
-from mpc.loop.record import ToldScores, told_scores
+from mpc.loop.record import EstimateScores, estimate_scores
 from tireid.commands.drive_case import conditions_of, frozen_tires
 from tireid.driving.runs import FROZEN, FULL, IMU, LEARNING, SENSORS, Conditions, run_drive
 
@@ -63,7 +63,7 @@ class Result(NamedTuple):
     rms: float
     peak: float
     noticed: float | None
-    told: ToldScores | None
+    told: EstimateScores | None
     alarms: list[float]
 
 
@@ -122,7 +122,7 @@ def score(case: Case) -> Result:
         rms=run.scores.rms_e_y_m,
         peak=run.scores.peak_e_y_m,
         noticed=noticed,
-        told=told_scores(driven),
+        told=estimate_scores(driven),
         alarms=[t for t, note in driven.notes if note.startswith(Verdict.FAULT.value)],
     )
 
@@ -202,7 +202,7 @@ def tell(key: str, row: list[Result], targets: Targets) -> None:
     targets : keeps it.
     """
 
-    def median(of: Callable[[ToldScores], float]) -> float:
+    def median(of: Callable[[EstimateScores], float]) -> float:
         return float(np.median([of(one.told) for one in row if one.told is not None]))
 
     targets.record(f"{key}/side_slip", median(lambda told: told.rms_error_deg), "deg")

@@ -128,7 +128,7 @@ def case(job: tuple[str, int]) -> Taught | str:
     rng = np.random.default_rng([seed, 16])
     told, mu = car.told, FRICTION[kind]
     speed = float(rng.uniform(*SPEEDS) * told.froude_speed)
-    tires = PlausibleTires.told(told, mu)
+    tires = PlausibleTires.declared(told, mu)
     margin = MARGIN * told.wheelbase
     space = Space(
         length=1e3,

@@ -221,7 +221,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     if found is not None:
         return found
     folder = cache_folder()
-    log.info("compiling %s (once, kept in %s)", name, folder)
+    log.info("compiling %s (once, cached in %s)", name, folder)
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         c_file, built = Path(scratch) / f"{name}.c", Path(scratch) / name

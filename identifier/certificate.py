@@ -15,7 +15,7 @@ _SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 class Property:
     """A property of a design, its limit, and what to do.
 
-    limit : what the value is held against; None where it is a statement only.
+    limit : what the value is compared with; None where it is a statement only.
     margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
     advice : one line; empty where there is nothing to say.
     """
@@ -32,14 +32,14 @@ class Property:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate:
-    """All properties of a design, and what its construction holds.
+    """All properties of a design, and its limits by construction.
 
     properties : in the order of the table; none where nothing is proven of stability and errors.
-    held : by name and unit, what holds after every sample whatever is measured: plain data.
+    limits : enforced after every sample, for any measurement, by name and unit: plain data.
     """
 
     properties: tuple[Property, ...] = ()
-    held: Mapping[str, Any] = field(default_factory=dict)
+    limits: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Verdict:
@@ -49,12 +49,12 @@ class Certificate:
         return max((entry.status for entry in self.properties), key=_SEVERITY.index)
 
     def __repr__(self) -> str:
-        counts = f"{len(self.properties)} properties, {len(self.held)} boxes held"
+        counts = f"{len(self.properties)} properties, {len(self.limits)} limits hold"
         return f"<Certificate: {self.verdict}; {counts}>"
 
     def __str__(self) -> str:
         lines = [f"{e.status}: {e.title}: {e.value:.4g} {e.unit}".rstrip() for e in self.properties]
-        lines += [f"held by construction: {name}: {value}" for name, value in self.held.items()]
+        lines += [f"limits by construction: {name}: {value}" for name, value in self.limits.items()]
         return "\n".join([*lines, f"verdict: {self.verdict}"])
 
     def __getitem__(self, name: str) -> Property:
@@ -80,7 +80,7 @@ class Certificate:
                 }
                 for entry in self.properties
             },
-            "held_by_construction": dict(self.held),
+            "limits": dict(self.limits),
         }
 
 

@@ -114,7 +114,7 @@ class Method(ABC):
 
     @property
     def tells_v_y(self) -> bool:
-        """Whether it tells the lateral velocity of a recording without one."""
+        """Whether it estimates the lateral velocity of a recording without one."""
         return not self.needs_v_y
 
     @property
@@ -206,7 +206,7 @@ class Method(ABC):
         }
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
-        """Return what was learnt of the axles over a run, to be drawn over time.
+        """Return the estimates of the axles over a run, to be drawn over time.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class Method(ABC):
         return ()
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return the learnt numbers that rest at their bounds: none, where there are no bounds.
+        """Return the estimates at active bounds: none, where there are no bounds.
 
         Parameters
         ----------
@@ -242,8 +242,8 @@ class Method(ABC):
         """Return the weights that the curve of a tire can have; None where it learns no curves."""
         return None
 
-    def believed_body(self, vehicle: Vehicle) -> "Body | None":
-        """Return how a car's body is believed to roll; None where no accelerometer tells v_y.
+    def body_prior(self, vehicle: Vehicle) -> "Body | None":
+        """Return the prior of the roll of a car's body; None where v_y is not estimated.
 
         Parameters
         ----------
@@ -300,7 +300,7 @@ class Method(ABC):
         raise CannotFreezeError(f"it estimates {self.estimates}, not a tire")
 
     def require_fresh(self, start: TireModel | None) -> None:
-        """Refuse to begin a run with a stored model, where no tire is learnt.
+        """Reject a stored model as the beginning of a run, where no tire is identified.
 
         Parameters
         ----------

@@ -133,7 +133,7 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
     dt : sampling interval [s].
     """
     if model.kind not in LEARNERS:
-        raise ValueError(f"no method can go on learning from a {type(model).__name__}")
+        raise ValueError(f"no method can continue a {type(model).__name__}")
     return LEARNERS[model.kind](model, vehicle, dt)
 
 

@@ -149,7 +149,8 @@ def _signals(network: ca.Function, inputs: Sequence[str] | None) -> tuple[str, .
         chosen = _BY_COUNT[count]
     else:
         raise UnusableNetworkError(
-            f"the network reads {count} columns: say with inputs which of {list(SIGNALS)} they are"
+            f"the network reads {count} columns: declare with inputs which of {list(SIGNALS)} "
+            "they are"
         )
     if len(chosen) != count or len(set(chosen)) < count or not set(chosen) <= set(SIGNALS):
         raise UnusableNetworkError(

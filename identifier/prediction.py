@@ -39,17 +39,17 @@ class Prediction:
             return f"<Prediction of {name!r}: no true forces to compare with{told}>"
         front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
         return (
-            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
+            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms error, "
             f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether the model gives back the drive's motion; computed once."""
+        """Whether the model reproduces the drive's motion; computed once."""
         return judge_prediction(self.model, self.recording)
 
     def friction(self) -> RoadFriction | None:
-        """Return the friction of the drive's road over that of the one that taught, over time.
+        """Return the friction of the drive's road over that of the identification drive, over time.
 
         None where the model has no band, or too little is driven. It is part of the verdict.
 
@@ -63,7 +63,7 @@ class Prediction:
         return self.verdict.friction
 
     def motion_text(self) -> str:
-        """Return what the forces explain of the motion, in a line; empty where nobody knows."""
+        """Return what the forces explain of the motion, in a line; empty where unknown."""
         if self.motion is None:
             return ""
         parts = zip(("lateral", "yaw"), self.motion.explained, strict=True)

@@ -96,7 +96,7 @@ def stale_samples(stale_time: float, dt: float) -> int:
 
 
 class Rests(NamedTuple):
-    """Samples with rests between stretches, N of them.
+    """Samples with rests between segments, N of them.
 
     rows : of the recording that each is, at rests the one that follows, (N,).
     resting : whether it is a rest (N,).   at : which of them each sample is (n,).
@@ -108,9 +108,9 @@ class Rests(NamedTuple):
 
 
 def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
-    """Return n samples with rests before each stretch but the first.
+    """Return n samples with rests before each segment but the first.
 
-    breaks : samples with which stretches begin, rising.
+    breaks : samples with which segments begin, rising.
     """
     begins = np.repeat(np.asarray(breaks, dtype=np.intp), rest)
     samples = np.arange(n)

@@ -151,7 +151,7 @@ class History:
         t : time of the freeze in this recording's own clock [s]; None is the end.
         """
         if self.online:
-            raise ValueError("an online run is beside another drive as of identify")
+            raise ValueError("an online run cannot be compared with another drive of identify")
         model = self.freeze(t)
         recording, outputs = _with_v_y(recording.as_logged(), model)
         force = model.axle_force(recording)

@@ -68,7 +68,7 @@ class Setup(NamedTuple):
     An observer that starts at the first measurement carries zero until that is known: `observe`
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
-    Between stretches of a drive the step is shown `rest` samples, after which it begins anew with
+    Between segments of a drive the step is shown `rest` samples, after which it begins anew with
     what it has learnt (`identifier.refused`): a step that judges samples itself as many as end a
     run of it, `ends_run`, every other one.
     """
@@ -82,7 +82,7 @@ class Setup(NamedTuple):
 
     @property
     def rest(self) -> int:
-        """Samples that the step is shown between stretches of a drive."""
+        """Samples that the step is shown between segments of a drive."""
         if not judges_samples(self.carry):
             return 1
         if self.ends_run is None:
@@ -207,7 +207,7 @@ class Before(Mapping[str, Array]):
 
 
 class Shown(NamedTuple):
-    """What a step is shown of a part of a recording: samples, and rests between its stretches.
+    """What a step is shown of a part of a recording: samples, and rests between its segments.
 
     signals : by port of `over`, (N, ...).   samples : N, rests included.
     at : which of these each sample of the part is (n,); None where there is no rest.
@@ -251,7 +251,7 @@ class Shown(NamedTuple):
 def shown(
     recording: Recording, over: Iterable[str], *, rest: int, judges: bool, part: slice = ALL
 ) -> Shown:
-    """Return a recording as a step is shown it: before each stretch but the first it rests.
+    """Return a recording as a step is shown it: before each segment but the first it rests.
 
     A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
     that no difference over the gap is ever taken for one over a sampling interval.
@@ -259,7 +259,7 @@ def shown(
     over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
         there is none.
     judges : whether the step judges samples itself.
-    part : samples that are shown; a stretch that begins with the first of them has its rest.
+    part : samples that are shown; a segment that begins with the first of them has its rest.
     """
     first, last, _ = part.indices(len(recording))
     v_x, n = recording.v_x[part], last - first

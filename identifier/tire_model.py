@@ -36,7 +36,7 @@ Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "what learning believes, not calibrated; run.tire checks it on the drive"
+UNCALIBRATED = "of the identifier, not calibrated; run.tire calibrates it on the drive"
 
 
 class _TireFunctions(NamedTuple):
@@ -50,7 +50,7 @@ class _TireFunctions(NamedTuple):
     dynamics: ca.Function
     """(x, delta, v_x) -> x_dot, axle_force (2,): what a collocation asks for."""
     step: ca.Function
-    """(x, delta, v_x, dt) -> x_next: one step of Runge-Kutta with δ and v_x held."""
+    """(x, delta, v_x, dt) -> x_next: one step of Runge-Kutta with δ and v_x constant."""
 
 
 class Fact(NamedTuple):
@@ -70,7 +70,7 @@ class Estimate(NamedTuple):
     """A number of one axle that a drive may have decided.
 
     title, axle : what.   value, unit : how much.   sd : its standard deviation, None unknown.
-    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
+    declared : value in the vehicle file or None.   identified : whether the drive decided it.
     """
 
     title: str
@@ -78,14 +78,14 @@ class Estimate(NamedTuple):
     value: float
     sd: float | None
     unit: str
-    told: float | None
-    learnt: bool
+    declared: float | None
+    identified: bool
 
     @property
     def words(self) -> str:
         """Value and standard deviation in three digits, and whether the drive left it open."""
         value = printed_value(self.value, self.sd, self.unit)
-        return value if self.learnt else f"{value} ({NOT_IDENTIFIABLE})"
+        return value if self.identified else f"{value} ({NOT_IDENTIFIABLE})"
 
     def with_missed(self, share: float) -> "Estimate":
         """Return the number with the share that is missed of a force in its standard deviation.
@@ -229,17 +229,17 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        ratio : friction over that of the drive that taught, positive [-].
+        ratio : friction over that of the identification drive, positive [-].
 
         Raises
         ------
         ValueError
-            Where the ratio is not positive, or the model cannot be told for another friction.
+            Where the ratio is not positive, or the model cannot be scaled to another friction.
         """
-        raise ValueError(f"a {type(self).__name__} cannot be told for a friction of {ratio:g}")
+        raise ValueError(f"a {type(self).__name__} cannot be scaled to a friction of {ratio:g}")
 
     def beside_v_y(self) -> "TireModel":
-        """Return the model as one that goes on learning where a lateral velocity is told."""
+        """Return the model as the beginning of a method with a given lateral velocity."""
         return self
 
     def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
@@ -332,12 +332,12 @@ class TireModel(ABC):
 
     @property
     def known_slip(self) -> Array | None:
-        """Slip [rad] up to which the forces were learnt, (2,); None where the model cannot tell."""
+        """Slip [rad] up to which the forces were identified, (2,); None where unknown."""
         return None
 
     @property
     def known_speeds(self) -> Array | None:
-        """Least and largest speed [m/s] of the drives that taught, (2,); None: it cannot tell."""
+        """Least and largest speed [m/s] of the identification drives, (2,); None where unknown."""
         return None
 
     @property
@@ -346,22 +346,22 @@ class TireModel(ABC):
         return None
 
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times `t` [s], (n,), of the drive that taught the road was another."""
+        """Return at which times `t` [s], (n,), of the identification drive the road was another."""
         return np.zeros(t.shape, dtype=bool)
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
-        """What the drives that taught showed beside the tires: code and one line of each."""
+        """Findings of the identification drives beside the tires: code and one line of each."""
         return ()
 
     def at_bounds(self) -> "tuple[Reached, ...]":
-        """Return the learnt numbers that rest at their bounds."""
+        """Return the estimates at active bounds."""
         return ()
 
     def relative_sd(self, alpha: Array) -> Array | None:
         """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.
 
-        Standard deviation of the force over that before learning: 1 is what was believed.
+        Standard deviation of the force over that before learning: 1 is the prior.
 
         Parameters
         ----------
@@ -387,8 +387,8 @@ class TireModel(ABC):
 
     @property
     def force_missed(self) -> Array | None:
-        """Share [-] of the force that the motion of the drive that taught shows and the model
-        misses, rms, white noise taken off, (2,); None where nobody looked: `calibrated` does.
+        """Error of the model over the force in the motion of the identification drive [-], rms,
+        white noise subtracted, (2,); None where not computed: `calibrated` does.
         """
         return None
 
@@ -406,7 +406,7 @@ class TireModel(ABC):
     def band_calibrated(self) -> bool:
         """Whether the width of `band` was found on parts of the drive that did not teach.
 
-        As of `Run.tire`, where enough was driven; else it is what learning believes.
+        As of `Run.tire`, where enough was driven; else that of the identifier.
         """
         return False
 
@@ -417,8 +417,8 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        calibration : None takes errors to be as learning is told.
-        force_missed : of the drive that taught, (2,); None where nobody looked.
+        calibration : None assumes the declared errors.
+        force_missed : of the identification drive, (2,); None where not computed.
         """
         del calibration, force_missed
         return self
@@ -444,8 +444,7 @@ class TireModel(ABC):
     def half_band_of_curves(self, recording: Recording, level: float = 0.9) -> Array | None:
         """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
 
-        Of the steady forces, without noise of the drive's sensors. None where the model cannot
-        tell.
+        Of the steady forces, without noise of the drive's sensors. None where unknown.
 
         Parameters
         ----------
@@ -457,12 +456,12 @@ class TireModel(ABC):
     def half_band(
         self, alpha: Array, level: float = 0.9, *, v_x: float | Array | None = None
     ) -> Array | None:
-        """Return half the width of `band`, (k, 2) [N]; None where the model cannot tell.
+        """Return half the width of `band`, (k, 2) [N]; None where unknown.
 
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
-        v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
+        v_x : speed [m/s], a number or (k,), positive; None takes that of the identification drive.
         """
         del alpha, level, v_x
         return None
@@ -470,7 +469,7 @@ class TireModel(ABC):
     def half_band_over(self, recording: Recording, level: float = 0.9) -> Array | None:
         """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
 
-        None where the model cannot tell.
+        None where unknown.
 
         Parameters
         ----------
@@ -504,14 +503,13 @@ class TireModel(ABC):
     ) -> tuple[float, float] | tuple[Array, Array] | None:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
 
-        None where the model cannot tell how sure it is; `band_calibrated` says whether it is so in
-        that share of cases, or as learning believes.
+        None where the model has no band; `band_calibrated` says whether that share was calibrated.
 
         Parameters
         ----------
         alpha, axle : as of `force`.
         level : in which share of cases it shall, above 0 and below 1.
-        v_x : speed [m/s], positive; None takes that of the drive that taught.
+        v_x : speed [m/s], positive; None takes that of the identification drive.
 
         Raises
         ------
@@ -616,10 +614,10 @@ class TireModel(ABC):
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
-        told = self.vehicle.bicycle[4:]
+        declared = self.vehicle.bicycle[4:]
         return tuple(
             Estimate(STIFFNESS, axle, float(C), None, "N/rad", before, not np.isclose(C, before))
-            for axle, C, before in zip(AXLES, self.stiffness, told, strict=True)
+            for axle, C, before in zip(AXLES, self.stiffness, declared, strict=True)
         )
 
     def facts(self) -> tuple[Fact, ...]:
@@ -629,7 +627,7 @@ class TireModel(ABC):
         return (Fact("known up to a slip of", np.degrees(self.known_slip), "deg"),)
 
     def summary(self) -> str:
-        """Return what was learnt, in a few lines; ± is one standard deviation.
+        """Return the estimates, in a few lines; ± is one standard deviation.
 
         It begins with the share of the force that the model misses where that is known: of a
         model of `calibrated`, also stored and read again. Without, ± knows of noise only.
@@ -637,7 +635,7 @@ class TireModel(ABC):
         missed = self.force_missed
         rows = [["", *AXLES]]
         if missed is not None:
-            fact = Fact("force missed in the drive that taught", 100.0 * missed, "%")
+            fact = Fact("model error on the identification drive", 100.0 * missed, "%")
             rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
         by_title: dict[str, dict[str, str]] = {}
         for one in self.estimates():
@@ -708,7 +706,7 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        valid : the verdict on it, told to whoever reads the file; None where there is none.
+        valid : the verdict on it, stored in the file; None where there is none.
         """
         told = {} if valid is None else {"valid": valid}
         write_atomically(path, json.dumps(self.to_dict() | told, indent=2) + "\n")

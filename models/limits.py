@@ -66,6 +66,6 @@ def limits_text() -> str:
     """Return the limits that hold, and how to raise them, for the help of commands."""
     values = " ".join(f"{name}={value:g}" for name, value in asdict(limits()).items())
     return (
-        f"What files may hold and commands may ask for is limited: {values}. The environment "
+        f"Contents of files and sizes in commands are limited: {values}. The environment "
         f'{VARIABLE}="samples=1e9 megabytes=4e4" raises limits, or lowers them.'
     )

@@ -161,7 +161,7 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
         if len(found) < len(pairs):
             keys = [key for key, _ in pairs]
             twice = next(key for key in found if keys.count(key) > 1)
-            raise json.JSONDecodeError(f"{shown(twice)} is told twice in one table", "", 0)
+            raise json.JSONDecodeError(f"{shown(twice)} is given twice in one table", "", 0)
         return found
 
     try:

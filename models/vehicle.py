@@ -377,7 +377,7 @@ class Vehicle:
         return told
 
     def moves_as(self, other: "Vehicle") -> bool:
-        """Return whether another file tells the same car: its bicycle and its downforce."""
+        """Return whether another file declares the same car: its bicycle and its downforce."""
         return self.bicycle == other.bicycle and self.downforce == other.downforce
 
     def without_chassis(self) -> "Vehicle":
@@ -387,7 +387,7 @@ class Vehicle:
 
     @property
     def drag(self) -> float:
-        """Deceleration by the air over v_x^2 [1/m]; of a passenger car where no area is told."""
+        """Deceleration by the air over v_x^2 [1/m]; of a passenger car without a declared area."""
         area = self.drag_area
         if area is None:
             area = _DRAG_AREA if self.wheelbase >= FULL_SIZE else 0.0
@@ -487,19 +487,19 @@ class Vehicle:
         if self.chassis is None:
             raise VehicleError(
                 f"vehicle '{self.name}' has no [chassis] table, which a simulated car needs: "
-                "`tireid init car.toml` writes one to fill in, docs/driving.md (The car that is "
-                "driven) says what it holds"
+                "`tireid init car.toml` writes one to fill in, see docs/driving.md (The car that "
+                "is driven)"
             )
         return self.chassis
 
     def origin(self, name: str) -> str:
-        """Return where a value comes from, in a word: "told", or "estimated" of what was left out.
+        """Return where a value comes from: "declared", or "estimated" where left out.
 
         Parameters
         ----------
         name : of the value.
         """
-        return "estimated" if name in self.estimated else "told"
+        return "estimated" if name in self.estimated else "declared"
 
     @property
     def estimates(self) -> str:
@@ -558,7 +558,7 @@ class Vehicle:
             raise VehicleError(f"{file}: {error}") from None
 
     def to_toml(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-        """Write the vehicle so that `from_toml` gives back an equal one, bit for bit.
+        """Write the vehicle so that `from_toml` returns an equal one, bit for bit.
 
         What is estimated is left out, as it was in the file; so is a downforce of zero.
 

@@ -79,7 +79,7 @@ def test_the_example_learns_the_tire(tmp_path, monkeypatch, capsys):
     names: dict[str, object] = {"__name__": "__main__"}
     exec(compile(blocks[0], "README.md", "exec"), names)
     told = capsys.readouterr().out
-    printed = re.search(r"rms missed, ([\d.]+) / ([\d.]+) % of the force", told)
+    printed = re.search(r"rms error, ([\d.]+) / ([\d.]+) % of the force", told)
     assert printed
     assert all(0.0 < float(share) < 8.0 for share in printed.groups())
     tire, log = names["tire"], names["log"]

@@ -41,7 +41,8 @@ def build_parser(words: Sequence[str]) -> _Parser:
     """Return the parser of a command line: all commands, and the options of the one it names."""
     parser = _Parser(
         prog="tireid",
-        description="Learns a car's lateral tire forces while it drives and freezes them.",
+        description="Turns a driving log into the car's tire curves, with error bars and a "
+        "verdict.",
         epilog=limits_text(),
     )
     parser.add_argument("--version", action="store_true", help="show the version and exit")

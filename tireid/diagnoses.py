@@ -55,7 +55,7 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
         const=Path("log.toml"),
         type=Path,
         metavar="FILE",
-        help=f"take out what is sure, {what} FILE (log.toml)",
+        help=f"repair what is sure, {what} FILE (log.toml)",
     )
 
 
@@ -85,13 +85,13 @@ def size_text(finding: Finding) -> str:
     return f"{with_doubt(scale * finding.size, doubt)} {unit}".strip()
 
 
-def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
+def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
         table = text_table([list(HEADER), *_finding_rows(diagnosis)], "<<<<")
-        return "\n".join([head, table, *diagnosis.lines(unseen=unseen)])
-    return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
+        return "\n".join([head, table, *diagnosis.lines(unobservable=unobservable)])
+    return "\n".join(["doctor: nothing found", *diagnosis.lines(unobservable=unobservable)])
 
 
 def _tone_of(diagnosis: Diagnosis) -> page.Tone:
@@ -107,14 +107,14 @@ def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
 
 
 def diagnosis_section(
-    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Is the log right?"
+    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Doctor"
 ) -> page.Section:
     """Return the section of a report that holds a diagnosis."""
     rows = _finding_rows(diagnosis)
     blocks: list[page.Block] = [
         page.Paragraph(
-            text="What is wrong with the log, or with what is declared of its car, by the log "
-            "alone. ± is one standard deviation."
+            text="Faults of the log, or of its declared car, from the log alone. ± is one "
+            "standard deviation."
         )
     ]
     if rows:
@@ -123,7 +123,8 @@ def diagnosis_section(
     else:
         blocks.append(page.Paragraph(text="Nothing was found."))
     blocks += [
-        page.Paragraph(text=page.printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen
+        page.Paragraph(text=page.printed(f"Not observable: {line}"))
+        for line in diagnosis.unobservable
     ]
     return page.Section(heading=heading, blocks=[*blocks, *more])
 
@@ -133,15 +134,15 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
 
     path : of --repair, None where it was not asked for.
     """
-    lines = [diagnosis_text(diagnosis, unseen=False)]
-    if diagnosis.unseen[:1] == (WITHOUT_V_Y,):
-        lines.append(f"cannot be seen: {WITHOUT_V_Y}")
+    lines = [diagnosis_text(diagnosis, unobservable=False)]
+    if diagnosis.unobservable[:1] == (WITHOUT_V_Y,):
+        lines.append(f"not observable: {WITHOUT_V_Y}")
     if repair:
-        lines.append(f"repaired, in what was learnt on and replayed: {repair_text(repair)}")
+        lines.append(f"repaired, in identification and replay: {repair_text(repair)}")
     elif path is not None:
-        lines.append("nothing is sure enough to be repaired")
+        lines.append("no sure repair")
     elif diagnosis.repair:
-        lines.append("what is sure is taken out with --repair")
+        lines.append("sure findings are repaired with --repair")
     return "\n".join(lines)
 
 
@@ -182,7 +183,7 @@ def write_doctor_report(
     drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
     sections = [
         diagnosis_section(diagnosis),
-        page.Section(heading="What the tires say", blocks=[drawn]),
+        page.Section(heading="Tire curves", blocks=[drawn]),
     ]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))

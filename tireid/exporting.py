@@ -29,7 +29,7 @@ from tireid.run import Run
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 _COSTS, _TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
 UNCALIBRATED = (
-    "the band is as learning is told of its errors: begin with the model of a drive to calibrate it"
+    "the band assumes the declared sensor errors: begin with the model of a drive to calibrate it"
 )
 PARTS = (  # of an export: about how long each takes, and the option that asks for it
     ("the identifier", 1.0, ""),
@@ -47,7 +47,7 @@ class Exported:
     folder: Path
     package: Package
     costs: tuple[Cost, ...]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def __str__(self) -> str:
         lines = [f"{cost.processor}, {cost.precision}: {cost.words}" for cost in self.costs]
@@ -55,9 +55,9 @@ class Exported:
         step = self.package.specialized
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
-        reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
+        reads += ", and v_y where it is measured; v_y is an output" if step.tells_v_y else ""
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
-        return "\n".join([*lines, *self.told, reads, *told, wrote])
+        return "\n".join([*lines, *self.notes, reads, *told, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -95,7 +95,7 @@ def export(
         calibrated, of a model as far as that is.
     fmu : also FMUs 2.0 and 3.0 for Co-Simulation.
     onnx : also the model, frozen, as ONNX.
-    mpc : also a tracker that steers by what is learnt.
+    mpc : also a tracker that steers by the identified tires.
     caution : of that tracker, from 0 to 1, as `drive` has it.
     overwrite : replace the folder if it exists.
 
@@ -154,7 +154,7 @@ def export(
                     version,
                 )
                 progress.step(2)
-    return Exported(folder=target, package=package, costs=tuple(costs), told=tuple(told))
+    return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(told))
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:

@@ -99,8 +99,8 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
     Parameters
     ----------
     recording : another drive; samples below the model's minimum speed do not count. Where it has
-        no v_y, `tire` tells it, or the inertial identifier, beginning with `tire`.
-    tire : what was learnt.
+        no v_y, `tire` estimates it, or the inertial identifier, beginning with `tire`.
+    tire : the identified tires.
     since : samples before this time [s] do not count; None counts all.
 
     Raises

@@ -74,7 +74,7 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
             raise OutputError(error.refusal(f"is writing {target}")) from None
         _require_replaceable(target, final, force)  # as the last one that held the claim left it
         for left in sorted(final.parent.glob(f"{_literal(prefix)}*.part")):
-            say(f"a run was stopped and left {left}: look for what you miss, then delete it")
+            say(f"a run was stopped and left {left}: recover what you need, then delete it")
         scratch = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=final.parent))
         new = scratch / "new"
         try:

@@ -46,9 +46,8 @@ def plan(
     area : length and width of what may be driven on [m].
     speed : that is held [m/s].
     time : of steering, over all passes through the area [s].
-    after : what was learnt already, of a fit or the axle identifier; None knows nothing.
-    friction : believed of tires and road, within 30 % [-]; None takes 0.8. What was learnt knows
-        it better: they exclude each other.
+    after : a model so far, of a fit or the axle identifier; None: nothing is known.
+    friction : prior of tires and road, within 30 % [-]; None takes 0.8. Not together with `after`.
     share : of the grip that is used at most, 0.2 to 0.97.
     margin : from the car to the edge of the area [m]; None takes 0.35 wheelbases.
     rate_limit : of the front wheels [rad/s]; None takes 0.4/sqrt(L/g).
@@ -92,10 +91,10 @@ def plan(
         believed = FRICTION if friction is None else friction
         if not 0.05 <= believed <= 3.0:
             raise PlanError(f"friction must be 0.05 to 3, it is {believed:g}")
-        tires = PlausibleTires.told(vehicle, believed, steering_lag=steering_lag)
+        tires = PlausibleTires.declared(vehicle, believed, steering_lag=steering_lag)
     else:
         if friction is not None:
-            raise PlanError("friction is known from what was learnt: leave one of them out")
+            raise PlanError("the model already has a friction: leave one of them out")
         tires = PlausibleTires.learnt(_of_car(after, vehicle), rng, steering_lag=steering_lag)
     return make_plan(tires, space, time, rng, progress)
 
@@ -119,7 +118,7 @@ def _of_car(model: TireModel, vehicle: Vehicle) -> AxleModel:
     model = model.in_units()
     if not isinstance(model, AxleModel):
         raise ValueError(
-            "a plan needs to know how sure a model is, as a fit and the axle identifier do: "
-            f"this one is of kind {kind!r}"
+            "a plan needs a model with a covariance, of a fit or the axle identifier: this one "
+            f"is of kind {kind!r}"
         )
     return model if model.vehicle == vehicle else model.mounted_on(vehicle)

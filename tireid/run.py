@@ -50,7 +50,7 @@ class Run:
 
     @cached_property
     def tire(self) -> TireModel:
-        """What was learnt at the end, its band calibrated on the drive.
+        """The tires at the end, their band calibrated on the drive.
 
         It is `freeze()` but for the band; that itself where the method has no band, or too little
         is driven.
@@ -63,7 +63,7 @@ class Run:
         return calibrated(self.history, verdict=self.verdict if self.method.whole else None)
 
     def freeze(self, t: float | None = None) -> TireModel:
-        """Return what was learnt until a time; its band is not calibrated.
+        """Return the tires identified until a time; their band is not calibrated.
 
         Parameters
         ----------

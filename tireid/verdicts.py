@@ -35,7 +35,7 @@ def _marked_number(verdict: Verdict, number: Number | None) -> Marked:
     """
     if number is None:
         return Marked("")
-    if not number.learnt:
+    if not number.identified:
         return Marked(number.words, "unknown", NOT_IDENTIFIABLE)
     if not number.valid:
         return Marked(number.words, "struck", "not valid")
@@ -74,7 +74,7 @@ def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
 
     verdicts : on the default method, by the name of the recording that it learnt on.
     """
-    return _each(verdicts, "default learnt on")
+    return _each(verdicts, "default identified on")
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
@@ -83,7 +83,7 @@ def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> H
         return Headline("NOT VALID", f"the verdict on this answer: {verdict.against}", "bad")
     notes = len(verdict.findings) + len(others)
     noted = f", with {notes} note{'s' * (notes > 1)}" if notes else ""
-    meaning = f"the verdict on this answer: it gives back the motion that was measured{noted}"
+    meaning = f"the verdict on this answer: it reproduces the measured motion{noted}"
     return Headline("valid", meaning, "doubt" if notes else "good")
 
 
@@ -107,8 +107,7 @@ def missed_headline(verdict: Verdict) -> list[Headline]:
         return []
     front, rear = (f"{PERCENT * share:.1f}" for share in missed)
     meaning = (
-        "missed of the force that the motion shows, front / rear (limit "
-        f"{PERCENT * MOST_MISSED:.0f} %)"
+        f"error over the force in the motion, front / rear (limit {PERCENT * MOST_MISSED:.0f} %)"
     )
     tone: Tone = "" if all(share <= MOST_MISSED for share in missed) else "bad"
     return [Headline(f"{front} / {rear} %", meaning, tone)]
@@ -138,7 +137,7 @@ def verdicts_headline(
 
 
 def known_headline(model: TireModel) -> list[Headline]:
-    """Return up to which slip a model knows the tires, as a number of a report, if it can tell."""
+    """Return the identified slip range of a model as a number of a report, if it has one."""
     if model.known_slip is None:
         return []
     front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
@@ -159,22 +158,21 @@ def verdict_section(verdict: Verdict) -> Section:
         [title, *(_marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
-    lines = (verdict.headline, verdict.missed_line, *verdict.unseen)
+    lines = (verdict.headline, verdict.missed_line, *verdict.unobservable)
     blocks: list[Block] = [
         Paragraph(
-            text="The frozen model is integrated over the drive and must give back the force that "
-            "the motion shows, at each axle, where it learnt and where it did not. ± is one "
+            text="The frozen model is replayed over the drive and must reproduce the force in "
+            "the motion, at each axle, on identification and validation drives. ± is one "
             "standard deviation."
         ),
         *(Paragraph(text=printed(line)) for line in lines if line),
         Table(
-            caption="What was learnt. Grey was not identified; what is struck through is not "
-            "valid.",
+            caption="Estimates. Grey was not identified; struck through is not valid.",
             header=("", *AXLES),
             rows=rows,
         ),
     ]
-    return Section(heading="Is it good?", blocks=blocks)
+    return Section(heading="Verdict", blocks=blocks)
 
 
 def warn_of_stored(path: Path | str) -> None:
@@ -187,7 +185,7 @@ def stored_warning(path: Path | str) -> list[Marked]:
     """Return what speaks against a stored model that was found not valid when it was learnt."""
     if stored_verdict(path) is not False:
         return []
-    text = f"{path} was found not valid when it was learnt: see its summary.json"
+    text = f"{path} was not valid on its identification drive: see its summary.json"
     return [Marked(text, "bad")]
 
 

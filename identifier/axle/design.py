@@ -126,7 +126,7 @@ class AxleIdentifier(Method):
         b, rising = self.bounds, self.rising_until
         return Certificate(
             properties=certified(self, vehicle, driving or natural_driving(vehicle)),
-            held={
+            limits={
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
                 **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
@@ -231,7 +231,7 @@ class AxleIdentifier(Method):
         """
         setup = self.setup(vehicle, start)
         stored = None if start is None else self._resumed(start).calibration
-        told = BandCalibration.told(brisk_speed(vehicle, self.min_speed))
+        told = BandCalibration.declared(brisk_speed(vehicle, self.min_speed))
         noise = np.array([self.regression.noise, self.regression.noise, 0.0])
         calibration = stored or replace(told, noise=noise)
         return setup._replace(
@@ -304,7 +304,7 @@ class AxleIdentifier(Method):
         grip, slope = W.sum(axis=1), (W / np.array(self.ladder)).sum(axis=1)
         elsewhere = "a sensor is off by more than that, or sits elsewhere than is told"
         late = "a sensor is late, or the tires are very soft"
-        unseen = "no such curve was seen, or mass, signs or units are wrong"
+        unexcited = "no such curve was seen, or mass, signs or units are wrong"
         zero, bias = float(own[0, 2]), float(own[1, 2])
         listed = [
             (abs(zero) > NEAR * b.steering,
@@ -317,9 +317,9 @@ class AxleIdentifier(Method):
                 (soft > NEAR * b.compliance,  # none at all is a stiff tire
                  Reached(axle, "compliance", float(soft), "m per load", late, False)),
                 (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
-                 Reached(axle, "grip", float(level), "static loads", unseen, False)),
+                 Reached(axle, "grip", float(level), "static loads", unexcited, False)),
                 (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
-                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unseen,
+                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unexcited,
                          True)),
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)

@@ -75,14 +75,14 @@ class ForceBound:
                 )
 
     @classmethod
-    def of(cls, told: "float | ForceBound") -> "ForceBound":
-        """Return a bound as it is told: a number is the error of both axles, nothing is late.
+    def of(cls, given: "float | ForceBound") -> "ForceBound":
+        """Return a bound as given: a number is the error of both axles, nothing is late.
 
         Parameters
         ----------
-        told : number [static axle loads], or the bound itself.
+        given : number [static axle loads], or the bound itself.
         """
-        return told if isinstance(told, ForceBound) else cls(error=(float(told), float(told)))
+        return given if isinstance(given, ForceBound) else cls(error=(float(given), float(given)))
 
     def allowed(self, beyond: Array, rate: Array) -> Array:
         """Return e (1 + β) + τ ρ [static axle loads], (k, 2).
@@ -264,7 +264,7 @@ class Guarantee:
 
     Parameters
     ----------
-    told : whether the bound was told; else it was estimated from the drive.
+    given : whether the bound was given; else it was estimated from the drive.
     corners : vertices of the possible weights of front and rear, (k, n) each.
     speed : mean of the drive that taught [m/s].
     fastest : largest ρ of its means [static axle loads/s], (2,): beyond it the band opens.
@@ -276,7 +276,7 @@ class Guarantee:
     """
 
     bound: ForceBound
-    told: bool
+    given: bool
     corners: tuple[Array, Array]
     speed: float
     fastest: tuple[float, float]
@@ -342,7 +342,7 @@ class Guarantee:
         return {
             "error_static_axle_loads": list(self.bound.error),
             "lateness_s": list(self.bound.lateness),
-            "told": self.told,
+            "given": self.given,
             "corners": [corners.tolist() for corners in self.corners],
             "speed_m_s": self.speed,
             "fastest_static_axle_loads_per_s": list(self.fastest),
@@ -356,8 +356,9 @@ class Guarantee:
             if not isinstance(data[name], list) or len(data[name]) != 2:
                 raise ValueError(f"{name} of the guarantee must be a pair, front and rear")
             pairs.append(data[name])
-        if not isinstance(data["told"], bool):
-            raise ValueError(f"told of the guarantee must be true or false, not {data['told']!r}")
+        given = data.get("given", data.get("told"))  # "told": files of earlier versions
+        if not isinstance(given, bool):
+            raise ValueError(f"given of the guarantee must be true or false, not {given!r}")
         error, lateness, fastest, both = pairs
         front, rear = (np.array(corners, dtype=np.float64) for corners in both)
         for corners in (front, rear):
@@ -368,7 +369,7 @@ class Guarantee:
                 error=(float(error[0]), float(error[1])),
                 lateness=(float(lateness[0]), float(lateness[1])),
             ),
-            told=data["told"],
+            given=given,
             corners=(front, rear),
             speed=float(data["speed_m_s"]),
             fastest=(float(fastest[0]), float(fastest[1])),
@@ -386,7 +387,7 @@ def _extremes(rows: Array, corners: Array) -> tuple[Array, Array]:
 
 
 def force_rate(
-    units: Array, curves: Sequence[Array], dt: float, stretches: Iterable[slice]
+    units: Array, curves: Sequence[Array], dt: float, segments: Iterable[slice]
 ) -> Array:
     """Return ρ (k, 2) [1/s]: the larger of |dφ/dt| and of its mean over the last 0.3 s.
 
@@ -399,7 +400,7 @@ def force_rate(
     dt : sampling interval [s].
     """
     rate = np.zeros(units.shape[:2])
-    for part in stretches:
+    for part in segments:
         if part.stop - part.start < 2:
             continue
         change = np.gradient(units[part], dt, axis=0)
@@ -429,7 +430,7 @@ def beyond_driven(slip: Array, driven: Array) -> Array:
     return np.maximum(np.abs(slip) / driven - 1.0, 0.0)
 
 
-def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice]) -> Array:
+def slip_beyond(slip: Array, driven: Array, dt: float, segments: Iterable[slice]) -> Array:
     """Return β (k, 2): the largest |x|/x_driven - 1 until now, each fading with 0.3 s; 0 within.
 
     Parameters
@@ -439,7 +440,7 @@ def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice
     dt : sampling interval [s].
     """
     beyond = np.zeros_like(slip)
-    for part in stretches:
+    for part in segments:
         over = beyond_driven(slip[part], driven)
         age = dt / MEMORY * np.arange(len(over))[:, None]
         with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
@@ -461,7 +462,7 @@ def grip_lost(along: Array, grip: Array) -> Array:
     return lost
 
 
-def along_acceleration(v_x: Array, turning: Array, dt: float, stretches: Iterable[slice]) -> Array:
+def along_acceleration(v_x: Array, turning: Array, dt: float, segments: Iterable[slice]) -> Array:
     """Return dv_x/dt - v_y r over the last 0.3 s (k,) [m/s²].
 
     Parameters
@@ -471,6 +472,6 @@ def along_acceleration(v_x: Array, turning: Array, dt: float, stretches: Iterabl
     dt : sampling interval [s].
     """
     along = np.zeros_like(v_x)
-    for part in stretches:
+    for part in segments:
         along[part] = (v_x[part] - _faded(v_x[part], dt)) / MEMORY - _faded(turning[part], dt)
     return along

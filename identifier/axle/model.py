@@ -76,7 +76,7 @@ class AxleModel(TireModel):
     covariance : of [W, own], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
-    calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
+    calibration : of the band, by segments that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
     guarantee : weights that the drive left possible; None where nobody asked.
     force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
@@ -306,7 +306,7 @@ class AxleModel(TireModel):
     @property
     def effective_calibration(self) -> BandCalibration:
         """Calibration of the band; where there is none, of errors as learning is told of them."""
-        return self.calibration or BandCalibration.told(self.reference_speed)
+        return self.calibration or BandCalibration.declared(self.reference_speed)
 
     def band_spread(self, alpha: Array, v_x: Array, pressed: Array | float = 1.0) -> BandSpread:
         """Return the variances of the steady forces that a band is made of, (k, 2).
@@ -405,20 +405,20 @@ class AxleModel(TireModel):
         most, and the slower the car is against the drive that taught, the larger: the lag of a tire
         is a length.
         """
-        slip, dt, stretches = self.lagged_slip(recording), recording.dt, recording.stretches
+        slip, dt, segments = self.lagged_slip(recording), recording.dt, recording.segments
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
         pressed = self.vehicle.load_ratio(recording.v_x)
         T *= pressed[..., None]
-        beyond = slip_beyond(slip, self.driven_slip, dt, stretches)
+        beyond = slip_beyond(slip, self.driven_slip, dt, segments)
         if self.guarantee is None:
-            rate = force_rate(T, (self.W[:1], self.W[1:]), dt, stretches)
+            rate = force_rate(T, (self.W[:1], self.W[1:]), dt, segments)
         else:
-            rate = force_rate(T, self.guarantee.corners, dt, stretches)
+            rate = force_rate(T, self.guarantee.corners, dt, segments)
             v_x = np.maximum(recording.v_x, self.min_speed)
             rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
             beyond += self.guarantee.too_fast(rate)
         v_y = 0.0 if recording.v_y is None else recording.v_y
-        along = along_acceleration(recording.v_x, v_y * recording.r, dt, stretches)
+        along = along_acceleration(recording.v_x, v_y * recording.r, dt, segments)
         carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
         doubt = Doubt(
             beyond=beyond,

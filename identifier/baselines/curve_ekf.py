@@ -183,7 +183,7 @@ class CurveEkf(Method):
         """Say whether it is more than the textbook's."""
         if self.textbook:
             return "the textbook's, without lag and offsets"
-        return "lag of the tires and offsets of the sensors are learnt, as by the default"
+        return "lag of the tires and offsets of the sensors are identified, as by the default"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""

@@ -40,7 +40,7 @@ from identifier.baselines.without_v_y import (
     axle_force,
     corrected,
     expected,
-    heard_ports,
+    given_ports,
     predicted,
     steady_v_y,
 )
@@ -98,7 +98,7 @@ def build_stage() -> ca.Function:
     both; before and now (7,), both columns; numbers, vehicle, sampling. A column that does not
     count leaves z and P as they are.
     """
-    s = heard_ports().sample
+    s = given_ports().sample
     z, at_before, at = (ca.SX.sym(name, Z) for name in ("z", "at_before", "at"))
     P = ca.SX.sym("P", Z, Z)
     before, now = (ca.SX.sym(name, len(Sampled._fields)) for name in ("before", "now"))
@@ -163,7 +163,7 @@ class Begun(NamedTuple):
 
 def _build_beginning() -> ca.Function:
     """Return `Begun` of estimate, P, running, the last column, the sample and the constants."""
-    heard = heard_ports()
+    heard = given_ports()
     s, p = heard.sample, heard.sample.parameters
     estimate, P, running = ca.SX.sym("estimate", Z), ca.SX.sym("P", Z, Z), ca.SX.sym("running")
     last, numbers = (
@@ -196,7 +196,7 @@ def _build_beginning() -> ca.Function:
 
 def _build_told() -> ca.Function:
     """Return axle_force and v_y of the next estimate, of the θ carried into the sample."""
-    s, numbers = heard_ports().sample, ca.SX.sym("numbers", len(Numbers._fields))
+    s, numbers = given_ports().sample, ca.SX.sym("numbers", len(Numbers._fields))
     following, estimate = ca.SX.sym("following", Z), ca.SX.sym("estimate", Z)
     known, at = Numbers(*ca.vertsplit(numbers)).friction, ca.vertcat(following[:2], estimate[2:])
     force = axle_force(TIRE, s.parameters, known, at, s.speed, s.u)

@@ -29,7 +29,7 @@ from identifier.baselines.ports import (
     lagged_slip,
     motion_rate,
 )
-from identifier.baselines.without_v_y import OVER, corrected, heard_ports
+from identifier.baselines.without_v_y import OVER, corrected, given_ports
 from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
@@ -75,7 +75,7 @@ def _curve_parameters(theta: Any, loads: Any) -> Any:
 
 def build_step(name: str) -> ca.Function:
     """Return the filter's step; carried are the ports of a `kalman` filter whose tire lags."""
-    heard, last = heard_ports(), lag_symbols()
+    heard, last = given_ports(), lag_symbols()
     s, p = heard.sample, heard.sample.parameters
     estimate, P = ca.SX.sym("estimate", STATES), ca.SX.sym("P", STATES, STATES)
     before, running = ca.SX.sym("before", 3), ca.SX.sym("running")

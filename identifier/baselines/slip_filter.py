@@ -29,7 +29,7 @@ from identifier.baselines.without_v_y import (
     axle_force,
     corrected,
     expected,
-    heard_ports,
+    given_ports,
     predicted,
     steady_v_y,
 )
@@ -112,7 +112,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
     tire : forces by θ.
     """
-    heard, n = heard_ports(), 2 + tire.unknowns
+    heard, n = given_ports(), 2 + tire.unknowns
     s, estimate, P = heard.sample, ca.SX.sym("estimate", n), ca.SX.sym("P", n, n)
     before, running = ca.SX.sym("before", 3), ca.SX.sym("running")
     numbers = ca.SX.sym("numbers", len(Numbers._fields))
@@ -247,7 +247,7 @@ class SlipFilter(Method):
     @property
     def remark(self) -> str:
         """Say which tires it stands on."""
-        on = "learnt tires of Dugoff" if self.learns else "the vehicle's linear tires"
+        on = "identified tires of Dugoff" if self.learns else "the vehicle's linear tires"
         return f"on {on}"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:

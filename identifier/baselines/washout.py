@@ -17,7 +17,7 @@ from identifier.baselines.curves import CURVES
 from identifier.baselines.without_v_y import (
     OVER,
     V_Y,
-    heard_ports,
+    given_ports,
     steady_v_y,
 )
 from identifier.method import Method
@@ -42,7 +42,7 @@ def build_step() -> ca.Function:
     Carried: washed, rate, running. Constant: cutoff ω [1/s]. Where a_y is not there, the
     last rate holds. The forces are those of the linear tires of the vehicle at that v_y.
     """
-    heard = heard_ports()
+    heard = given_ports()
     s, washed, rate, running = heard.sample, *(ca.SX.sym(name) for name in CARRY)
     p, dt, cutoff = s.parameters, s.sampling[0], ca.SX.sym("cutoff")
     steady = steady_v_y(p, s.speed, heard.r, s.u)

@@ -45,7 +45,7 @@ class _Heard(NamedTuple):
         return self.sample.x[1]
 
 
-def heard_ports() -> _Heard:
+def given_ports() -> _Heard:
     """Return fresh symbols."""
     a_y = ca.SX.sym("a_y")
     hears = ca.fabs(a_y) < _MOST_FELT  # NaN is not

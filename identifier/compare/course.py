@@ -59,7 +59,7 @@ class Course:
                 )
             size = self.size(recording)
             if not min(size.front, size.rear) > 0.0:
-                what = "that the motion shows of" if self.by_motion else "of"
+                what = "in the motion of" if self.by_motion else "of"
                 raise ValueError(f"{recording.name}: the force {what} an axle is always zero")
 
     @property
@@ -248,14 +248,14 @@ def frozen_shares(
 
     frozen : by recording learnt on and recording replayed [N].
     """
-    learnt_on, other = where_learnt_and_elsewhere(frozen)
+    learnt_on, other = same_and_other(frozen)
     return (
         _mean([course.share(name, error) for name, error in learnt_on]),
         _mean([course.share(name, error) for name, error in other]),
     )
 
 
-def where_learnt_and_elsewhere(
+def same_and_other(
     frozen: Mapping[str, Mapping[str, AxleRmse]],
 ) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
     """Return name and error of replays of the drive that was learnt, and of every other drive.

@@ -77,7 +77,7 @@ def run_comparison(
     for name, method in methods.items():
         trials[name] = cross_replay(method, course, None if seen is None else partial(seen, name))
         lost = "".join(f", diverged on {rec}" for rec in trials[name].diverged_at)
-        progress(f"{name}: learnt on {len(recordings)} recordings, replayed on all{lost}")
+        progress(f"{name}: identified on {len(recordings)} recordings, replayed on all{lost}")
     timed = {REFERENCE: make_method(REFERENCE, vehicle, seed)} | methods
     return Comparison(
         course=course,

@@ -45,7 +45,7 @@ class Accelerometer:
     """a_y over the motion of drives."""
 
     def __init__(
-        self, stretches: Sequence[Recording], drives: Sequence[Drive], vehicle: Vehicle
+        self, segments: Sequence[Recording], drives: Sequence[Drive], vehicle: Vehicle
     ) -> None:
         self.drives, L = drives, vehicle.wheelbase
         roll = 0.008 * float(np.sqrt(L / SEDAN))  # s, by which weight follows it
@@ -55,7 +55,7 @@ class Accelerometer:
         width = float(np.sqrt(L / SEDAN)) * SMOOTHED
         self.shown = [
             box(thinned(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
-            for one, drive in zip(stretches, drives, strict=True)
+            for one, drive in zip(segments, drives, strict=True)
         ]
 
     def line(self, p: Array, wide: Mapping[str, float]) -> Line:

@@ -1,4 +1,4 @@
-"""What the doctor says of a log and of its car: findings in order, a repair, and what is unseen."""
+"""What is wrong with a log and its car: findings in order, a repair, and what is not observable."""
 
 import math
 from dataclasses import dataclass, replace
@@ -37,18 +37,18 @@ NEVER = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Diagnosis:
-    """What is wrong with a log or with what is told of its car, and what takes it out.
+    """What is wrong with a log or with the declaration of its car, and the repair.
 
     Parameters
     ----------
     name : of the recording.
     findings : those that matter most first.
-    unseen : what this log cannot tell, and why, a line each.
+    unobservable : what this log cannot tell, and why, a line each.
     """
 
     name: str
     findings: tuple[Finding, ...]
-    unseen: tuple[str, ...]
+    unobservable: tuple[str, ...]
 
     @property
     def healthy(self) -> bool:
@@ -60,18 +60,18 @@ class Diagnosis:
         """What takes out all that is sure."""
         return combined(one for one in self.findings if one.sure)
 
-    def lines(self, *, unseen: bool = True) -> list[str]:
+    def lines(self, *, unobservable: bool = True) -> list[str]:
         """Return the findings, and how certain they are, a line each.
 
         Parameters
         ----------
-        unseen : whether what the log cannot tell follows.
+        unobservable : whether what the log cannot tell follows.
         """
         found = [f"{one.text} ({_certainty(one)})" for one in self.findings]
-        return found + [f"cannot be seen: {line}" for line in self.unseen if unseen]
+        return found + [f"not observable: {line}" for line in self.unobservable if unobservable]
 
     def summary(self) -> str:
-        """Return the findings and what is unseen as lines of text."""
+        """Return the findings and what is unobservable as lines of text."""
         nothing = [] if self.findings else ["nothing found"]
         return "\n".join([f"{self.name}:", *nothing, *self.lines()])
 
@@ -81,7 +81,7 @@ class Diagnosis:
             "recording": self.name,
             "healthy": self.healthy,
             "findings": [one.to_dict() for one in self.findings],
-            "unseen": list(self.unseen),
+            "not_observable": list(self.unobservable),
             "repair": self.repair.tables(),
         }
 
@@ -95,20 +95,20 @@ def _certainty(one: Finding) -> str:
 
 
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
-    """Return what is wrong with a log or with what is told of its car, from the log alone.
+    """Return what is wrong with a log or with the declaration of its car, from the log alone.
 
     Parameters
     ----------
-    recording : as it was read; its axle forces are not looked at.
-    vehicle : as it was told.
+    recording : as it was read; its axle forces are not used.
+    vehicle : as it was declared.
     """
     world = world_axes(recording)
     if world is not None:  # nothing that follows would be of this car
         finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
-        return Diagnosis(name=recording.name, findings=(finding,), unseen=NEVER)
+        return Diagnosis(name=recording.name, findings=(finding,), unobservable=NEVER)
     if recording.logged_v_y is None:
         told = (*_contradictions(recording, vehicle), *_samples(recording))
-        return Diagnosis(name=recording.name, findings=told, unseen=(WITHOUT_V_Y, *NEVER))
+        return Diagnosis(name=recording.name, findings=told, unobservable=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
     found, fine = list(gross.findings), Examination()
@@ -133,7 +133,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     return Diagnosis(
         name=recording.name,
         findings=tuple(_told_once(ranked)),
-        unseen=(*_unseen(recording, replace(gross, blind=blind)), *fine.unseen),
+        unobservable=(*_unobservable(recording, replace(gross, blind=blind)), *fine.unobservable),
     )
 
 
@@ -198,9 +198,9 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
     return replace(exact, sure=exact.sure and coarse.sure)
 
 
-def _unseen(recording: Recording, gross: Screened) -> tuple[str, ...]:
+def _unobservable(recording: Recording, gross: Screened) -> tuple[str, ...]:
     """Return what this log cannot tell, a line each."""
-    lines = [*NEVER, *gross.unseen]
+    lines = [*NEVER, *gross.unobservable]
     if gross.blind:
         lines.append(
             f"offsets, delays, lever arms, scales, center of gravity, inertia: {gross.blind}"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
-from identifier.doctor.pieces import stretches_of
+from identifier.doctor.pieces import segments_of
 from identifier.doctor.suspects import NOTES, SUSPECTS, TURNING, Suspect
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
@@ -42,9 +42,9 @@ class Rules:
     longest: float = 60.0  # [s] that are looked at of a log,
     pieces: int = 4  # and from how many parts of a longer one
     logs: int = 3  # that are looked at as long, of several,
-    log: float = 10.0  # and what a stretch must last to be one [s]
+    log: float = 10.0  # and what a segment must last to be one [s]
     shortest: float = 5.0  # [s] that must be driven
-    margin: float = 0.4  # [s] at both ends of a stretch that do not count: a delay may need them
+    margin: float = 0.4  # [s] at both ends of a segment that do not count: a delay may need them
     gain: float = 12.0  # [nats] that a fault must bring
     promise: float = 0.4  # of it, that one Gauss-Newton step must promise of what is fitted
     fitted: int = 4  # suspects in a round
@@ -70,12 +70,12 @@ _SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
     (
         "delta_f",
-        "no tire explains the front axle, whichever fault is taken out: a steering angle that "
-        "was commanded and not measured, play, or several faults at once",
+        "no tire explains the front axle, with any fault removed: a steering angle that was "
+        "commanded and not measured, play, or several faults at once",
     ),
     (
         "",
-        "no tire explains the rear axle, whichever fault is taken out: several faults at once, or "
+        "no tire explains the rear axle, with any fault removed: several faults at once, or "
         "another car",
     ),
 )
@@ -85,7 +85,7 @@ class Examination(NamedTuple):
     """Findings, what explains most first; what the log cannot tell; codes and channels taken in."""
 
     findings: tuple[Finding, ...] = ()
-    unseen: tuple[str, ...] = ()
+    unobservable: tuple[str, ...] = ()
     taken: frozenset[tuple[str, str]] = frozenset()
 
 
@@ -120,7 +120,7 @@ class _Taken(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class Search:
-    """The search for what is wrong with some stretches of a drive.
+    """The search for what is wrong with some segments of a drive.
 
     problem : of them, with slopes over all parameters.
     accelerometer : None where there is none.
@@ -442,7 +442,7 @@ class Search:
         size = suspect.size(one.value)
         text = suspect.words(size, deviation, vehicle)
         if alike:
-            text += f"; this drive cannot tell it from: {', '.join(x.suspect.name for x in alike)}"
+            text += f"; on this drive it looks like: {', '.join(x.suspect.name for x in alike)}"
         repair = suspect.repair(size, vehicle)
         real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
         return Finding(
@@ -459,14 +459,14 @@ class Search:
             note=suspect.code in NOTES,
         )
 
-    def unseen(self, post: Posterior) -> Iterator[str]:
+    def unobservable(self, post: Posterior) -> Iterator[str]:
         """Yield what this drive tells next to nothing of, beside what was found."""
         for one, _, _, left in self.steps(post):
             if left > RULES.untold * one.scaled(one.wide, self.vehicle):
                 least = f"{left * one.per_unit:.2g}{one.shown}"
                 if one.code in ("factor", "yaw_inertia"):
                     least = f"a factor of {1.0 + left:.2g}"
-                yield f"{one.name}: {least} would not be seen on this drive"
+                yield f"{one.name}: {least} is not observable on this drive"
 
 
 def _all_move(priors: Priors) -> Priors:
@@ -476,42 +476,42 @@ def _all_move(priors: Priors) -> Priors:
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
 
-    recording : as it was logged, of one drive or of several joined; of a long one lively stretches
+    recording : as it was logged, of one drive or of several joined; of a long one lively segments
         are looked at.
     vehicle : as it was told; its cornering stiffnesses are not looked at.
     """
     search = prepared(recording, vehicle)
     if search is None:
-        return Examination(unseen=(SLOW,))
+        return Examination(unobservable=(SLOW,))
     post = search.run()
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
     worst = search.problem.share_missed(post.p)
     if worst.max() > RULES.unexplained:
         channel, text = UNEXPLAINED[int(np.argmax(worst))]
-        share = f"{100.0 * worst.max():.0f} % of its force is missed (usual: below 12 %)"
+        share = f"{100.0 * worst.max():.0f} % model error (typical: below 12 %)"
         one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")
         return Examination((one,), (_SIZES_BLIND,), taken)
     found = list(search.findings(post))
     if search.accelerometer is not None:
         found = _of_one_device(found, vehicle)
-    return Examination(tuple(found), tuple(search.unseen(post)), taken)
+    return Examination(tuple(found), tuple(search.unobservable(post)), taken)
 
 
 def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
     """Return the search of a drive, None where too little is driven."""
-    whole = sum((one.stop - one.start) * recording.dt > RULES.log for one in recording.stretches)
+    whole = sum((one.stop - one.start) * recording.dt > RULES.log for one in recording.segments)
     logs = min(max(whole, 1), RULES.logs)
-    stretches = stretches_of(
+    segments = segments_of(
         recording, vehicle, longest=logs * RULES.longest, pieces=logs * RULES.pieces
     )
     fastest = min(RULES.interval, RULES.interval * math.sqrt(vehicle.wheelbase / SEDAN) + 0.004)
-    bare = [replace(one, a_y=None) for one in stretches]
+    bare = [replace(one, a_y=None) for one in segments]
     drives = [_inside(Drive.of(one, vehicle, fastest=fastest)) for one in bare]
     if sum(np.count_nonzero(one.counts) * one.dt for one in drives) < RULES.shortest:
         return None
     priors, accelerometer = Priors.of(vehicle), None
     if recording.a_y is not None:
-        accelerometer = Accelerometer(stretches, drives, vehicle)
+        accelerometer = Accelerometer(segments, drives, vehicle)
         accelerometer.line(priors.mean, dict.fromkeys(OF_A_Y[:4], 1.0))
     problem = Problem(drives, vehicle, priors, every=True)
     return Search(problem=problem, accelerometer=accelerometer)

@@ -1,6 +1,6 @@
 """Which pieces of a drive the doctor looks at: all of a short one, some of a long one.
 
-The screen takes pieces from all over a drive, the search for sizes its liveliest stretches. None
+The screen takes pieces from all over a drive, the search for sizes its liveliest segments. None
 runs across a gap. Pieces are slices of the drive: nothing is copied.
 """
 
@@ -18,13 +18,13 @@ WINDOW = 0.2  # [s]
 SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
 PIECE, PIECES = 60.0, 10  # s, and how many of them are looked at of a drive of hours
 SHORTEST = 200  # samples of such a piece
-LEAST = 2.0  # s, below which a stretch between two gaps is not looked at
+LEAST = 2.0  # s, below which a segment between two gaps is not looked at
 
 
 def looked_at(recording: Recording) -> tuple[Recording, ...]:
     """Return the pieces of a drive that the screen looks at: all of a short one, some of a long."""
     n = max(round(PIECE / recording.dt), SHORTEST)
-    places = list(recording.stretches)
+    places = list(recording.segments)
     if len(recording) > PIECES * n:
         cut = [
             slice(k, min(k + n, one.stop))
@@ -53,12 +53,12 @@ def driven_windows(recording: Recording, fast: float) -> Windows:
     return Windows.where(np.abs(recording.v_x) >= fast, recording, WINDOW)
 
 
-def stretches_of(
+def segments_of(
     recording: Recording, vehicle: Vehicle, *, longest: float, pieces: int
 ) -> tuple[Recording, ...]:
-    """Return the recording, or of a long one the liveliest stretch of each of its parts.
+    """Return the recording, or of a long one the liveliest segment of each of its parts.
 
-    longest : that is looked at as a whole [s]; the stretches have it together.
+    longest : that is looked at as a whole [s]; the segments have it together.
     """
     n, dt = len(recording), recording.dt
     if recording.duration <= longest:
@@ -80,7 +80,7 @@ def stretches_of(
 
 
 def _unbroken(recording: Recording, part: slice) -> list[slice]:
-    """Return the stretches of a part of a recording that no gap breaks, the longest at least."""
+    """Return the segments of a part of a recording that no gap breaks, the longest at least."""
     edges = [part.start, *(k for k in recording.breaks if part.start < k < part.stop), part.stop]
     pieces = sorted((slice(a, b) for a, b in pairwise(edges)), key=lambda one: one.start - one.stop)
     least = int(LEAST / recording.dt)

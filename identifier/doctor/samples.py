@@ -36,7 +36,7 @@ CERTAIN = 0.99
 
 
 class Runs(NamedTuple):
-    """Stretches of equal neighbors of a channel: index of the first sample, and length, (k,)."""
+    """Segments of equal neighbors of a channel: index of the first sample, and length, (k,)."""
 
     first: NDArray[np.intp]
     length: NDArray[np.intp]
@@ -78,7 +78,7 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:
-    """Return what is wrong with the samples of one stretch."""
+    """Return what is wrong with the samples of one segment."""
     signals = channels(recording)
     found = list(_copies(signals))
     named = {one.channel for one in found} | set(_still(signals))
@@ -212,8 +212,8 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
             deviation=size / z,
             unit="s",
             confidence=0.9,
-            text=f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped where "
-            "they arrive, not where they are taken",
+            text=f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped on "
+            "arrival, not on sampling",
         )
 
 
@@ -290,7 +290,7 @@ def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
         text=f"{name} reads exactly 0 {len(places)} times, for {size:.3g} s in all "
         f"({100.0 * float(np.mean(off)):.2g} % of the log), as from {recording.t[there.start]:.4g} "
         f"s on for {dt * (there.stop - there.start):.3g} s{slow}: an estimate that is switched off "
-        "there and no measurement; leave these stretches out of the log",
+        "there and no measurement; cut these segments out of the log",
     )
 
 
@@ -356,7 +356,7 @@ def _runs_on(name: str, noisy: bool, recording: Recording, first: int, length: i
 
 
 def _moves(name: str, recording: Recording, first: int, length: int, usual: float) -> bool:
-    """Whether the car changes its turn over a stretch, by the channels that are not judged."""
+    """Whether the car changes its turn over a segment, by the channels that are not judged."""
     width = max(1, min(round(0.2 / recording.dt), length // 2))
     turn = _turning(name, recording)[first : first + length]
     smooth = np.convolve(turn, np.ones(width) / width, "valid")

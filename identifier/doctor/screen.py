@@ -47,7 +47,7 @@ class Screened:
     repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
-    unseen : what gross faults this log cannot tell, a line each.
+    unobservable : what gross faults this log cannot tell, a line each.
     without : the same if the velocity sensor is where it should be, where that alone makes gross
         findings of it: to be asked where no size tells that it is elsewhere; None else.
     """
@@ -55,7 +55,7 @@ class Screened:
     findings: tuple[Finding, ...]
     repair: Repair
     blind: str = ""
-    unseen: tuple[str, ...] = ()
+    unobservable: tuple[str, ...] = ()
     without: "Screened | None" = None
 
 
@@ -104,8 +104,8 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             findings=(*gross, *samples, *told),
             repair=before_sizes((*samples, *gross)),
             blind="the car is another one" if other else "",
-            unseen=tuple(
-                f"unit of {name}: it hardly swings more than its noise on this drive"
+            unobservable=tuple(
+                f"unit of {name}: its signal hardly exceeds its noise on this drive"
                 for name in sorted(motion.hidden)
             ),
             without=None if found.without is None else screened(found.without),
@@ -256,9 +256,9 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
             code="other_car",
             size=1.0 / size,
             confidence=confidence,
-            text=f"this is the motion of a car with about {size * vehicle.wheelbase:.2g} m between "
-            f"the axles, the told one has {vehicle.wheelbase:.3g} m: name the right vehicle file"
-            f"{doubt}",
+            text=f"this is the motion of a car with about {size * vehicle.wheelbase:.2g} m "
+            f"between the axles, the declared one has {vehicle.wheelbase:.3g} m: name the right "
+            f"vehicle file{doubt}",
         )
     if change.code == "yaw_inertia":
         factor = factors["inertia"]

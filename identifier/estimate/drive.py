@@ -40,7 +40,7 @@ class Drive:
     signals : columns as `motion.model.SIGNALS`, (n, 9).
     rates : d/dt of v_y, r and δ_f, (n, 3).
     counts : samples that count, (n,).
-    begins : first samples of its stretches, rising, (k,).
+    begins : first samples of its segments, rising, (k,).
     """
 
     t: Array
@@ -80,7 +80,7 @@ class Drive:
         begin, end, _ = part.indices(len(recording))
         within = [
             slice(max(one.start, begin), min(one.stop, end))
-            for one in recording.stretches
+            for one in recording.segments
             if one.start < end and one.stop > begin
         ]
         pieces = [
@@ -105,7 +105,7 @@ class Drive:
 
         Parameters
         ----------
-        delays : of v_y, r and the front steering angle [s], (3,); at the end of a stretch a late
+        delays : of v_y, r and the front steering angle [s], (3,); at the end of a segment a late
             signal keeps its last value.
         """
         signals, rates = self.signals.copy(), self.rates.copy()
@@ -134,7 +134,7 @@ class Drive:
 def _piece(
     recording: Recording, piece: slice, vehicle: Vehicle, every: int, dt: float, slowest: float
 ) -> tuple[Array, Array, Array]:
-    """Return time, signals and rates of a stretch; its first sample does not count."""
+    """Return time, signals and rates of a segment; its first sample does not count."""
     v_y = recording.needed("v_y")
 
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
@@ -153,7 +153,7 @@ def _piece(
     bank = np.zeros_like(v_x)
     if recording.a_y is not None:
         bank = _bank(thinned(recording.a_y[piece], every), v_x, v_y, r, on, dt)
-    on[0] = False  # nothing is carried into a stretch
+    on[0] = False  # nothing is carried into a segment
     signals = np.column_stack(
         [v_x, v_y, r, delta_f, delta_r, a_x, bank, np.zeros_like(v_x), on.astype(float)]
     )

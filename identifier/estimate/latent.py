@@ -613,7 +613,7 @@ def _fill(
 
     firsts = np.flatnonzero(nodes.begins)
     lasts = np.flatnonzero(nodes.counts & ~nodes.goes)
-    beyond = 1.5 * nodes.dt  # half a node, and what is left of a stretch that makes none
+    beyond = 1.5 * nodes.dt  # half a node, and what is left of a segment that makes none
     for first, last in zip(firsts, lasts, strict=True):
         if last - first < 3:
             continue

@@ -316,8 +316,8 @@ class FittedModel(TireModel):
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
-        for stretch in recording.stretches:
-            begin, end = stretch.start, min(stretch.stop, len(recording))
+        for segment in recording.segments:
+            begin, end = segment.start, min(segment.stop, len(recording))
             for part in blocks(end - begin):
                 first = max(part.start - WARM, 0)
                 some = slice(begin + first, begin + part.stop)

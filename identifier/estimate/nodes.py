@@ -28,7 +28,7 @@ from models.vehicle import Vehicle
 
 BETWEEN, LEAST = 0.06, 0.02  # sqrt(L/g) from a node to the next, and [s] that it is at least
 ROLLS, JERKS = 5.0, 3.0  # Hz of a sedan, below which a_y rolls the body and is differentiated
-FEWEST = 3  # nodes of a stretch
+FEWEST = 3  # nodes of a segment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,7 +79,7 @@ class Nodes:
         a_y = recording.needed("a_y")
         nothing = np.full(len(recording), np.nan)
         pieces = []
-        for one in recording.stretches:
+        for one in recording.segments:
             first, last = max(one.start, begin), min(one.stop, end)
             count = (last - first) // every
             if count >= FEWEST:
@@ -114,7 +114,7 @@ def _earlier(signal: Array, samples: float) -> Array:
 def _piece(
     recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array, v_y: Array
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return t, given, measured, counts and goes of a stretch."""
+    """Return t, given, measured, counts and goes of a segment."""
     dt, scale = recording.dt, float(np.sqrt(vehicle.wheelbase / SEDAN))
     slowest = SLOW * vehicle.froude_speed
 

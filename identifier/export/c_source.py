@@ -89,20 +89,18 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
             precision(name, single=single),
             defines(name, _switches(specialized)),
             defines(name, _numbers(specialized, about)),
-            "/* Time [s] without a sample that could be taken after which no force is told any\n"
-            f" * more; may be set by who compiles the library. */\n#ifndef {stale}\n"
+            "/* Time [s] without a sample that could be taken after which no force is output any\n"
+            f" * more; may be set when the library is compiled. */\n#ifndef {stale}\n"
             f"#define {stale} ({_number(STALE_TIME)})\n#endif\n",
             _structure(f"{name}_input", _inputs(specialized)),
             _structure(f"{name}_output", _declarations(output_members(specialized), name)),
-            _structure(f"{name}_weights", _declarations(learnt, name), "What is learnt."),
-            _structure(
-                f"{name}_signals", _declarations(others, name), "What else is carried, but weights."
-            ),
+            _structure(f"{name}_weights", _declarations(learnt, name), "What is identified."),
+            _structure(f"{name}_signals", _declarations(others, name), "Other states."),
             _structure(
                 f"{name}_values",
                 (f"    {name}_weights weights;\n" if learnt else "")
                 + f"    {name}_signals signals;\n",
-                "What is carried from step to step.",
+                "The state.",
             ),
         ],
     )
@@ -111,7 +109,9 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
 def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
     learnt, _ = _weights_and_others(specialized)
     if specialized.believed not in (None, GATE):
-        raise ValueError(f"the C looks for what was believed in {GATE}, not {specialized.believed}")
+        raise ValueError(
+            f"the C looks for the last plausible sample in {GATE}, not {specialized.believed}"
+        )
     count, order = len(rules(learnt)), covariance_order(learnt)
     ruled: dict[str, tuple[object, str]] = {
         "COVARIANCE": (f"{order}U", "rows of a covariance among the weights"),

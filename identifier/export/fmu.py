@@ -198,9 +198,9 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             "status",
             "integer",
             "",
-            "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is one "
-            "that no car can be in, not learnt from; 3 an input or 4 a result is not finite or "
-            "beyond what any car reaches, nothing is learnt; 6 that for half a second or more, "
+            "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is "
+            "one that no car can be in, ignored; 3 an input or 4 a result is not finite or "
+            "beyond what any car does, the weights stay; 6 that for half a second or more, "
             "forces are zero",
         ),
         _output(9, "samples", "integer", "", "number of samples taken, those ignored included"),
@@ -212,7 +212,7 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             "tunable",
             "true",
             "",
-            f"whether it learns; false holds {learnt}",
+            f"whether it adapts; false freezes {learnt}",
         ),
         _constant(11, "sample_time", "s", specialized.dt, "sampling interval, inside and fixed"),
         _constant(

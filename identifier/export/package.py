@@ -82,10 +82,10 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
     """Return what is proven of a method, as the manifest says it."""
     if method.judged_by:
         verdict = f"judged by {method.judged_by}"
-        return {"verdict": verdict, "properties": {}, "held_by_construction": {}}
+        return {"verdict": verdict, "properties": {}, "limits": {}}
     found = method.certify(vehicle)
     told = found.to_dict()
-    return {name: told[name] for name in ("verdict", "properties", "held_by_construction")}
+    return {name: told[name] for name in ("verdict", "properties", "limits")}
 
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
@@ -109,7 +109,7 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
             f"`{method.judged_by}` on its\n"
             "design file gives the certificate. None is part of this package."
         )
-    verdict, held = proven["verdict"], proven["held_by_construction"]
+    verdict, held = proven["verdict"], proven["limits"]
     proven_of = proven["properties"].values()
     if proven_of:
         lines = [f"Certificate of this method, for the interval it was built for: **{verdict}**.\n"]
@@ -123,7 +123,7 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
     else:
         lines = [f"This method is **{verdict}**: no margin and no bound of its error is proven."]
     if held:
-        lines.append("What holds by construction after every sample, whatever is measured, in both")
+        lines.append("Limits by construction after every sample, for any measurement, in both")
         lines.append("precisions, of what it learns:\n")
         lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
     return "\n".join(lines)
@@ -368,8 +368,8 @@ def _modes(specialized: SpecializedStep) -> str:
     name = specialized.name
     learnt = ", ".join(specialized.learnt)
     return (
-        f"`{name}_set_adaptation(&state, false)` freezes what is learnt ({learnt});\n"
-        "observers and filters go on, so that it may be switched on again at any time. "
+        f"`{name}_set_adaptation(&state, false)` freezes what is identified ({learnt});\n"
+        "observers and filters continue, so that it may be switched on again at any time. "
         f"`{name}_get_weights` and\n`{name}_set_weights` store it and bring it back, "
         f"`{name}_reset` begins anew with it, `{name}_init`\nforgets it."
     )
@@ -390,14 +390,14 @@ def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
         signals = "v_x, r, a_y and steering"
         flagged = " Use it where\n`side_slip_observable` is 1, and as sure as `v_y_sd` says."
         absent.append(
-            "`v_y` may be NaN, and is where no sensor measures it; what no car has counts as NaN.\n"
-            f"What is told of it is in `{name}_output`, which `{name}_get_output` copies."
-            f"{flagged if specialized.side_slip == SIDE_SLIP else ''} All of\nit is zero before "
-            "the first sample, and where samples have been refused for too long."
+            "`v_y` may be NaN, and is where no sensor measures it; implausible values count as "
+            f"NaN.\nIts estimate is in `{name}_output`, which `{name}_get_output` "
+            f"copies.{flagged if specialized.side_slip == SIDE_SLIP else ''} All of\nit is zero "
+            "before the first sample, and where samples have been refused for too long."
         )
     return {
         "signals": signals,
-        "tells": ", without v_y,\nwhich is told" if specialized.tells_v_y else "",
+        "tells": ", without v_y,\nwhich is an output" if specialized.tells_v_y else "",
         "absent": "".join(f"{sentence}\n\n" for sentence in absent),
     }
 
@@ -407,7 +407,7 @@ def _implausible_row(specialized: SpecializedStep) -> str:
     if specialized.believed is not None:
         return (
             "| 2 `IMPLAUSIBLE` | no car can be there, or get there within a sample | of the last "
-            "sample that was believed, zero where that lasts | hold | yes |\n"
+            "plausible sample, zero where that lasts | hold | yes |\n"
         )
     if specialized.parts.where_false is not None:
         return "| 2 `IMPLAUSIBLE` | no car can be there | zero | hold | yes |\n"
@@ -418,13 +418,13 @@ def _about_gaps(specialized: SpecializedStep) -> dict[str, str]:
     """Return what becomes of forces while samples are refused, and of the state after it."""
     if specialized.believed is not None:
         return {
-            "refused_forces": "of the last sample that was believed, zero where that lasts",
+            "refused_forces": "of the last plausible sample, zero where that lasts",
             "after_gap": "After a moment the step rests, and restarts with the next good sample.",
         }
     return {
         "refused_forces": "as before",
-        "after_gap": "With the next good sample observers and filters begin anew, and what was "
-        "learnt stays.",
+        "after_gap": "With the next good sample observers and filters begin anew, and the "
+        "weights stay.",
     }
 
 

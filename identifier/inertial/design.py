@@ -157,7 +157,7 @@ class InertialIdentifier(Method):
         del vehicle, driving
         b = self.bounds
         return Certificate(
-            held={
+            limits={
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
                 "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],
@@ -167,7 +167,7 @@ class InertialIdentifier(Method):
                 "v_y_offset_m_s": [-b.v_y, b.v_y],
                 "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
                 "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
-                "inverse_yaw_inertia_over_told": [1.0 - MOST["inertia"], 1.0 + MOST["inertia"]],
+                "inverse_yaw_inertia_over_declared": [1.0 - MOST["inertia"], 1.0 + MOST["inertia"]],
             }
         )
 
@@ -240,7 +240,7 @@ class InertialIdentifier(Method):
             ends_run=self.plausibility.rest(self.dt),
         )
 
-    def believed_body(self, vehicle: Vehicle) -> Body:
+    def body_prior(self, vehicle: Vehicle) -> Body:
         """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
         frequency = self.roll_frequency / vehicle.froude_time
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
@@ -310,7 +310,7 @@ class InertialIdentifier(Method):
         b, W, own = self.bounds, state["W"], np.ravel(state["own"])
         shown = dict(zip(SENSORS, map(float, np.ravel(state["sensors"])), strict=True))
         zero, bias = shown["steering"], shown["v_y_bias"]
-        unseen = "no such curve was seen, or mass, signs or units are wrong"
+        unexcited = "no such curve was seen, or mass, signs or units are wrong"
         late = "a sensor is late, or the tires are very soft"
         listed = [
             (abs(zero) > NEAR * b.steering,
@@ -328,9 +328,9 @@ class InertialIdentifier(Method):
                 (bool(soft > NEAR * b.compliance),  # none at all is a stiff tire
                  Reached(axle, "compliance", float(soft), "m per load", late, False)),
                 (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
-                 Reached(axle, "grip", float(level), "static loads", unseen, False)),
+                 Reached(axle, "grip", float(level), "static loads", unexcited, False)),
                 (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
-                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unseen,
+                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unexcited,
                          True)),
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)

@@ -374,7 +374,7 @@ def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> Pap
         raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")
     first = design.gains
     if first.W_free or first.V_free or np.isfinite([first.W_max, first.V_max]).any():
-        raise ValueError("the weights of this design are kept by a dead zone or a projection")
+        raise ValueError("the weights of this design are bounded by a dead zone or a projection")
     gains = KEEPINGS[keeping](first, known)
     if gains == first:
         return design

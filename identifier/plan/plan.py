@@ -162,7 +162,7 @@ def make_plan(
     least = tires.vehicle.lowest_speed * 3.0
     if space.speed < least:
         raise PlanError(
-            f"nothing is learnt below {least:.3g} m/s with this car, the speed is {space.speed:g}"
+            f"no sample counts below {least:.3g} m/s with this car, the speed is {space.speed:g}"
         )
     tires = tires.at_speed(space.speed)
     body = body_of(tires)

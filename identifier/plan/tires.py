@@ -58,7 +58,9 @@ class PlausibleTires:
     prior: Array
 
     @classmethod
-    def told(cls, vehicle: Vehicle, friction: float, *, steering_lag: float | None = None) -> Self:
+    def declared(
+        cls, vehicle: Vehicle, friction: float, *, steering_lag: float | None = None
+    ) -> Self:
         """Return the tires that a car may have that was never identified.
 
         friction : believed of tires and road [-].

@@ -243,8 +243,8 @@ def _above_zero(name: str, title: str, value: float, advice: str) -> Property:
 # Properties that bound error and weights, beside the bound of an identifier without a network.
 
 _CONDITION = (
-    "it holds while slip, friction, speed, steering, yaw rate and noise are as declared, no sample "
-    "is left out as impossible, and the first weights keep it (resumed ones too)"
+    "valid while slip, friction, speed, steering, yaw rate and noise are as declared, no sample "
+    "is rejected, and the first weights satisfy it (resumed ones too)"
 )
 
 
@@ -385,7 +385,7 @@ def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: 
     enough = capacity >= need
     return Property(
         name="capacity",
-        title="largest steady force that the leakage lets the network hold",
+        title="largest steady force of the network with this leakage",
         value=capacity,
         limit=need,
         margin=capacity / need,

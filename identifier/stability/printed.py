@@ -252,5 +252,5 @@ def _remark(law: DrivingError, value: float, trivial: float) -> str:
     if law.z > 0.0:
         remarks.append("its proof does not cover a law that reads z")
     if value >= trivial:
-        remarks.append("above the trivial bound, it says nothing")
+        remarks.append("above the trivial bound")
     return "; ".join(remarks)

@@ -3,7 +3,7 @@
 from identifier.verdict.bands import calibrated, within_band
 from identifier.verdict.friction import Road, RoadFriction, road_friction
 from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
-from identifier.verdict.judging import judge, judge_prediction, judge_taught
+from identifier.verdict.judging import judge, judge_identification, judge_prediction
 from identifier.verdict.verdict import Number, Objection, Verdict, WindowForces
 
 __all__ = [
@@ -18,8 +18,8 @@ __all__ = [
     "contradictions",
     "guaranteed",
     "judge",
+    "judge_identification",
     "judge_prediction",
-    "judge_taught",
     "road_friction",
     "within_band",
 ]

@@ -1,4 +1,4 @@
-"""Bands that hold: calibrated on stretches of the drive that did not teach, by the motion alone.
+"""Bands that hold: calibrated on segments of the drive that did not teach, by the motion alone.
 
 Each quarter of the drive is asked of a model that was taught without it. Over windows of 0.3 s the
 impulse of an axle says which force it made, with no true force; what the model misses of it, noise
@@ -110,7 +110,7 @@ def calibrated(
     within = np.searchsorted(SPEEDS, speeds / model.vehicle.froude_speed, side="right")
     empty = np.zeros((3, *each))
     missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
-    told = BandCalibration.told(speed)
+    told = BandCalibration.declared(speed)
     for mine, other in taught_elsewhere(teach, recording, found):
         if other is None:
             continue
@@ -118,7 +118,7 @@ def calibrated(
         for into, values in zip(missed[:-1], asked_of, strict=True):
             into[..., mine, :] = values[..., mine, :]
     told = replace(told, noise=sensor_noise(recording, model.vehicle))
-    judged, _ = found.but_a_stretch()
+    judged, _ = found.but_a_segment()
     return model.with_calibration(
         calibration(missed, found.noise, found.windows, told), judged.missed
     )
@@ -133,7 +133,7 @@ def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Ar
 def calibration(
     missed: Missed, noise: Array, windows: Windows, told: BandCalibration
 ) -> BandCalibration | None:
-    """Return factors and color of errors on stretches that did not teach; None: too few windows.
+    """Return factors and color of errors on segments that did not teach; None: too few windows.
 
     noise : variance of the sensors' white noise in them (2,).
     told : what else is kept of the drive, and factors of an axle that has too few windows.

@@ -46,7 +46,7 @@ _SIMILAR = 0.1  # of ln μ: by so much roads of a tire are not similar
 
 
 class Road(NamedTuple):
-    """A stretch of another friction than that of the drive that taught.
+    """A segment of another friction than that of the drive that taught.
 
     first, last : from when to when it was told, in the recording's own clock [s].
     ratio : friction over that of the drive that taught [-].   sd : standard deviation of it [-].
@@ -59,10 +59,10 @@ class Road(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The stretch in words."""
+        """The segment in words."""
         return (
             f"from {self.first:.4g} to {self.last:.4g} s the road has "
-            f"{with_doubt(self.ratio, self.sd)} of the friction of the drive that taught"
+            f"{with_doubt(self.ratio, self.sd)} of the friction of the identification drive"
         )
 
 
@@ -84,7 +84,7 @@ class RoadFriction(NamedTuple):
 
     @property
     def roads(self) -> tuple[Road, ...]:
-        """Stretches of another friction, each from when that is sure on until it is not likely."""
+        """Segments of another friction, each from when that is sure on until it is not likely."""
         likely = np.concatenate([[False], self.another >= LIKELY, [False]])
         edges, found = np.flatnonzero(likely[1:] != likely[:-1]), []
         for begin, past in zip(edges[::2], edges[1::2], strict=True):
@@ -101,7 +101,7 @@ class RoadFriction(NamedTuple):
         return tuple(found)
 
     @property
-    def as_taught(self) -> bool:
+    def unchanged(self) -> bool:
         """Whether the drive shows, somewhere, that its road has the friction that taught."""
         return bool((1.0 - self.another - self.unexplained >= SURE).any())
 
@@ -128,7 +128,7 @@ def road_friction(
     windows = found.windows
     grid = np.log(np.geomspace(LEAST, MOST, COUNT))
     grid = np.insert(grid, np.searchsorted(grid, 0.0), 0.0)
-    if not all(one.learnt for one in model.estimates() if one.title == GRIP):
+    if not all(one.identified for one in model.estimates() if one.title == GRIP):
         grid = grid[grid <= 0.0]  # a curve that goes on looks like more friction
     away, slope = np.empty((2, grid.size, *found.measured.shape))
     for k, mu in enumerate(np.exp(grid)):

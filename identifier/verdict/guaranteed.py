@@ -40,7 +40,7 @@ _OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
 class BoundViolatedError(TireidError, ValueError):
-    """No tire's curve keeps the bound that was told: the drive contradicts it."""
+    """No tire's curve satisfies the given bound: the drive contradicts it."""
 
 
 def strips_of(model: TireModel, recording: Recording, road: Array | None = None) -> Strips | None:
@@ -106,7 +106,7 @@ def guaranteed(
     t : time of the freeze in the recording's own clock [s]; None is the end.
     model : frozen at that time, which is to carry it, as of `calibrated`; None freezes one.
     """
-    told = None if bound is None else ForceBound.of(bound)
+    given = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
     carries, box = run.model if model is None else model, history.design.possible_tires()
     if box is None or not isinstance(carries, AxleModel):
@@ -116,7 +116,7 @@ def guaranteed(
         strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))
     if strips is None or len(strips.t) < FEWEST:
         return carries
-    chosen = _estimated_bound(strips, box) if told is None else told
+    chosen = _estimated_bound(strips, box) if given is None else given
     corners = []
     for axle in range(2):
         found = possible_weights(strips, axle, chosen, box)
@@ -125,7 +125,7 @@ def guaranteed(
         corners.append(found)
     guarantee = Guarantee(
         bound=chosen,
-        told=told is not None,
+        given=given is not None,
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
         fastest=fastest(strips),
@@ -162,8 +162,8 @@ def _violated(strips: Strips, axle: int, bound: ForceBound, box: HalfSpaces) -> 
     least, late = least_bound(strips, axle, box)
     return BoundViolatedError(
         f"the bound of {bound.error[axle]:g} static axle loads and {bound.lateness[axle]:g} s is "
-        f"violated at the {AXLES[axle]} axle: no tire's curve keeps it from "
-        f"{strips.t[last - 1]:g} s on; the least one that fits is {least:.3g} and {late:.3g} s"
+        f"violated at the {AXLES[axle]} axle: no curve satisfies it from {strips.t[last - 1]:g} s "
+        f"on; the least one that fits is {least:.3g} and {late:.3g} s"
     )
 
 

@@ -99,10 +99,10 @@ def judge(history: History, t: float | None = None) -> Verdict:
     end = float(whole.t[-1]) if t is None else t
     state = {} if history.design.whole else history.state_at(end)
     reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
-    return judge_taught(model, whole, state_index(whole, end), reached)
+    return judge_identification(model, whole, state_index(whole, end), reached)
 
 
-def judge_taught(
+def judge_identification(
     model: TireModel,
     recording: Recording,
     frozen: int | None = None,
@@ -149,7 +149,7 @@ def _asked(
         found = found.where(~other[found.windows.starts])
     if found is None or len(found.windows) < FEWEST:
         return None
-    judged, some = found.but_a_stretch()
+    judged, some = found.but_a_segment()
     left_out = None
     if some is not None:
         t, starts = recording.t[part.samples], found.windows.starts
@@ -239,7 +239,7 @@ def _left_out(asked: Asked) -> Iterator[Objection]:
             f"error {PERCENT * float(asked.found.missed.max()):.0f} % of the force): a sensor that "
             "had not settled, or a banked or slippery segment"
         )
-        yield Objection("stretch", None, text, False)
+        yield Objection("segment", None, text, False)
 
 
 def _unsure(asked: Asked) -> Iterator[Objection]:
@@ -374,7 +374,7 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
     numbers = tuple(
         Number(
             *one.with_missed(float(missed[one.axle])),
-            valid=one.learnt and not refused & {None, one.axle},
+            valid=one.identified and not refused & {None, one.axle},
         )
         for one in model.estimates()
     )

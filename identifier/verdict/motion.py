@@ -21,7 +21,7 @@ from models.vehicle import GRAVITY, Vehicle
 WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
-STRETCH = 0.3  # share of the windows that may be missed in one piece
+SEGMENT = 0.3  # share of the windows that may be missed in one piece
 _REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
 _CONFINED = 0.6  # and of what is missed with the piece
 
@@ -43,7 +43,7 @@ class Windows:
     def of(cls, recording: Recording, min_speed: float) -> "Windows":
         """Return the windows of a recording.
 
-        min_speed : a window counts where the car is never slower [m/s], in one stretch.
+        min_speed : a window counts where the car is never slower [m/s], in one segment.
         """
         return cls.where(recording.v_x >= min_speed, recording, WINDOW)
 
@@ -55,7 +55,7 @@ class Windows:
         length: float,
         overlapping: int = 2,
     ) -> "Windows":
-        """Return the windows of a length in one stretch of which every sample counts.
+        """Return the windows of a length in one segment of which every sample counts.
 
         counts : which samples do (n,).
         length : of a window [s].
@@ -64,7 +64,7 @@ class Windows:
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
         total = np.concatenate([[0], np.cumsum(~counts)])
         whole = total[starts + n + 1] == total[starts] if starts.size else starts > 0
-        whole &= recording.within_a_stretch(starts, n)
+        whole &= recording.within_a_segment(starts, n)
         return cls(starts=starts[whole], n=n, duration=n * recording.dt)
 
     def __len__(self) -> int:
@@ -181,15 +181,15 @@ class Evidence:
             modelled=self.modelled[kept],
         )
 
-    def but_a_stretch(self) -> "tuple[Evidence, tuple[int, int] | None]":
+    def but_a_segment(self) -> "tuple[Evidence, tuple[int, int] | None]":
         """Return what a model is judged by, and which windows are left out of it: first, past last.
 
-        One stretch may be missed, as before a sensor has settled, where all the rest is explained:
-        it is left out. None is where all is explained, or more than one stretch is missed.
+        One segment may be missed, as before a sensor has settled, where all the rest is explained:
+        it is left out. None is where all is explained, or more than one segment is missed.
         """
         if (self.missed <= _REST_MISSED).all():
             return self, None
-        first, last = self.worst_stretch(STRETCH)
+        first, last = self.worst_segment(SEGMENT)
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
         confined = (rest.missed <= np.minimum(_REST_MISSED, _CONFINED * self.missed.max())).all()
@@ -197,8 +197,8 @@ class Evidence:
             return rest, (first, last)
         return self, None
 
-    def worst_stretch(self, share: float) -> tuple[int, int]:
-        """Return the stretch of a share of the windows in which most is missed: first, past
+    def worst_segment(self, share: float) -> tuple[int, int]:
+        """Return the segment of a share of the windows in which most is missed: first, past
         last.
         """
         n = max(1, int(share * len(self.windows)))
@@ -284,7 +284,7 @@ def motion_error(
     """Return what axle forces miss of the measured motion; None where no window counts.
 
     force : lateral axle forces (n, 2) [N], frame of the body.
-    counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
+    counted : samples that count (n,); a window counts where all of its samples do, in one segment.
     """
     windows = Windows.where(counted, recording, _MOMENT, round(_MOMENT / recording.dt))
     if not len(windows):

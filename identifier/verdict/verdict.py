@@ -12,7 +12,7 @@ from identifier.verdict.friction import RoadFriction
 MOST_MISSED = 0.12  # share of the force, rms, that the frozen model may miss at an axle
 PERCENT = 100.0
 
-UNSEEN = (
+UNOBSERVABLE = (
     "a wrong mass, which scales all forces alike: weigh the car",
     "l_f and l_r where all changes are slow, as for a small car: measure them",
 )
@@ -26,7 +26,7 @@ WITHOUT_V_Y = (
 
 
 class Objection(NamedTuple):
-    """What speaks against an answer.
+    """A finding on a model.
 
     code : for machines.   axle : that it is about, None for the car or the drive.
     text : what it means and the likely cause, one line.   refuses : whether it makes it not valid.
@@ -45,11 +45,11 @@ class Objection(NamedTuple):
 
 
 class Number(NamedTuple):
-    """A number that was learnt, or not.
+    """A number of one axle, identified or not.
 
     title, axle : what.   value, unit : how much.   sd : its standard deviation ±, None unknown.
-    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
-    valid : whether it is learnt, within its bounds, and nothing was found against its axle.
+    declared : value in the vehicle file or None.   identified : whether the drive decided it.
+    valid : whether it is identified, within its bounds, and nothing was found against its axle.
     """
 
     title: str
@@ -57,8 +57,8 @@ class Number(NamedTuple):
     value: float
     sd: float | None
     unit: str
-    told: float | None
-    learnt: bool
+    declared: float | None
+    identified: bool
     valid: bool
 
     @property
@@ -69,7 +69,7 @@ class Number(NamedTuple):
     @property
     def state(self) -> str:
         """What it is: "valid", "not valid", or "not identifiable from this drive"."""
-        if not self.learnt:
+        if not self.identified:
             return NOT_IDENTIFIABLE
         return "valid" if self.valid else "not valid"
 
@@ -77,7 +77,7 @@ class Number(NamedTuple):
 class WindowForces(NamedTuple):
     """Forces over the windows that an answer is judged by [static axle loads].
 
-    t : middle of each window (m,) [s].   measured : mean force that the motion shows (m, 2).
+    t : middle of each window (m,) [s].   measured : mean force in the motion (m, 2).
     modelled : that of the model (m, 2).
     """
 
@@ -88,18 +88,18 @@ class WindowForces(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Verdict:
-    """Whether an answer is good, and all that speaks against it.
+    """Whether a model is valid, and the findings.
 
     Parameters
     ----------
-    findings : those that refuse first.
-    numbers : what was learnt, each with its doubt.
+    findings : rejections first.
+    numbers : the estimates, each with its standard deviation.
     measures : what was measured on the way, by name, front and rear or one value.
     reach : range of speed and slip that the drives covered, in words; empty where unknown.
-    blind : what more nobody can see of this drive.
-    friction : of the drive's road over that of the drive that taught a stored model, window by
-        window; None of a run, and where nobody can tell.
-    shown : what the motion shows and what the model says, window by window; None where too little
+    blind : what else is not observable in this drive.
+    friction : of the road over that of the identification drive, window by window; None of a run,
+        and where not observable.
+    shown : force in the motion and of the model, window by window; None where too little
         is driven.
     """
 
@@ -113,7 +113,7 @@ class Verdict:
 
     @property
     def valid(self) -> bool:
-        """Whether nothing was found that refuses the answer."""
+        """Whether no finding rejects the model."""
         return not any(finding.refuses for finding in self.findings)
 
     @property
@@ -131,7 +131,7 @@ class Verdict:
 
     @property
     def force_missed(self) -> tuple[float, ...] | None:
-        """Share [-] of the force that the motion shows which the model misses, front and rear.
+        """Error of the model over the force in the motion [-], front and rear.
 
         None where too little is driven.
         """
@@ -145,20 +145,20 @@ class Verdict:
             return ""
         front, rear = (f"{PERCENT * share:.1f}" for share in self.force_missed)
         return (
-            f"missed of the force that the motion shows: {front} / {rear} % (front / rear, limit "
+            f"model error over the force in the motion: {front} / {rear} % (front / rear, limit "
             f"{PERCENT * MOST_MISSED:.0f} %)"
         )
 
     @property
-    def unseen(self) -> tuple[str, ...]:
-        """What nobody can see, a line each."""
-        return tuple(f"not seen: {text}" for text in (*UNSEEN, *self.blind))
+    def unobservable(self) -> tuple[str, ...]:
+        """What is not observable, a line each."""
+        return tuple(f"not observable: {text}" for text in (*UNOBSERVABLE, *self.blind))
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Headline, what is missed, a line for each finding, and what nobody can see."""
+        """Headline, model error, a line for each finding, and what is not observable."""
         missed = (self.missed_line,) if self.missed_line else ()
-        return (self.headline, *missed, *(one.line for one in self.findings), *self.unseen)
+        return (self.headline, *missed, *(one.line for one in self.findings), *self.unobservable)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain numbers and words, ready for JSON."""
@@ -168,7 +168,7 @@ class Verdict:
             "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
             "measures": dict(self.measures),
             "reach": self.reach,
-            "unseen": [*UNSEEN, *self.blind],
+            "not_observable": [*UNOBSERVABLE, *self.blind],
         }
 
     def __repr__(self) -> str:

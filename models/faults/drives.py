@@ -250,7 +250,7 @@ class ShiftedCenter:
 
     def __str__(self) -> str:
         """Return it in words."""
-        return f"c.g. told {100.0 * self.share:g} % of the wheelbase too far back"
+        return f"c.g. declared {100.0 * self.share:g} % of the wheelbase too far back"
 
     def tell(self, vehicle: Vehicle) -> Vehicle:
         """Return the car as it is told."""
@@ -260,13 +260,13 @@ class ShiftedCenter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnotherCar:
-    """Another car told than the one that drove: the file of a 1:10 car for one of two tons."""
+    """Another declared car than the one that drove: the file of a 1:10 car for one of two tons."""
 
-    told: Vehicle
+    declared: Vehicle
 
     def __str__(self) -> str:
         """Return it in words."""
-        return f"told to be {self.told.name}"
+        return f"declared as {self.declared.name}"
 
     def tell(self, vehicle: Vehicle) -> Vehicle:
         """Return that other car, whatever car drove.
@@ -274,4 +274,4 @@ class AnotherCar:
         vehicle : that drove; not looked at.
         """
         del vehicle
-        return self.told
+        return self.declared

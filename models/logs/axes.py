@@ -15,7 +15,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.log import Channel
-from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_told, quantities
+from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_given, quantities
 
 LETTERS = "xyz"
 STEP, WINDOW = 0.1, 0.3  # [s] between instants, and over which means are taken there
@@ -76,7 +76,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
         letter, rest = split
         stems = {word for word in rest if word != "?"}
         likely = [one for one in (RATE, ACCELERATION, SPEED) if stems & set(_STEMS[one].split())]
-        if is_told(units[name]):
+        if is_given(units[name]):
             told = quantities(units[name])
             likely = [one for one in (RATE, ACCELERATION, SPEED) if one in told]
         if likely:

@@ -98,8 +98,8 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     """Read the frames of a log that a DBC knows and list their signals."""
     if dbc is None:
         raise RecordingError(
-            f"{path}: holds frames of a bus; give the DBC file that tells their signals, in the "
-            '[file] of log.toml: dbc = "car.dbc"'
+            f"{path}: has frames of a bus; give the DBC file of their signals, "
+            'in the [file] of log.toml: dbc = "car.dbc"'
         )
     told = _read_dbc(dbc)
     with one_line(path, "a CAN log"):

@@ -8,7 +8,7 @@ costs 1.0, 1.04 and 1.2 times the error of models that were taught at full rate;
 held cost 1.2, 1.8 and 2.2 times (`benchmarks/several_rates.py`: random cars, CarMaker).
 
 A gap is where a channel has no sample for longer than `LONGEST_GAP`, or than 2.5 of its own
-intervals: a car can build up or lose all its lateral force meanwhile. It ends a stretch.
+intervals: a car can build up or lose all its lateral force meanwhile. It ends a segment.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +28,7 @@ _OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slo
 _ON_STEP = 0.01  # share of a step within which an instant is that of a sample
 
 
-class Stretch(NamedTuple):
+class Segment(NamedTuple):
     """Signals on one clock without a gap: t (n,) and by name (n,)."""
 
     t: Array
@@ -116,8 +116,8 @@ def are_one_clock(raws: Sequence[Raw]) -> bool:
     return all(raw.t is first or np.array_equal(raw.t, first) for raw in raws[1:])
 
 
-def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Stretch]:
-    """Return signals of several clocks on one, in the stretches in which all of them are there.
+def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Segment]:
+    """Return signals of several clocks on one, in the segments in which all of them are there.
 
     Clocks of the calendar are compared since their first instant, to the microsecond.
 
@@ -140,13 +140,13 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
         own = inside[: grid.size]
         if own.size == grid.size and np.abs(own - grid).max() <= 1e-6 * dt:
             grid = own  # its very numbers, where they are the clock
-        found.append(Stretch(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
+        found.append(Segment(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
     return found
 
 
-def _later(stretch: Stretch, zero: float) -> Stretch:
-    t = stretch.t
-    return stretch._replace(t=filled(t.size, lambda part: t[part] + zero))
+def _later(segment: Segment, zero: float) -> Segment:
+    t = segment.t
+    return segment._replace(t=filled(t.size, lambda part: t[part] + zero))
 
 
 def _interval(t: Array) -> float:

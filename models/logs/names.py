@@ -42,7 +42,7 @@ from models.logs.units import (
     LENGTH,
     RATE,
     SPEED,
-    is_told,
+    is_given,
     quantities,
     to_si,
     unit_of_range,
@@ -61,7 +61,7 @@ _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is told, "" SI.
 UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
-_OBLIQUE = "its box lies oblique: no axis of it is one of the car"
+_OBLIQUE = "its box is mounted obliquely: no axis of it is one of the car"
 SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
@@ -291,7 +291,7 @@ def _is_hint(signal: str, one: Heading) -> bool:
     """Return whether a word of a name and its unit let a channel be what no rule knows."""
     words = _with_parts(words_of(_field(one.name)))
     starts = _HINTS.get(signal, ())
-    fits = is_told(one.unit) and QUANTITIES[signal] in quantities(one.unit)
+    fits = is_given(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
     return fits and named and not words & RULES[signal].never
 
@@ -348,9 +348,9 @@ _NO_POSE = set(TABLES["pose"]["never"].split())
 def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
     groups: dict[str, dict[str, Heading]] = {}
-    for one in map(_with_told_unit, headings):
+    for one in map(_with_given_unit, headings):
         words = "_".join(words_of(without_ending(one.name, one.unit)))
-        told = quantities(one.unit) if is_told(one.unit) else (LENGTH, ANGLE)
+        told = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
@@ -369,7 +369,7 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     some = whole[measured[0]]
     sure = KNOWN if len(measured) == 1 else HINT
     why = "" if len(measured) == 1 else "there are several poses"
-    lost = _NO_UNIT_LOSS if measured[0] and not is_told(some["x"].unit) else 0.0
+    lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
     turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
     channels = {"x": [some["x"].name], "y": [some["y"].name], "heading": turned}
@@ -393,7 +393,7 @@ def _with_signs(
     signs: dict[frozenset[str], str] = {}
     for one in headings:
         words = frozenset(words_of(one.name))
-        if words & SIGN and not is_told(one.unit):
+        if words & SIGN and not is_given(one.unit):
             signs[words - SIGN] = one.name
 
     def completed(guess: Guess) -> Guess:
@@ -408,7 +408,7 @@ def _with_signs(
 
 def _triads(headings: Sequence[Heading]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z."""
-    named = map(_with_told_unit, headings)
+    named = map(_with_given_unit, headings)
     units = {one.name: told.unit for one, told in zip(headings, named, strict=True)}
     words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
     bad = REFERENCE | CORNERS
@@ -433,7 +433,7 @@ def _along_axes(
 
     speed = best("v_x") or _of_a_triad(candidates["v_x"])
     found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
-    units = {one.name: _with_told_unit(one).unit.strip() for one in headings}
+    units = {one.name: _with_given_unit(one).unit.strip() for one in headings}
     mended = {
         name: [
             replace(_said(one, _OBLIQUE), confidence=min(one.confidence, HINT))
@@ -445,7 +445,7 @@ def _along_axes(
         for name, some in candidates.items()
     }
     for one in found.axes:
-        near = KNOWN if is_told(units[one.name]) else KNOWN - _NO_UNIT_LOSS
+        near = KNOWN if is_given(units[one.name]) else KNOWN - _NO_UNIT_LOSS
         guess = Guess(
             channel=(one.name,),
             confidence=near,
@@ -470,7 +470,7 @@ def _rank(guess: Guess) -> tuple[bool, float]:
 
 def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -> bool:
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
-    if len(one.channel) + len(other.channel) > 2 or _is_told(one) != _is_told(other):
+    if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
     names = (words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
     if len(set(names)) > 1:
@@ -510,7 +510,7 @@ def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]
 def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     """Return the channels whose names and units may be a signal."""
     found = []
-    listed = [_with_told_unit(one) for one in headings]
+    listed = [_with_given_unit(one) for one in headings]
     for one in listed:
         names = {without_ending(one.name, one.unit)}
         names |= {one.name} if one.name.lower().endswith("_g") else set()  # "lat_g" is in g, and g
@@ -531,15 +531,15 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     return found
 
 
-def _with_told_unit(one: Heading) -> Heading:
+def _with_given_unit(one: Heading) -> Heading:
     """Return a heading with the unit that its name ends in, where the file tells none."""
-    return one if is_told(one.unit) else Heading(one.name, unit_in_name(one.name))
+    return one if is_given(one.unit) else Heading(one.name, unit_in_name(one.name))
 
 
 def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     """Return a guess by what the unit says of it."""
     quantity = quantity_of(signal, one.unit)
-    if not is_told(one.unit):
+    if not is_given(one.unit):
         if guess.confidence == _STANDARD:  # names of ours are in SI, as the documents say
             return guess
         loss = guess.confidence - _NO_UNIT_LOSS
@@ -572,7 +572,7 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     for one in listed:
         found = _corner(words_of(one.name))
         quantity = QUANTITIES[signal]
-        fits = not is_told(one.unit) or quantity in quantities(one.unit)
+        fits = not is_given(one.unit) or quantity in quantities(one.unit)
         if found and fits and not found[1] & REFERENCE:
             by_corner.setdefault(found, one)
     pairs = []
@@ -664,15 +664,15 @@ def _beside_turning(
     for name in UNTOLD:
         mended[name] = [
             guess
-            if _is_told(guess) or guess.confidence == 0.0
+            if _is_given(guess) or guess.confidence == 0.0
             else _in_turning(name, {**best, name: guess}, seen)
             for guess in candidates[name]
         ]
     for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
         first = next((one for one in mended[like] if one.channel == _channel_of(best, like)), None)
-        if first is not None and first.unit and not _is_told(best[like]):
+        if first is not None and first.unit and not _is_given(best[like]):
             mended[name] = [
-                guess if _is_told(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
+                guess if _is_given(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
                 for guess in candidates[name]
             ]
     return mended
@@ -682,7 +682,7 @@ def _channel_of(there: Mapping[str, Guess], name: str) -> tuple[str, ...]:
     return there[name].channel if name in there else ()
 
 
-def _is_told(guess: Guess) -> bool:
+def _is_given(guess: Guess) -> bool:
     """Return whether the unit of a guess is known; names of ours are in SI."""
     return bool(guess.unit) or guess.confidence == _STANDARD
 
@@ -702,7 +702,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         }
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
-    choices = [(one.unit,) if _is_told(one) else UNTOLD[key] for key, one in there.items()]
+    choices = [(one.unit,) if _is_given(one) else UNTOLD[key] for key, one in there.items()]
     nearest = min(itertools.product(*choices), key=far)
     unit = nearest[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess

@@ -43,13 +43,13 @@ _POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
 _COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
 _MAYBE_INSTANT = re.compile(r"(?=.*\d).*[-:/.]\w.*")
 # A rate or an interval of samples that a preamble tells: "Sample Rate","100.000","Hz".
-_TOLD_RATE = re.compile(
+_GIVEN_RATE = re.compile(
     r"(?i)(?:sampl\w*[ _]*(?:rate|freq\w*)|abtast(?:rate|frequenz)|\bfs\b"
     r"|(?:log|logging|data)[ _]*rate)"
     r"[^\d\n]{0,20}(\d+(?:\.\d+)?)(?:\W{0,5}(k?hz|sps|1/s)\b)?"
     r"|(?:rate|freq\w*)[^\d\n]{0,20}(\d+(?:\.\d+)?)\W{0,5}(k?hz|sps)\b"
 )
-_TOLD_STEP = re.compile(
+_GIVEN_STEP = re.compile(
     r"(?i)(?:(?:sampl\w*|time)[ _]*(?:interval|period|time|step)|abtastzeit"
     r"|delta[ _]?[xt]\b|\bd[tx]\b)"
     r"[^\d\n]{0,20}(\d*\.?\d+(?:e-?\d+)?)(?:\W{0,5}(ms|us|s|sec)\b)?"
@@ -297,7 +297,8 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     if way.delimiter == "," and len(names) * 2 in (width, width + 1):
         raise RecordingError(
             f"{path}: line {lines[first].number} has {width} cells, the header has {len(names)}: "
-            "decimal commas cannot be told from commas between cells; export with semicolons"
+            "decimal commas cannot be distinguished from commas between cells; export with "
+            "semicolons"
         )
     while len(names) > width and (not names[-1] or names[-1] == "Comment") and len(names) > 1:
         names.pop()  # the header alone ends in a delimiter, or in LabVIEW's Comment
@@ -339,17 +340,17 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         rows=data,
         words=tuple(words),
         made_by=made_by,
-        rate=_told_rate([line.text for line in lines[: lines.index(names_line)]]),
+        rate=_given_rate([line.text for line in lines[: lines.index(names_line)]]),
     )
 
 
-def _told_rate(preamble: Sequence[str]) -> float:
+def _given_rate(preamble: Sequence[str]) -> float:
     """Return the samples per second that a preamble tells [Hz]; 0 where it tells none."""
     for line in preamble:
-        if found := _TOLD_RATE.search(line):
+        if found := _GIVEN_RATE.search(line):
             kilo = (found[2] or found[4] or "").lower().startswith("k")
             rate = float(found[1] or found[3]) * (1e3 if kilo else 1.0)
-        elif found := _TOLD_STEP.search(line):
+        elif found := _GIVEN_STEP.search(line):
             step = float(found[1])
             rate = PER_SECOND[time_unit(found[2] or "s")] / step if step else 0.0
         else:

@@ -72,7 +72,7 @@ SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
-def told_by(signals: Iterable[str]) -> set[str]:
+def given_by(signals: Iterable[str]) -> set[str]:
     """Return what signals tell, by name; beta tells v_y, wheels v_x, a pose v_x, v_y and r."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
     told = {stands_for.get(name, name) for name in signals}
@@ -211,7 +211,7 @@ def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
         if (signal.table or signal.ratio != 1.0) and name not in ("delta_f", "delta_r"):
             raise RecordingError(f"{where}signals.{name} can have no ratio or table: no steering")
     if BETA in signals and "v_y" in signals:
-        raise RecordingError(f"{where}signals.beta stands in for v_y: give one of them")
+        raise RecordingError(f"{where}signals.beta replaces v_y: give one of them")
     if 0 < len(set(POSE) & set(signals)) < len(POSE):
         raise RecordingError(f"{where}x, y and heading are a pose together: give all three")
     if ("Fyf" in signals) != ("Fyr" in signals):

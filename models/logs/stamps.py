@@ -126,7 +126,7 @@ def no_clock(
     even = [one.name for one in _even(names, units, head, ())]
     if len(even) > 1:
         return (
-            f"several columns rise evenly ({', '.join(even[:3])}): tell the time by "
+            f"several columns rise evenly ({', '.join(even[:3])}): declare the time by "
             f'--columns "t={even[0]}"'
         )
     way = [name for name, unit in zip(names, units, strict=True) if _is_way(name, unit)]
@@ -226,7 +226,7 @@ def _is_beside(
     return abs(steps[0] / steps[1] - 1.0) > _OTHER_RATE
 
 
-def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
+def given_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
     """Return a column that is said to be the time; None where its cells are none.
 
     column : from 0.
@@ -748,7 +748,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])
     moves = int(np.count_nonzero(steps > 0.0))
     if k == 0 and not moves:
-        return said + "it never moves: tell the column that is the time"
+        return said + "it never moves: declare the column of the time"
     if moves and steps.size / moves >= SHARED:
         return said + (
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "

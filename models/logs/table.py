@@ -28,11 +28,11 @@ from models.logs.stamps import (
     MISSING,
     Stamps,
     find_clock,
+    given_clock,
     no_clock,
     own_clocks,
     seconds,
     started,
-    told_clock,
     typical_rate,
 )
 from models.schema import LONGEST_NAME, limits, require_few
@@ -260,7 +260,7 @@ class TableLog:
             name = bare[0] if len(bare) == 1 else name
         (column,) = chosen(self.path, [name], self._places)
         unit = self.clock_unit or table.units[column] or unit_in_name(self.clock_name)
-        told = told_clock(column, name, unit, table.first_rows(column))
+        told = given_clock(column, name, unit, table.first_rows(column))
         if told is None:
             raise RecordingError(
                 f"{self.path}: {name} must be a time, its first cells are "

@@ -103,7 +103,7 @@ def are_same(one: str, other: str) -> bool:
     )
 
 
-def is_told(unit: str) -> bool:
+def is_given(unit: str) -> bool:
     """Whether a unit is written at all; "-" and the like tell none."""
     return _plain(unit) not in _NO_UNIT
 

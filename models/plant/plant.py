@@ -167,8 +167,8 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
     file = vehicle.require_chassis().tire
     if file is None:
         raise VehicleError(
-            f"vehicle '{vehicle.name}' names no tire file and none was given: say which by "
-            'tire = "my_tire.tir" in its table [chassis]'
+            f"vehicle '{vehicle.name}' names no tire file and none was given: "
+            'declare it by tire = "my_tire.tir" in its table [chassis]'
         )
     path = os.fspath(file)
     tire = MagicFormula.from_tir(path)

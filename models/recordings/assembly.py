@@ -1,4 +1,4 @@
-"""From a log to a recording: the channels that were chosen in SI, on one clock, in stretches."""
+"""From a log to a recording: the channels that were chosen in SI, on one clock, in segments."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from codegen.arrays import Array, filled
 from models.logs.clock import (
     SLOWEST,
     Raw,
-    Stretch,
+    Segment,
     are_one_clock,
     gaps,
     holes,
@@ -33,7 +33,7 @@ from models.logs.signals import (
     quantity_of,
     signed,
 )
-from models.logs.units import is_told, to_si
+from models.logs.units import is_given, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
 from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.pose import with_pose
@@ -46,11 +46,11 @@ from models.recordings.record import (
     side_by_side,
 )
 from models.recordings.rolled import rolled
-from models.recordings.wheel_scale import Scale, learnt_scales, scale_text, wheel_factor
+from models.recordings.wheel_scale import Scale, identified_scales, scale_text, wheel_factor
 from models.schema import require_few
 
 FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
-SHORTEST = 1.0  # [s]: a stretch of less teaches nothing, since learning waits half a second
+SHORTEST = 1.0  # [s]: a segment of less teaches nothing, since learning waits half a second
 _FIELDS = {
     "Fyf": "axle_force",
     "Fyr": "axle_force",
@@ -65,10 +65,10 @@ _FIELDS = {
 T = TypeVar("T")
 
 
-class Stretches(NamedTuple):
+class Segments(NamedTuple):
     """Those that are kept, and how many are too short to be."""
 
-    kept: list[Stretch]
+    kept: list[Segment]
     short: int
 
 
@@ -101,7 +101,7 @@ def recording_of(
     try:
         parts = _channels(log, label, signals, log_map, run)
         signals, parts, posed = with_pose(label, signals, parts)
-        stretches = _stretches(label, signals, parts, log_map, dt)
+        segments = _segments(label, signals, parts, log_map, dt)
     except RecordingError as error:
         needed = {
             key: one
@@ -114,23 +114,23 @@ def recording_of(
         signals, spared = needed, f"{left} is left aside: {error}"
         parts = _channels(log, label, signals, log_map, run)
         signals, parts, posed = with_pose(label, signals, parts)
-        stretches = _stretches(label, signals, parts, log_map, dt)
+        segments = _segments(label, signals, parts, log_map, dt)
     rolls = ""
     if has_wheels(signals):
-        kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
-        stretches = stretches._replace(kept=kept)
+        kept, rolls = _on_wheels(label, segments.kept, log_map, dt)
+        segments = segments._replace(kept=kept)
     of_pose = {column_of(name) for name, one in signals.items() if one.channel == ("pose",)}
     kept = (one for one in reading.notes if one.partition(" is taken from ")[0] not in of_pose)
     notes = (*_notes(log), *kept)
     notes += _hole_notes(parts)
-    notes += _gap_notes(stretches.kept)
+    notes += _gap_notes(segments.kept)
     notes += tuple(note for note in (*posed, learnt, rolls, spared) if note)
-    if stretches.short:
-        several = "es" if stretches.short > 1 else ""
-        notes += (f"left out: {stretches.short} stretch{several} of less than {_shortest(dt):g} s",)
+    if segments.short:
+        several = "s" if segments.short > 1 else ""
+        notes += (f"left out: {segments.short} segment{several} of less than {_shortest(dt):g} s",)
     recordings = [
         _recording(name if run is None else f"{name}:{run}", one, log_map, dt)
-        for one in stretches.kept
+        for one in segments.kept
     ]
     whole = joined(recordings, recordings[0].name)
     return replace(whole, notes=notes) if notes else whole
@@ -165,7 +165,7 @@ def _channels(
         for name in signal.channel:
             logged, cut = by_name[name], log_map.holes == CUT
             channel = without_empty(logged, cut=cut)
-            unit = signal.unit if is_told(signal.unit) else channel.unit
+            unit = signal.unit if is_given(signal.unit) else channel.unit
             what = f"{label}: {column_of(ours)}"
             what += "" if name == column_of(ours) else f" (channel {name!r})"
             factor = to_si(unit, quantity_of(ours, unit), what)
@@ -218,14 +218,14 @@ def _require_of_a_car(label: str, name: str, values: Array, channel: Channel) ->
         )
 
 
-def _stretches(
+def _segments(
     label: str,
     signals: Mapping[str, Signal],
     parts: Mapping[str, list[Raw]],
     log_map: LogMap,
     dt: float,
-) -> Stretches:
-    """Return the signals on one clock, in the stretches between gaps; at least one."""
+) -> Segments:
+    """Return the signals on one clock, in the segments between gaps; at least one."""
     raws = {f"{name}/{k}": raw for name, listed in parts.items() for k, raw in enumerate(listed)}
     for raw in {id(raw.t): raw for raw in raws.values()}.values():
         _judge_time(label, raw)
@@ -248,10 +248,10 @@ def _stretches(
         for piece in _pieces(first.t, log_map.longest_gap):
             if piece.stop - piece.start > 1:
                 cut = {name: values[piece] for name, values in columns.items()}
-                found.append(Stretch(*resample(first.t[piece], cut, dt)))
+                found.append(Segment(*resample(first.t[piece], cut, dt)))
     else:
         separate = on_one_clock(raws, dt, log_map.longest_gap)
-        found = [Stretch(one.t, combined(one.signals)) for one in separate]
+        found = [Segment(one.t, combined(one.signals)) for one in separate]
     if not found:
         raise RecordingError(
             f"{label}: at no time are all channels sampled: they must overlap in time"
@@ -264,11 +264,11 @@ def _stretches(
             f"{label}: the run lasts {t[-1] - t[0]:.4g} s, at least {MINIMUM_SAMPLES} steps of "
             f"{dt:g} s are needed"
         )
-    return Stretches(kept, len(found) - len(kept))
+    return Segments(kept, len(found) - len(kept))
 
 
 def _shortest(dt: float) -> float:
-    """Return how long a stretch must be [s]: to teach something, and to be a recording."""
+    """Return how long a segment must be [s]: to teach something, and to be a recording."""
     return max(SHORTEST, MINIMUM_SAMPLES * dt)
 
 
@@ -310,27 +310,27 @@ def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
     return (f"cells without a value are cut out: {told}",)
 
 
-def _gap_notes(stretches: list[Stretch]) -> tuple[str, ...]:
+def _gap_notes(segments: list[Segment]) -> tuple[str, ...]:
     """Return what is to be said of gaps."""
-    if len(stretches) < 2:
+    if len(segments) < 2:
         return ()
-    times = [after.t[0] - before.t[-1] for before, after in pairwise(stretches)]
+    times = [after.t[0] - before.t[-1] for before, after in pairwise(segments)]
     longest = int(np.argmax(times))
     return (
-        f"gaps cut the log into {len(stretches)} stretches that are learnt on as one drive; the "
-        f"longest lasts {times[longest]:.3g} s, after {stretches[longest].t[-1]:.6g} s",
+        f"gaps cut the log into {len(segments)} segments that are used as one drive; the "
+        f"longest lasts {times[longest]:.3g} s, after {segments[longest].t[-1]:.6g} s",
     )
 
 
 _LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
 
 
-def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recording:
-    """Return one stretch as a recording, in ISO axes, filtered where the map says so."""
-    t, sign = stretch.t, AXES[log_map.axes]
+def _recording(name: str, segment: Segment, log_map: LogMap, dt: float) -> Recording:
+    """Return one segment as a recording, in ISO axes, filtered where the map says so."""
+    t, sign = segment.t, AXES[log_map.axes]
     signals = {
         key: values if key in ("v_x", "a_x") else scaled(values, sign)
-        for key, values in stretch.signals.items()
+        for key, values in segment.signals.items()
     }
     if log_map.low_pass is not None:
         signals = {key: _low_pass(name, one, log_map.low_pass, dt) for key, one in signals.items()}
@@ -364,7 +364,7 @@ def wheel_scales(
     headings = log.headings()
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
     parts = _channels(log, str(log.path), of_wheels, log_map, run)
-    return learnt_scales(parts, of_wheels, wheel_units(headings, of_wheels))
+    return identified_scales(parts, of_wheels, wheel_units(headings, of_wheels))
 
 
 def _scale_note(
@@ -374,14 +374,14 @@ def _scale_note(
     try:
         return scale_text(wheel_scales(log, signals, log_map, run))
     except RecordingError as error:
-        return f"of the wheels nothing is learnt: {error}"
+        return f"the wheels are not used: {error}"
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
     """Return the units of wheels, told or else of the file, by signal."""
     units = {one.name: one.unit for one in headings}
     return {
-        name: one.unit if is_told(one.unit) else units[one.channel[0]]
+        name: one.unit if is_given(one.unit) else units[one.channel[0]]
         for name, one in signals.items()
         if name in WHEELS
     }
@@ -392,12 +392,12 @@ def _without_wheels(by_name: Mapping[str, T]) -> dict[str, T]:
 
 
 def _on_wheels(
-    label: str, stretches: Sequence[Stretch], log_map: LogMap, dt: float
-) -> tuple[list[Stretch], str]:
-    """Return stretches with v_x in place of wheels, and how far these were trusted, in words."""
+    label: str, segments: Sequence[Segment], log_map: LogMap, dt: float
+) -> tuple[list[Segment], str]:
+    """Return segments with v_x in place of wheels, and how far these were trusted, in words."""
     found, gated, held, n = [], 0, 0, 0
     wheels, repair, sign = log_map.wheels, log_map.repair, AXES[log_map.axes]
-    for one in stretches:
+    for one in segments:
         still = np.zeros(one.t.size)
         speeds = {name: values for name, values in one.signals.items() if name in WHEELS}
         turns = {  # as they were driven: wheels are brought to the center of gravity by them
@@ -412,10 +412,11 @@ def _on_wheels(
         signals = {"v_x": told.v_x, **_without_wheels(one.signals)}
         found.append(one._replace(signals=signals))
         gated, held, n = gated + told.gated, held + told.held, n + one.t.size
-    names = ", ".join(name for name in WHEELS if name in stretches[0].signals)
+    names = ", ".join(name for name in WHEELS if name in segments[0].signals)
     return found, (
-        f"vx is made of {names}: at {100.0 * gated / n:.2g} % of the samples a wheel slipped and "
-        f"was left out, at {100.0 * held / n:.2g} % all were, and the speed went on as before"
+        f"vx is computed from {names}: at {100.0 * gated / n:.2g} % of the samples a wheel "
+        f"slipped and was left out, at {100.0 * held / n:.2g} % all were, and the speed went on "
+        "as before"
     )
 
 

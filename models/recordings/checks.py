@@ -41,7 +41,7 @@ _COPY = 1e-4  # of a channel, rms, that is left of it beside another one which i
 _LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
 _SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
 _LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
-DOCTOR = "tireid doctor LOG --vehicle FILE says what else may be wrong, and repairs it"
+DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
 LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 
 
@@ -128,7 +128,7 @@ def _check_signs_are_there(recording: Recording) -> str | None:
         if min(on_left, on_right) > 1.5 * max(between, 0.0) and min(on_left, on_right) > 0.0:
             return (
                 f"{name} must be negative to the right, it never is, and as large there as to the "
-                f"left: an amount whose sign stands in a channel of its own? multiply by that"
+                f"left: an amount with its sign in another channel? multiply by that"
             )
     return None
 
@@ -189,9 +189,7 @@ def _check_turns(w: Means) -> str | None:
             return f"r contradicts ay: {law}; r must be positive to the left, change its sign"
         if turned_a:
             return f"{law}; change the sign of ay (positive to the left)"
-        return (
-            f"r and ay contradict one another: {law}; nobody can tell which, look at one left turn"
-        )
+        return f"r and ay contradict one another: {law}; ambiguous, look at one left turn"
     if r_delta.sign < 0 and a_delta.sign >= 0 and r_a.sign > 0:
         return _check_two(r_delta)  # a_y says nothing of the steering
     if (
@@ -535,7 +533,7 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
     together = correlation(alpha, a)
     if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
         return None
-    car = f"name the right vehicle, of which l_r = {l_r:g} m is told"
+    car = f"name the right vehicle; this file declares l_r = {l_r:g} m"
     place = "move vy to the center of gravity"
     remedy = f"change the sign of vy{other or f', or {car}'}, or {place}"
     if w.a_y is not None:

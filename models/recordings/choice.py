@@ -23,9 +23,9 @@ from models.logs.signals import (
     SPARED,
     WHEELS,
     Signal,
+    given_by,
     require_fitting,
     signal_name,
-    told_by,
 )
 from models.logs.spelling import without_unit
 from models.logs.units import SI
@@ -109,9 +109,9 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     sure = {name: one for name, one in proposal.signals().items() if name not in told}
     if has_wheels(told):
         sure.pop("v_x", None)
-    if "v_y" in told_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
+    if "v_y" in given_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
         sure = {name: one for name, one in sure.items() if name not in POSE}
-    if "v_x" in told_by(told) or "v_x" in proposal.guesses:
+    if "v_x" in given_by(told) or "v_x" in proposal.guesses:
         sure = {name: one for name, one in sure.items() if name not in WHEELS}
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
@@ -199,12 +199,12 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
 
 def has_v_y(signals: Mapping[str, Signal]) -> bool:
     """Return whether a lateral velocity is read, or the sideslip angle in its place."""
-    return "v_y" in told_by(signals)
+    return "v_y" in given_by(signals)
 
 
 def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     """Return the needed signals that are not there; without v_y it is estimated from a_y."""
-    there = told_by(signals) | ({"v_y"} if "a_y" in signals else set())
+    there = given_by(signals) | ({"v_y"} if "a_y" in signals else set())
     return [name for name in NEEDED if name not in there]
 
 
@@ -225,7 +225,7 @@ def _lost_text(told: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tupl
     if "v_x" not in told or "v_x" in listed:
         return ()
     channels = " + ".join(told["v_x"].channel)
-    return (f"there is no column {shown(channels)}: vx is made of the wheels",)
+    return (f"there is no column {shown(channels)}: vx is computed from the wheels",)
 
 
 def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
@@ -235,13 +235,13 @@ def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
         if "a_y" in found or a_y is None or a_y.confidence < HINT:
             return ""
         likely, word = likely_text("a_y", proposal), column_word("a_y", proposal)
-        return f"ay is left aside, as it is not sure: {likely}; tell it by --columns {word}"
+        return f"ay is left aside, as it is not sure: {likely}; declare it by --columns {word}"
     said = "no lateral velocity is read: vy is to be estimated"
     name = next(iter(stand_ins("v_y", proposal)), "a_y")
     if name == "a_y":
         return said
     likely, word = likely_text(name, proposal), column_word(name, proposal)
-    return f"{said}; if {likely} is one, tell it by --columns {word}"
+    return f"{said}; if {likely} is one, declare it by --columns {word}"
 
 
 def aside_signals(found: Mapping[str, Signal], proposal: Proposal) -> list[str]:
@@ -271,7 +271,7 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
         columns = columns.replace("vy", "vy (or ay, from which it is estimated)", 1)
     said = f"{log.path}: column {columns} is missing; "
     if parts:
-        said += f"did you mean {', '.join(parts)}? tell it by --columns {' '.join(words)}; "
+        said += f"did you mean {', '.join(parts)}? declare it by --columns {' '.join(words)}; "
     else:
         said += f"tireid channels {log.path} lists what is there; "
     return said + listing(names)

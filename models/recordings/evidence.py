@@ -93,7 +93,7 @@ class Pair(NamedTuple):
 def windows(recording: Recording) -> Means:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
-    No window reaches from one stretch into the next.
+    No window reaches from one segment into the next.
 
     Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
     """
@@ -102,7 +102,7 @@ def windows(recording: Recording) -> Means:
     start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1) * thinning(n))
     fast = max(SLOWEST, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
     start = start[_sums(lambda at: (recording.v_x[at] < fast) + 0.0, n, start, width) == 0.0]
-    start = start[recording.within_a_stretch(start, width)]
+    start = start[recording.within_a_segment(start, width)]
 
     def mean(signal: Array, by: Array | None = None) -> Array:
         product = signal.__getitem__ if by is None else lambda at: signal[at] * by[at]
@@ -207,7 +207,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
         return None
     some = np.arange(n)[:: thinning(len(recording))] * width
     some = some[some < (n - 1) * width]
-    some = some[recording.within_a_stretch(some, 2 * width - 1)]
+    some = some[recording.within_a_segment(some, 2 * width - 1)]
 
     def mean(signal: Array, at: NDArray[np.intp]) -> Array:
         means: Array = np.mean([signal[at + k] for k in range(width)], axis=0)

@@ -30,10 +30,10 @@ from models.logs.signals import (
     NEEDED,
     QUANTITIES,
     Signal,
+    given_by,
     quantity_of,
     require_fitting,
     signal_name,
-    told_by,
 )
 from models.logs.units import to_si
 from models.recordings.repair import Repair
@@ -59,8 +59,8 @@ class LogMap:
     run : which of the file's runs; empty where there is one.
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
     clock : channel that is the time, where it is not what the format takes for it; empty else.
-    clock_unit : of that channel; empty takes that of the file, seconds where it tells none.
-    rate : of the samples [Hz], where no channel is a time; None where none is told.
+    clock_unit : of that channel; empty takes that of the file, seconds where it has none.
+    rate : of the samples [Hz], where no channel is a time; None where not declared.
     longest_gap : the log is cut where a channel has no sample for longer [s].
     holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
         has no sample there.
@@ -70,7 +70,7 @@ class LogMap:
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
     wheels : what they are, where v_x is made of their speeds.
-    repair : what is taken out of the recording, and told of the car, after reading.
+    repair : corrections of the recording and of the car, after reading.
 
     Raises
     ------
@@ -103,7 +103,7 @@ class LogMap:
         if self.rate is not None and not 0.0 < self.rate < math.inf:
             raise RecordingError(f"rate must be positive and finite, in Hz, it is {self.rate}")
         if self.rate is not None and self.clock:
-            raise RecordingError("rate stands in for a time: give it or the channel of the clock")
+            raise RecordingError("rate replaces a time: give it or the channel of the clock")
         if self.holes not in (_REFUSE, CUT):
             raise RecordingError(f"holes must be {_REFUSE} or {CUT}, not {shown(self.holes)}")
         if self.order not in (_REFUSE, MEND):
@@ -127,11 +127,11 @@ class LogMap:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every signal that is needed is told: then only what is told is read."""
-        return set(NEEDED) <= told_by(self.signals)
+        """Whether every needed signal is declared: then no other is read."""
+        return set(NEEDED) <= given_by(self.signals)
 
     def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
-        """Return the map with some signals told otherwise; v_y and beta replace one another.
+        """Return the map with some signals declared otherwise; v_y and beta replace one another.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class LogMap:
         Parameters
         ----------
         folder : where the log.toml shall lie: a DBC file in it, or below, is named from there, any
-            other by its whole path. None names it as it is told.
+            other by its whole path. None names it as given.
         """
         if self.dbc and folder is not None:
             return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
@@ -296,7 +296,7 @@ def _value(value: Any) -> str:
 # Signals as a command line tells them: NAME=CHANNEL [UNIT] /RATIO.
 
 
-def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
+def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
     """Return signals as they are told on a command line.
 
     "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
@@ -315,8 +315,8 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
             known = ", ".join(QUANTITIES)
             raise RecordingError(f"{shown(name)} is no column of ours: {known}")
         if ours in found:
-            raise RecordingError(f"--columns tells {name} twice")
-        found[ours] = told_channel(rest)
+            raise RecordingError(f"--columns gives {name} twice")
+        found[ours] = given_channel(rest)
     require_fitting(found, "--columns: ")
     return found
 
@@ -326,7 +326,7 @@ _SIGN = re.compile(r"\s*(?:\*\s*)?\bsign\((?P<channel>.+)\)(?:\s*\*)?\s*")
 _UNIT = re.compile(r"\s+\[(?P<unit>[^\[\]]*)\]$")
 
 
-def told_channel(text: str) -> Signal:
+def given_channel(text: str) -> Signal:
     """Return what stands behind the name in one word of a command line."""
     pair = text
     given: dict[str, Any] = {}
@@ -334,7 +334,7 @@ def told_channel(text: str) -> Signal:
     while found := _CHANGE.search(text):
         key, text = keys[found["sign"]], text[: found.start()]
         if key in given:
-            raise RecordingError(f"--columns tells the {key} of {shown(pair)} twice")
+            raise RecordingError(f"--columns gives the {key} of {shown(pair)} twice")
         try:
             given[key] = float(found["number"])
         except ValueError:

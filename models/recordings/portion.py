@@ -11,17 +11,17 @@ from codegen.arrays import LONG, Array, blocks
 from models.recordings.record import Recording
 from models.vehicle import GRAVITY
 
-STRETCH = 20.0  # s of one, where a quarter of the samples are enough for that
-STEPS = 4  # beginnings that a stretch may have in the time of one
-FEWEST = 4  # stretches, so that there are some on both sides of a middle
-REST = 0.6  # s that the car stands at the end of a stretch: a delay of that leaves the next alone
+SEGMENT = 20.0  # s of one, where a quarter of the samples are enough for that
+STEPS = 4  # beginnings that a segment may have in the time of one
+FEWEST = 4  # segments, so that there are some on both sides of a middle
+REST = 0.6  # s that the car stands at the end of a segment: a delay of that leaves the next alone
 _HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a drive
 
 
 class Portion(NamedTuple):
-    """Stretches of a recording, joined.
+    """Segments of a recording, joined.
 
-    recording : of them; at the end of each stretch the car stands, so that a signal that is moved
+    recording : of them; at the end of each segment the car stands, so that a signal that is moved
     in time leaves the next alone.   samples : which samples of the whole they are (k,).
     """
 
@@ -37,17 +37,17 @@ class Portion(NamedTuple):
 
 
 def portion(recording: Recording, middle: int | None = None) -> Portion:
-    """Return a recording of at most `LONG` samples itself, of a longer one stretches of it.
+    """Return a recording of at most `LONG` samples itself, of a longer one segments of it.
 
-    The recording is divided into parts of one length, and of each the stretch is taken in which the
+    The recording is divided into parts of one length, and of each the segment is taken in which the
     car is turned hardest: by the sum of (v_x r)².
 
-    middle : sample before which half of the stretches shall lie; None spreads them over all.
+    middle : sample before which half of the segments shall lie; None spreads them over all.
     """
     n = len(recording)
     if n <= LONG:
         return Portion(recording, np.arange(n))
-    step = min(round(STRETCH / recording.dt), LONG // FEWEST) // STEPS
+    step = min(round(SEGMENT / recording.dt), LONG // FEWEST) // STEPS
     power = _power(recording, step)
     count = LONG // (STEPS * step)
     if middle is None or not 0 < middle < n:
@@ -58,7 +58,7 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     samples = np.unique(np.add.outer(begins, np.arange(STEPS * step)))
     samples = recording.without_scraps(samples[samples < n])
     taken = recording.taken(samples)
-    ends = np.array([piece.stop for piece in taken.stretches])
+    ends = np.array([piece.stop for piece in taken.segments])
     v_x = taken.v_x.copy()
     v_x[np.maximum(ends[:, None] - 1 - np.arange(round(REST / recording.dt)), 0)] = 0.0
     return Portion(replace(taken, v_x=v_x), samples)
@@ -75,7 +75,7 @@ def _power(recording: Recording, step: int) -> Array:
 
 
 def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list[int]:
-    """Return where the hardest stretch begins of each of `count` parts of samples."""
+    """Return where the hardest segment begins of each of `count` parts of samples."""
     length = STEPS * step
     if last - first <= count * length:
         return list(range(first, last, length))

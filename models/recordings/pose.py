@@ -51,7 +51,7 @@ def with_pose(
     if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
         raise RecordingError(
             f"{label}: the pose never leaves its heading, as one that is integrated from wheels: "
-            "vy is not in it; tell the pose of another sensor, or leave it out"
+            "vy is not in it; give the pose of another sensor, or leave it out"
         )
     found = {name: raws for name, raws in parts.items() if name not in POSE}
     gyro = parts["r"][0] if "r" in parts else None

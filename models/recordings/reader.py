@@ -12,7 +12,7 @@ from models.logs.log import LogFile, RecordingError
 from models.logs.memory import ArrayLog
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
-from models.recordings.map import MEND, LogMap, told_channel, told_signals
+from models.recordings.map import MEND, LogMap, given_channel, given_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
@@ -40,7 +40,7 @@ def read_recording(
     run (text); a unit that the file tells is converted. Others are ignored. Where there are no Fyf
     and Fyr, the
     columns Fyf_inv and Fyr_inv (forces computed backwards from the motion) stand in for them.
-    Signals of other names are told by `columns` or a map; where neither tells them and names and
+    `columns` or a map declare signals of other names; where neither has them and names and
     units leave no doubt, they are taken and the recording's notes say so.
 
     Parameters
@@ -99,7 +99,7 @@ def read_repaired(
     Parameters
     ----------
     path : a log of any format.
-    vehicle : as it was told.
+    vehicle : as it was declared.
     run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
     columns, log_map : as of `read_recording`.
@@ -150,10 +150,10 @@ def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
             f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
         )
     signals = {name: words for name, words in columns.items() if name != "t"}
-    told = told.with_signals(told_signals([f"{a}={b}" for a, b in signals.items()]))
+    told = told.with_signals(given_signals([f"{a}={b}" for a, b in signals.items()]))
     if "t" not in columns:
         return told
-    clock = told_channel(columns["t"])
+    clock = given_channel(columns["t"])
     return replace(told, clock=" + ".join(clock.channel), clock_unit=clock.unit, rate=None)
 
 

@@ -54,7 +54,7 @@ LARGEST = {
 class Recording:
     """Signals of one drive, all of the same length n, uniformly sampled and read-only.
 
-    A drive may consist of stretches, where the log has gaps or there were several: time is uniform
+    A drive may consist of segments, where the log has gaps or there were several: time is uniform
     in each, and nothing is ever differenced from one to the next.
 
     Arrays that nobody may write, as those of a file that is mapped, are kept as they are; others
@@ -63,7 +63,7 @@ class Recording:
     Parameters
     ----------
     name : "FILE:RUN", or "FILE" when the file has no run column.
-    t : time [s], shape (n,), uniform to 2 % of one step in each stretch, and rising.
+    t : time [s], shape (n,), uniform to 2 % of one step in each segment, and rising.
     v_x : forward speed at the center of gravity [m/s], shape (n,).
     v_y : lateral velocity at the center of gravity [m/s], positive to the left, shape (n,), or
         None when it was not logged.
@@ -77,16 +77,15 @@ class Recording:
         push lengthwise, less the drag of the air: v̇_x - v_y r on a level road.
     axle_force : front and rear lateral axle force [N], positive to the left, shape (n, 2), or
         None when there is no truth.
-    breaks : index of the first sample of each stretch but the first, rising.
+    breaks : index of the first sample of each segment but the first, rising.
     notes : what was taken or done in reading beyond the words of the file, one sentence each.
-    estimated : names of signals that no sensor showed but a method told: of v_y only. No method
-        is shown them.
+    estimated : signals that a method estimated, not a sensor: v_y only. No method gets them.
 
     Raises
     ------
     RecordingError
         If lengths differ, a value is not finite or beyond `LARGEST`, time is not uniform, or a
-        stretch has fewer than 10 samples.
+        segment has fewer than 10 samples.
     """
 
     name: str
@@ -107,9 +106,9 @@ class Recording:
         n = np.size(self.t)
         if not set(self.estimated) <= {"v_y"}:
             raise RecordingError(f"{self.name}: estimated may name v_y, not {self.estimated}")
-        for piece in self.stretches:
+        for piece in self.segments:
             if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
-                whole = "a recording" if not self.breaks else "each stretch of a recording"
+                whole = "a recording" if not self.breaks else "each segment of a recording"
                 raise RecordingError(
                     f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
                     f"{max(min(piece.stop, n) - piece.start, 0)}"
@@ -139,7 +138,7 @@ class Recording:
                 )
             object.__setattr__(self, name, array)
         step = self._step
-        for piece in self.stretches:
+        for piece in self.segments:
             off_grid = _off_grid(self.t[piece], step)
             if not (step > 0.0 and off_grid <= JITTER * step):
                 raise RecordingError(
@@ -148,7 +147,7 @@ class Recording:
                 )
             if piece.start and not self.t[piece.start] > self.t[piece.start - 1]:
                 raise RecordingError(
-                    f"{self.name}: t must rise from one stretch to the next, "
+                    f"{self.name}: t must rise from one segment to the next, "
                     f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
                 )
 
@@ -157,14 +156,14 @@ class Recording:
         return int(self.t.size)
 
     @property
-    def stretches(self) -> tuple[slice, ...]:
-        """Samples of each stretch: slices from one break to the next, one where there is none."""
+    def segments(self) -> tuple[slice, ...]:
+        """Samples of each segment: slices from one break to the next, one where there is none."""
         return tuple(
             slice(first, end) for first, end in pairwise((0, *self.breaks, int(np.size(self.t))))
         )
 
-    def within_a_stretch(self, starts: NDArray[np.intp], n: int) -> NDArray[np.bool_]:
-        """Return whether samples from each start to n later lie in one stretch, (m,).
+    def within_a_segment(self, starts: NDArray[np.intp], n: int) -> NDArray[np.bool_]:
+        """Return whether samples from each start to n later lie in one segment, (m,).
 
         Parameters
         ----------
@@ -187,7 +186,7 @@ class Recording:
         return None if "v_y" in self.estimated else self.v_y
 
     def as_logged(self) -> "Recording":
-        """Return it without signals that were estimated, as methods are shown it."""
+        """Return it without estimated signals, as the input of methods."""
         return replace(self, v_y=self.logged_v_y, estimated=()) if self.estimated else self
 
     def needed(self, name: str) -> Array:
@@ -221,13 +220,13 @@ class Recording:
 
     @property
     def _step(self) -> float:
-        """Mean step of time within the stretches [s]."""
+        """Mean step of time within the segments [s]."""
         return self.duration / (self.t.size - 1 - len(self.breaks))
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last sample, without what lies between stretches [s]."""
-        return sum(float(self.t[piece.stop - 1] - self.t[piece.start]) for piece in self.stretches)
+        """Time from the first to the last sample, without what lies between segments [s]."""
+        return sum(float(self.t[piece.stop - 1] - self.t[piece.start]) for piece in self.segments)
 
     def alpha(self, l_f: float, l_r: float, part: slice | NDArray[Any] = ALL) -> Array:
         """Slip angles of the axles in the paper's sign, the negative of ISO 8855.
@@ -251,7 +250,7 @@ class Recording:
         return slip
 
     def between(self, t0: float, t1: float) -> "Recording":
-        """Return the part with t0 <= t <= t1; what it leaves of a stretch as of `taken`.
+        """Return the part with t0 <= t <= t1; what it leaves of a segment as of `taken`.
 
         Parameters
         ----------
@@ -302,9 +301,9 @@ class Recording:
         return pandas.DataFrame(_columns(self))
 
     def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
-        """Return some of the samples; where some are left out between, a stretch begins.
+        """Return some of the samples; where some are left out between, a segment begins.
 
-        What is left of a stretch is left out too where it has fewer than 10 samples, and a note
+        What is left of a segment is left out too where it has fewer than 10 samples, and a note
         says so.
 
         Parameters
@@ -314,13 +313,13 @@ class Recording:
         Raises
         ------
         RecordingError
-            Where no stretch of 10 samples is left.
+            Where no segment of 10 samples is left.
         """
         pieces = self._pieces(kept)
         whole = [piece for piece in pieces if piece.stop - piece.start >= MINIMUM_SAMPLES]
         if not whole:
             raise RecordingError(
-                f"{self.name}: each stretch of a recording needs at least {MINIMUM_SAMPLES} "
+                f"{self.name}: each segment of a recording needs at least {MINIMUM_SAMPLES} "
                 f"samples, of {len(self)} samples none is left that has them"
             )
         scraps = len(pieces) - len(whole)
@@ -337,12 +336,12 @@ class Recording:
         }
         notes = self.notes
         if scraps:
-            several = "es" if scraps > 1 else ""
-            notes += (f"left out: {scraps} stretch{several} of under {MINIMUM_SAMPLES} samples",)
+            several = "s" if scraps > 1 else ""
+            notes += (f"left out: {scraps} segment{several} of under {MINIMUM_SAMPLES} samples",)
         return replace(self, **cut, breaks=tuple(int(k) for k in ends[:-1]), notes=notes)
 
     def without_scraps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Return samples but for those of stretches that `taken` would leave out.
+        """Return samples but for those of segments that `taken` would leave out.
 
         Parameters
         ----------
@@ -353,19 +352,19 @@ class Recording:
         return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
 
     def _pieces(self, kept: slice | NDArray[np.intp]) -> list[slice]:
-        """Return the stretches that samples make, counted from the first of them."""
+        """Return the segments that samples make, counted from the first of them."""
         if isinstance(kept, slice):
             first, end, _ = kept.indices(len(self))
             n, begins = max(end - first, 0), [k - first for k in self.breaks if first < k < end]
         else:
-            stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
-            new = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
+            segment = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
+            new = (np.diff(segment) > 0) | (np.diff(kept) > 1)
             n, begins = kept.size, (np.flatnonzero(new) + 1).tolist()
         return [slice(a, b) for a, b in pairwise((0, *begins, n))]
 
     def __repr__(self) -> str:
         truth = "" if self.axle_force is None else ", with axle forces"
-        pieces = f" in {len(self.stretches)} stretches" if self.breaks else ""
+        pieces = f" in {len(self.segments)} segments" if self.breaks else ""
         return (
             f"<Recording {self.name!r}: {self.t.size} samples{pieces} of {self.dt:g} s at "
             f"{self.v_x.min():.3g} to {self.v_x.max():.3g} m/s{truth}>"
@@ -385,7 +384,7 @@ SIGNALS = ("t", *CHANNELS, "a_x", "axle_force")
 
 
 def joined(recordings: Sequence[Recording], name: str | None = None) -> Recording:
-    """Return several recordings as one drive in stretches, in their order.
+    """Return several recordings as one drive in segments, in their order.
 
     Each keeps its own time where it begins after the one before; else its time is moved to begin
     `PAUSE` after it. Signals that one lacks are left out of all.
@@ -403,8 +402,8 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     for one in recordings[1:]:
         if abs(one.dt - first.dt) > JITTER * first.dt / len(one):
             raise RecordingError(
-                f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs "
-                "that are learnt on together must be brought to one interval"
+                f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs that "
+                f"are used together need one sampling interval"
             )
         end = float(t[n - 1])
         moved = 0.0 if one.t[0] > end + first.dt else end + PAUSE - float(one.t[0])
@@ -500,9 +499,9 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
 
     Columns that the recording lacks are left out. Numbers are the shortest that read back the
     same: `read_recording` gives the recording back bit for bit at its own interval, a drive in
-    stretches where each lasts a second and time leaps by more than 0.1 s between them. Over a
+    segments where each lasts a second and time leaps by more than 0.1 s between them. Over a
     shorter gap a reader draws a line, unless its map tells a shorter `longest_gap`, and shorter
-    stretches it leaves out. The file appears whole or not at all; an existing one is replaced.
+    segments it leaves out. The file appears whole or not at all; an existing one is replaced.
 
     Returns
     -------

@@ -26,7 +26,7 @@ SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, o
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repair:
-    """Numbers that bring a log, and the car told with it, to what was driven; SI throughout.
+    """Corrections of a log and of its declared car; SI throughout.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Repair:
     velocity_sensor_angle : by which that sensor is turned to the left [rad].
     acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
     sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
-    vehicle : numbers of the car in place of the told ones, by their names in `Vehicle`.
+    vehicle : numbers of the car in place of the declared ones, by their names in `Vehicle`.
 
     Raises
     ------
@@ -84,7 +84,7 @@ class Repair:
         Parameters
         ----------
         recording : as it was logged.
-        vehicle : as it was told.
+        vehicle : as it was declared.
 
         Raises
         ------
@@ -116,12 +116,12 @@ class Repair:
             signals["v_y"] = filled(n, lambda k: speed[k] * np.tan(angle[k] * factor) - offset)
         for name, delay in self.delay.items():
             late = signals[name]
-            signals[name] = _by_stretches(recording, partial(_earlier, t, late, delay))
+            signals[name] = _by_segments(recording, partial(_earlier, t, late, delay))
         width = round(SMOOTHED * vehicle.froude_time / recording.dt)
         for name, lag in self.lag.items():
             low = signals[name]
             signals[name] = large((n,))
-            for piece in recording.stretches:
+            for piece in recording.segments:
                 signals[name][piece] = without_low_pass(low[piece], lag, recording.dt, width)
         r = signals["r"]
         if turned:
@@ -131,7 +131,7 @@ class Repair:
             signals["v_y"] = filled(n, lambda k: c * v_y[k] + s * v_x[k] - x * r[k])
         if self.acceleration_sensor_x:
             ahead, a_y = self.acceleration_sensor_x, signals["a_y"]
-            signals["a_y"] = _by_stretches(
+            signals["a_y"] = _by_segments(
                 recording, lambda whole, k: a_y[k] - ahead * _rate(r, whole, k, recording.dt)
             )
         changes: dict[str, Any] = dict(signals)
@@ -146,11 +146,11 @@ class Repair:
         return signal
 
     def on(self, vehicle: Vehicle) -> Vehicle:
-        """Return the car with the numbers that are told in place of its own.
+        """Return the car with the corrected numbers.
 
         Parameters
         ----------
-        vehicle : as it was told.
+        vehicle : as it was declared.
 
         Raises
         ------
@@ -170,10 +170,10 @@ class Repair:
         first, last = (math.ceil(time / repaired.dt - 1e-6) for time in (early, late))
         if not (first or last):
             return repaired
-        stretches = [slice(one.start + first, one.stop - last) for one in repaired.stretches]
-        kept = [one for one in stretches if one.stop - one.start >= MINIMUM_SAMPLES]
+        segments = [slice(one.start + first, one.stop - last) for one in repaired.segments]
+        kept = [one for one in segments if one.stop - one.start >= MINIMUM_SAMPLES]
         if not kept:
-            whole = "any stretch of its" if repaired.breaks else "its"
+            whole = "any segment of its" if repaired.breaks else "its"
             raise RecordingError(
                 f"{repaired.name}: delays of {1e3 * late:g} and {1e3 * early:g} ms leave nothing "
                 f"of {whole} {repaired.duration:g} s"
@@ -181,8 +181,8 @@ class Repair:
         if not repaired.breaks:
             return repaired.taken(kept[0])
         left = repaired.taken(np.concatenate([np.arange(one.start, one.stop) for one in kept]))
-        if lost := len(stretches) - len(kept):
-            note = f"left out: {lost} stretch{'es' * (lost > 1)} of which delays leave nothing"
+        if lost := len(segments) - len(kept):
+            note = f"left out: {lost} segment{'s' * (lost > 1)} of which delays leave nothing"
             left = replace(left, notes=(*left.notes, note))
         return left
 
@@ -232,7 +232,7 @@ class Repair:
         if other.sideslip and (self.sideslip or self.offset.get("v_y")):
             raise RecordingError(
                 "repair: what is left is read as a sideslip angle, so nothing may be taken off "
-                "v_y before, and it must not have been one: tell both repairs as one"
+                "v_y before, and it must not have been one: combine both repairs"
             )
         factor = other.factor.get
         f_x, f_y, f_r, f_a = (factor(name, 1.0) for name in ("v_x", "v_y", "r", "a_y"))
@@ -301,13 +301,13 @@ def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, fl
     return {key: one.get(key, 0.0) + other.get(key, 0.0) for key in {**one, **other}}
 
 
-def _by_stretches(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
-    """Return values of samples that are computed of their stretch alone, block by block (n,).
+def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
+    """Return values of samples that are computed of their segment alone, block by block (n,).
 
-    compute : returns the values of a part (k,) of a stretch, told both.
+    compute : returns the values of a part (k,) of a segment, told both.
     """
     values = large((len(recording),))
-    for whole in recording.stretches:
+    for whole in recording.segments:
         for part in blocks(whole.stop, whole.start):
             values[part] = compute(whole, part)
     values.setflags(write=False)
@@ -315,12 +315,12 @@ def _by_stretches(recording: Recording, compute: Callable[[slice, slice], Array]
 
 
 def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:
-    """Return samples of a part of a stretch of a signal a delay earlier."""
+    """Return samples of a part of a segment of a signal a delay earlier."""
     return np.interp(t[part] + delay, t[whole], signal[whole])
 
 
 def _rate(signal: Array, whole: slice, part: slice, dt: float) -> Array:
-    """Return the rate of change over a part of a stretch of a signal, by central differences."""
+    """Return the rate of change over a part of a segment of a signal, by central differences."""
     first, end = max(part.start - 1, whole.start), min(part.stop + 1, whole.stop)
     rate: Array = np.gradient(signal[first:end], dt)
     return rate[part.start - first :][: part.stop - part.start]

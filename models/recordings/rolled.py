@@ -35,7 +35,7 @@ SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
 class _Rolled(NamedTuple):
-    """Forward speed of a stretch [m/s], (n,), and what of it is not what all wheels say.
+    """Forward speed of a segment [m/s], (n,), and what of it is not what all wheels say.
 
     gated, held : samples at which a wheel was left out, and at which all were.
     """
@@ -253,7 +253,7 @@ def _sources(speeds: Mapping[str, Array], wheels: Wheels) -> list[tuple[str, ...
             found.append(there)
         elif there:
             raise RecordingError(
-                f"{there[0]} is alone on its axle: tell its place by [wheels] track, in m"
+                f"{there[0]} is alone on its axle: give its place by [wheels] track, in m"
             )
     return found
 

@@ -11,7 +11,7 @@ from codegen.arrays import Array
 from models.logs.clock import Raw
 from models.logs.log import RecordingError
 from models.logs.signals import QUANTITIES, WHEELS, Signal, quantity_of
-from models.logs.units import SPEED, is_told
+from models.logs.units import SPEED, is_given
 from models.recordings.wheels import RADII, Wheels
 
 STRAIGHT = 0.05  # [rad/s], largest yaw rate
@@ -43,19 +43,19 @@ def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
     Where no unit is written, a radius that is told says that the numbers are turns.
     """
     radius = wheels.radius_of(name)
-    if not is_told(unit):
+    if not is_given(unit):
         return 1.0 if radius is None else radius
     if quantity_of(name, unit) == SPEED:
         return 1.0
     if radius is None:
         raise RecordingError(
-            f"{what} is in {unit.strip()}, a rate of turns: tell the radius of the wheels, in m, "
+            f"{what} is in {unit.strip()}, a rate of turns: give the radius of the wheels, in m, "
             "by [wheels] radius in a log.toml (--log FILE)"
         )
     return radius
 
 
-def learnt_scales(
+def identified_scales(
     parts: Mapping[str, Sequence[Raw]], signals: Mapping[str, Signal], units: Mapping[str, str]
 ) -> dict[str, Scale]:
     """Return the scale of each wheel that v_x tells, by name.
@@ -74,19 +74,19 @@ def learnt_scales(
     for name in WHEELS:
         if name not in parts:
             continue
-        told = learnt_scale(t, v_x, r, at(name))
+        told = identified_scale(t, v_x, r, at(name))
         if told is None:
             continue
         value, seconds = told
         unit, (low, high) = units[name], SPEEDS
-        speed = low <= value <= high and (not is_told(unit) or quantity_of(name, unit) == SPEED)
-        turns = not speed and (not is_told(unit) or quantity_of(name, unit) != SPEED)
+        speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
+        turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
         if speed or (turns and RADII[0] <= value <= RADII[1]):
             found[name] = Scale(value, turns, seconds)
     return found
 
 
-def learnt_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, float] | None:
+def identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, float] | None:
     """Return the speed over ground per what a wheel shows, and the seconds that tell it.
 
     None where straight and even driving is too short, or does not agree on one number.

@@ -84,7 +84,7 @@ class Wheels:
         return self.radius[min(k // 2, len(self.radius) - 1)]
 
     def completed(self, vehicle: Vehicle) -> "Wheels":
-        """Return it with what a car tells of it and nobody has told.
+        """Return it, completed by what the vehicle declares.
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class Wheels:
         return replace(self, track=track, wheelbase=wheelbase)
 
     def table(self) -> dict[str, Any]:
-        """Return it as a document holds it: what differs from what holds where nothing is told."""
+        """Return it as a document holds it: what differs from the defaults."""
         told = {one.name: getattr(self, one.name) for one in fields(self)}
         plain = {one.name: one.default for one in fields(self)}
         changed = {name: value for name, value in told.items() if value != plain[name]}

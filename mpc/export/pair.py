@@ -37,7 +37,7 @@ def frozen_start(package: Package) -> TireModel:
     specialized = package.specialized
     if specialized.vehicle.has_downforce:
         raise NoHandoverError(
-            f"{specialized.vehicle.name} has downforce, of which the handover in C does not know: "
+            f"{specialized.vehicle.name} has downforce, which the handover in C does not model: "
             "export the identifier alone"
         )
     try:
@@ -83,7 +83,7 @@ Arrays = dict[str, tuple[Sequence[float], str]]
 def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     shortest = repr(SHORTEST * model.vehicle.wheelbase)
     numbers: Numbers = {
-        "CURVES": (1, "what is learnt are curves over slip; else a network"),
+        "CURVES": (1, "identified are curves over slip; else a network"),
         "UNITS": (f"{len(model.ladder)}U", "of a curve"),
         "SWAY": (repr(GRAVITY / model.sway.frequency**2), "g over the roll's frequency^2 [m]"),
         "SHORTEST": (shortest, "lag that is always there [m]"),
@@ -91,7 +91,7 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     if model.tells_v_y:  # beside it the share of the sway is none of what is learnt
         share = repr(float(model.own[0, 1]))
         numbers |= {
-            "SWAY_SHARE": (share, "of the sway of the body, which is not learnt"),
+            "SWAY_SHARE": (share, "of the sway of the body, not identified"),
             "STEERING": (f"{SENSORS.index('steering')}U", "which of the sensors' errors it is"),
         }
     return numbers, {
@@ -103,9 +103,9 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
 
 def _of_network(model: NetworkModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     del tracker
-    assert model.network.scale is not None, "a network that was learnt has scales"
+    assert model.network.scale is not None, "an identified network has scales"
     numbers: Numbers = {
-        "CURVES": (0, "what is learnt is a network; else curves over slip"),
+        "CURVES": (0, "identified is a network; else curves over slip"),
         "UNITS": (f"{model.network.hidden}U", "of the hidden layer"),
         "INPUTS": (f"{len(model.network.inputs)}U", "of the network"),
         "FORCE_UNIT": (repr(float(model.force_unit)), "of the weights [N]"),

@@ -108,7 +108,7 @@ class LateralVelocity:
         body: Body | None = None,
     ) -> None:
         method = identifier.method
-        believed = method.believed_body(identifier.vehicle)
+        believed = method.body_prior(identifier.vehicle)
         if believed is None:
             raise ValueError(f"{type(method).__name__} tells no v_y")
         self.identifier, self.trust = identifier, localization or Localization()

@@ -55,7 +55,7 @@ class Drive:
         (n,).
     measured : what the sensors said, by the names of `Measured`, (n,) each; v_y is not among them
         where nothing measures it.
-    told : v_y in its place, by the names of `Told`, (n,) each; empty where sensors show it.
+    estimates : v_y in its place, by the names of `Told`, (n,) each; empty where it is measured.
     status : of the tracker, by its number, (n,).
     solve_time : of the tracker [s], (n,).
     notes : what the learner said and when [s].
@@ -84,7 +84,7 @@ class Drive:
     v_ref: Array
     command: Array
     measured: Mapping[str, Array]
-    told: Mapping[str, Array] = field(default_factory=dict)
+    estimates: Mapping[str, Array] = field(default_factory=dict)
     status: NDArray[np.int64]
     solve_time: Array
     plans: tuple[Plan, ...]
@@ -104,13 +104,13 @@ class Drive:
             name=self.name,
             t=self.t,
             v_x=self.measured["v_x"],
-            v_y=self.measured["v_y"] if "v_y" in self.measured else self.told["v_y"],
+            v_y=self.measured["v_y"] if "v_y" in self.measured else self.estimates["v_y"],
             r=self.measured["r"],
             delta_f=self.measured["delta"],
             delta_r=np.zeros_like(self.t),
             a_y=self.measured["a_y"],
             axle_force=self.axle_force,
-            estimated=("v_y",) if self.told else (),
+            estimated=("v_y",) if self.estimates else (),
         )
 
 
@@ -207,7 +207,7 @@ class Recorder:
             status=others.pop("status").astype(np.int64),
             **others,
             measured=measured,
-            told=told,
+            estimates=told,
             plans=tuple(self._plans),
             notes=tuple(self._notes),
             completed=completed,
@@ -256,7 +256,7 @@ def scores(drive: Drive) -> Scores:
     )
 
 
-class ToldScores(NamedTuple):
+class EstimateScores(NamedTuple):
     """Errors of the lateral velocity that was estimated, against the truth.
 
     rms_error_m_s, rms_error_deg : root mean square of the error of v_y [m/s] and of side slip
@@ -272,20 +272,20 @@ class ToldScores(NamedTuple):
     inertial_rms_error_m_s: float
 
 
-def told_scores(drive: Drive) -> ToldScores | None:
+def estimate_scores(drive: Drive) -> EstimateScores | None:
     """Return how right the v_y was that was told over a drive; None where sensors showed it."""
-    if not drive.told:
+    if not drive.estimates:
         return None
 
     def rms(values: Array) -> float:
         return float(np.sqrt(np.nanmean(values**2)))
 
-    error, sd = drive.told["v_y"] - drive.v_y, drive.told["v_y_sd"]
+    error, sd = drive.estimates["v_y"] - drive.v_y, drive.estimates["v_y_sd"]
     known = np.isfinite(error)
-    return ToldScores(
+    return EstimateScores(
         rms_error_m_s=rms(error),
         rms_error_deg=float(np.rad2deg(rms(error / drive.v_x))),
         rms_deg=float(np.rad2deg(rms(np.arctan2(drive.v_y, drive.v_x)))),
         within_two_sd=float(np.mean(np.abs(error[known]) <= 2.0 * sd[known])),
-        inertial_rms_error_m_s=rms(drive.told["inertial_v_y"] - drive.v_y),
+        inertial_rms_error_m_s=rms(drive.estimates["inertial_v_y"] - drive.v_y),
     )

@@ -102,8 +102,8 @@ def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]
         "ERRORS": (N_ERRORS, "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
         "SPEEDS": (N_SPEEDS, "of the fall-back's table"),
         "GAINS": (N_GAINS, "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
-        "GRIPS": (N_GRIPS, "frictions that are held for possible"),
-        "DOUBTS": (N_DOUBTS, "slips at which the doubt of the forces is told"),
+        "GRIPS": (N_GRIPS, "frictions that are possible"),
+        "DOUBTS": (N_DOUBTS, "slips at which the uncertainty of the forces is given"),
     }
 
 

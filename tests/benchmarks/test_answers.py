@@ -137,7 +137,7 @@ def test_what_the_doctor_warns_of_is_kept(drive, log, monkeypatch):
     def diagnose(recording, vehicle):
         seen.append(recording.axle_force)
         finding = Finding(code="delay", channel="delta_f", confidence=0.6)
-        return Diagnosis(name="", findings=(finding, Finding(code="offset")), unseen=())
+        return Diagnosis(name="", findings=(finding, Finding(code="offset")), unobservable=())
 
     monkeypatch.setattr("tireid.learning.diagnose", diagnose)
     assert answer(log, drive.car.told, drive.exact).doctor == ("delay delta_f",)

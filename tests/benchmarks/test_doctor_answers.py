@@ -47,7 +47,7 @@ def test_only_a_half_may_be_called_straight(drive, monkeypatch):
     monkeypatch.setattr(
         doctor_answers.ti,
         "diagnose",
-        lambda log, car: Diagnosis(name=log.name, findings=(late,), unseen=()),
+        lambda log, car: Diagnosis(name=log.name, findings=(late,), unobservable=()),
     )
     alarms = doctor_answers.said_of_clean("sedan", 1, log, car).alarms
     assert set(alarms.values()) == {("late",)}

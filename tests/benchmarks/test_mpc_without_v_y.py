@@ -15,10 +15,10 @@ from benchmarks.mpc_without_v_y import (
 )
 from benchmarks.mpc_without_v_y import conditions as conditions_of_case
 from benchmarks.targets import Targets
-from mpc.loop.record import ToldScores
+from mpc.loop.record import EstimateScores
 from tireid.driving.runs import FULL, IMU, SENSORS
 
-TOLD = ToldScores(0.02, 0.06, 0.9, 0.97, 0.03)
+TOLD = EstimateScores(0.02, 0.06, 0.9, 0.97, 0.03)
 
 
 def result(case, **other):

@@ -33,8 +33,8 @@ typedef double tireid_real;
 #define TIREID_NOWHERE (1000000.0) /* speed of no car [m/s] */
 #define TIREID_VERSION "reference" /* name, hash, version of tireid */
 
-/* Time [s] without a sample that could be taken after which no force is told any
- * more; may be set by who compiles the library. */
+/* Time [s] without a sample that could be taken after which no force is output any
+ * more; may be set when the library is compiled. */
 #ifndef TIREID_STALE_TIME
 #define TIREID_STALE_TIME (0.5)
 #endif
@@ -52,7 +52,7 @@ typedef struct {
     tireid_real axle_force[2];
 } tireid_output;
 
-/* What is learnt. */
+/* What is identified. */
 typedef struct {
     tireid_real W[2][4]; /* weights of the units, rows front and rear [static axle loads] */
     /* compliance, sway share, offset of steering (front) and of v_y (rear) [m per load; -; rad and m/s] */
@@ -69,7 +69,7 @@ typedef struct {
     tireid_real kept[2][7];
 } tireid_weights;
 
-/* What else is carried, but weights. */
+/* Other states. */
 typedef struct {
     /* last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck samples in a row [SI] */
     tireid_real gate[9];
@@ -82,7 +82,7 @@ typedef struct {
     tireid_real filters[2][9];
 } tireid_signals;
 
-/* What is carried from step to step. */
+/* The state. */
 typedef struct {
     tireid_weights weights;
     tireid_signals signals;

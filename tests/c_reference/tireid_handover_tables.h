@@ -6,7 +6,7 @@
 
 #include "tireid_mpc.h"
 
-#define TIREID_HANDOVER_CURVES 1 /* what is learnt are curves over slip; else a network */
+#define TIREID_HANDOVER_CURVES 1 /* identified are curves over slip; else a network */
 #define TIREID_HANDOVER_UNITS 4U /* of a curve */
 #define TIREID_HANDOVER_SWAY 0.10800000000000003 /* g over the roll's frequency^2 [m] */
 #define TIREID_HANDOVER_SHORTEST 0.0027 /* lag that is always there [m] */

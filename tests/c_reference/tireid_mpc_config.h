@@ -20,8 +20,8 @@ typedef double tireid_mpc_real;
 #define TIREID_MPC_ERRORS 7U /* e_y, e_psi, course, v_y, yaw rate, delta, progress */
 #define TIREID_MPC_SPEEDS 8U /* of the fall-back's table */
 #define TIREID_MPC_GAINS 7U /* a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn */
-#define TIREID_MPC_GRIPS 9U /* frictions that are held for possible */
-#define TIREID_MPC_DOUBTS 26U /* slips at which the doubt of the forces is told */
+#define TIREID_MPC_GRIPS 9U /* frictions that are possible */
+#define TIREID_MPC_DOUBTS 26U /* slips at which the uncertainty of the forces is given */
 #define TIREID_MPC_VERSION "reference" /* name, hash, version of tireid */
 
 #endif

@@ -11,7 +11,7 @@ from identifier.compare.course import (
     Course,
     cross_replay,
     frozen_shares,
-    where_learnt_and_elsewhere,
+    same_and_other,
 )
 from identifier.reproducibility import AxleRmse
 
@@ -28,7 +28,7 @@ def test_the_drive_that_was_learnt_is_told_from_the_others():
         "a": {"a": errors["aa"], "b": errors["ab"]},
         "b": {"a": errors["ba"], "b": errors["bb"]},
     }
-    own, other = where_learnt_and_elsewhere(frozen)
+    own, other = same_and_other(frozen)
     assert own == [("a", errors["aa"]), ("b", errors["bb"])]
     assert other == [("b", errors["ab"]), ("a", errors["ba"])]
 

@@ -97,7 +97,7 @@ def test_what_cannot_be_kept_otherwise_is_refused():
     with pytest.raises(ValueError, match="keeping must be one of"):
         kept("memory", design)
     for keeping in ("dead_zone", "projection"):
-        with pytest.raises(ValueError, match="kept by a dead zone or a projection"):
+        with pytest.raises(ValueError, match="bounded by a dead zone or a projection"):
             kept(keeping, kept("dead_zone"))
 
 

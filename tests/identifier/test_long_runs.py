@@ -201,7 +201,7 @@ def test_a_law_that_diverges_is_noticed_in_the_block_where_it_does(whole, in_blo
 @pytest.fixture
 def short_portions(monkeypatch, in_blocks):
     monkeypatch.setattr(portion, "LONG", 4000)
-    monkeypatch.setattr(portion, "STRETCH", 5.0)
+    monkeypatch.setattr(portion, "SEGMENT", 5.0)
 
 
 @pytest.fixture(scope="module")
@@ -219,7 +219,7 @@ def test_a_portion_is_bounded_spread_and_at_rest_where_it_is_joined(long_drive, 
     assert len(asked.recording) == asked.samples.size <= 4000
     thirds = np.histogram(asked.samples, 4, (0, len(long_drive)))[0]
     assert thirds.min() >= 900
-    ends = [piece.stop - 1 for piece in asked.recording.stretches]
+    ends = [piece.stop - 1 for piece in asked.recording.segments]
     assert len(ends) == 8
     assert not asked.recording.v_x[ends].any()
     moving = asked.recording.v_x > 0.0
@@ -234,14 +234,14 @@ def test_a_portion_takes_where_the_car_is_turned_and_not_where_a_sensor_breaks(
     r = np.where(straight, 0.0, long_drive.r)
     r[[8500, 11000]] = 5000.0
     samples = portion.portion(replace(long_drive, r=r)).samples
-    assert np.isin(np.arange(9000, 9600), samples).sum() > 400  # of a stretch of 500
+    assert np.isin(np.arange(9000, 9600), samples).sum() > 400  # of a segment of 500
 
 
 @pytest.mark.parametrize(("dt", "lasts"), [(0.01, 5.0), (0.02, 5.0), (0.00625, 5.0), (0.001, 1.0)])
-def test_stretches_of_a_portion_last_as_long_at_every_rate(long_drive, short_portions, dt, lasts):
+def test_segments_of_a_portion_last_as_long_at_every_rate(long_drive, short_portions, dt, lasts):
     same = replace(long_drive, t=dt * np.arange(len(long_drive)))
     asked = portion.portion(same, 12_000)
-    pieces = asked.recording.stretches
+    pieces = asked.recording.segments
     assert len(pieces) >= 4 and len(asked.recording) <= 4000
     shortest = min(piece.stop - piece.start for piece in pieces)
     assert shortest * dt == pytest.approx(lasts, rel=0.01)

@@ -37,7 +37,7 @@ def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
     verdict, tire = run.verdict, run.tire
     assert tuple(tire.force_missed) == verdict.force_missed
     front, rear = (with_doubt(100.0 * share) for share in verdict.force_missed)
-    (line,) = (one for one in tire.summary().splitlines() if one.startswith("force missed"))
+    (line,) = (one for one in tire.summary().splitlines() if one.startswith("model error"))
     assert line.split()[-2:] == [front, rear]
     for number in verdict.numbers:
         assert number.words in tire.summary()
@@ -46,6 +46,6 @@ def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
     tire.save(tmp_path / "tire.json")
     assert ti.TireModel.load(tmp_path / "tire.json").summary() == tire.summary()
     assert run.freeze().force_missed is None
-    assert "force missed" not in run.freeze().summary()
+    assert "model error" not in run.freeze().summary()
     for other in (tire.at_friction(0.5), tire.mounted_on(tire.vehicle)):
         assert other.force_missed is None

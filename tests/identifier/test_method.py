@@ -109,7 +109,7 @@ def test_every_method_answers_what_is_proven_of_it(name):
     found = certify(method, CAR)
     assert found == method.certify(CAR)
     assert bool(found.properties) == (name in (*OBSERVING, "axle"))
-    assert bool(found.held) == (name in ("axle", "inertial"))
+    assert bool(found.limits) == (name in ("axle", "inertial"))
     assert (found.verdict == "not certified") == (name not in (*OBSERVING, "axle"))
 
 

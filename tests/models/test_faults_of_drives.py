@@ -247,7 +247,7 @@ def test_cars_are_told_wrongly_by_the_size():
     assert shifted.wheelbase == pytest.approx(CAR.wheelbase)
     rear = shifted.axle_loads[1] - CAR.axle_loads[1]
     assert rear == pytest.approx(0.05 * CAR.weight)
-    assert AnotherCar(told=swapped).tell(CAR) is swapped
+    assert AnotherCar(declared=swapped).tell(CAR) is swapped
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from models.logs.log import RecordingError
 from models.logs.signals import QUANTITIES, Signal
 from models.recordings import LogMap, Repair
-from models.recordings.map import told_signals
+from models.recordings.map import given_signals
 from models.recordings.wheels import DRIVEN, Wheels
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
@@ -129,7 +129,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
         ("[signals.delta_f]\nchannel = 'a'\nratio = 2\ntable = [[0, 0], [1, 1]]\n", "give one of"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [[0, 0], [1, -1]]\n", "that rise"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "table must be pairs"),
-        ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta stands in for v_y"),
+        ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),
         ("[filters]\nlow_pass = 0\n", "low_pass must be positive and finite, it is 0"),
@@ -168,7 +168,7 @@ def test_what_is_no_map_is_refused_in_one_line(tmp_path: Path, text: str, rule: 
     ],
 )
 def test_a_word_of_the_command_line_tells_a_signal(word: str, name: str, signal: Signal) -> None:
-    assert told_signals([word]) == {name: signal}
+    assert given_signals([word]) == {name: signal}
 
 
 @pytest.mark.parametrize(
@@ -177,25 +177,25 @@ def test_a_word_of_the_command_line_tells_a_signal(word: str, name: str, signal:
         (["rate=yaw_rate"], "'rate' is no column of ours: v_x, v_y"),
         (["r"], "wants"),
         (["r="], "wants"),
-        (["r=a", "r=b"], "tells r twice"),
-        (["r=a *1 *2"], "tells the factor of"),
+        (["r=a", "r=b"], "gives r twice"),
+        (["r=a *1 *2"], "gives the factor of"),
         (["vy=a /3"], "signals.v_y can have no ratio"),
-        (["vy=a", "beta=b"], "beta stands in for v_y"),
+        (["vy=a", "beta=b"], "beta replaces v_y"),
         (["r=a *0"], "factor must be finite and not zero"),
     ],
 )
 def test_a_word_that_tells_none_is_refused(words: list[str], rule: str) -> None:
     with pytest.raises(RecordingError, match=re.escape(rule)):
-        told_signals(words)
+        given_signals(words)
 
 
 def test_what_is_told_later_replaces_and_sideslip_takes_the_place_of_lateral_velocity() -> None:
-    first = LogMap(signals=told_signals(["vy=a", "r=b"]))
-    second = first.with_signals(told_signals(["beta=c", "r=d"]))
+    first = LogMap(signals=given_signals(["vy=a", "r=b"]))
+    second = first.with_signals(given_signals(["beta=c", "r=d"]))
     assert set(second.signals) == {"beta", "r"} and second.signals["r"].channel == ("d",)
-    assert set(second.with_signals(told_signals(["vy=e"])).signals) == {"v_y", "r"}
+    assert set(second.with_signals(given_signals(["vy=e"])).signals) == {"v_y", "r"}
     assert not first.is_complete
-    assert first.with_signals(told_signals(["vx=u", "delta_f=s"])).is_complete
+    assert first.with_signals(given_signals(["vx=u", "delta_f=s"])).is_complete
 
 
 def test_a_hand_wheel_becomes_road_wheels_by_ratio_or_table() -> None:

@@ -11,7 +11,7 @@ from models.logs.log import RecordingError
 from models.logs.names import propose
 from models.logs.signals import Signal
 from models.recordings import LogMap, read_recording
-from models.recordings.map import told_signals
+from models.recordings.map import given_signals
 from models.recordings.pose import lateness, motion_of, smoothed, with_pose
 
 T = 0.01 * np.arange(3000)
@@ -162,20 +162,20 @@ def test_a_measured_v_y_comes_before_a_pose(tmp_path):
 def test_a_pose_can_be_told_and_wants_all_three(tmp_path):
     names = {"x [m]": "px", "y [m]": "py", "yaw [rad]": "rotation"}
     path = table(tmp_path / "log.csv", {names.get(k, k): v for k, v in COLUMNS.items()})
-    told = LogMap(signals=told_signals(["x=px [m]", "y=py [m]", "heading=rotation [rad]"]))
+    told = LogMap(signals=given_signals(["x=px [m]", "y=py [m]", "heading=rotation [rad]"]))
     judge(read_recording(path, log_map=told))
     told.to_toml(tmp_path / "log.toml")
     assert LogMap.from_toml(tmp_path / "log.toml") == told
     with pytest.raises(
         RecordingError, match="x, y and heading are a pose together: give all three"
     ):
-        told_signals(["x=px", "y=py"])
+        given_signals(["x=px", "y=py"])
 
 
 def test_a_pose_that_is_integrated_from_wheels_is_refused(tmp_path):
     x, y = integral(V_X * np.cos(PSI)), integral(V_X * np.sin(PSI))
     path = table(tmp_path / "log.csv", {**COLUMNS, "x [m]": x, "y [m]": y, "yaw [rad]": PSI})
-    told = LogMap(signals=told_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
+    told = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match=r"never leaves its heading, as one .* from wheels"):
         read_recording(path, log_map=told)
 
@@ -185,7 +185,7 @@ def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_
     found = read_recording(table(tmp_path / "log.csv", columns))
     assert found.v_y is None and found.a_y is not None
     assert any("x, y, heading is left aside" in note for note in found.notes)
-    told = LogMap(signals=told_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
+    told = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match="must go along with the direction of travel"):
         read_recording(tmp_path / "log.csv", log_map=told)
 

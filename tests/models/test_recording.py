@@ -106,10 +106,10 @@ def in_three() -> Recording:
     return recording(t=t, breaks=(40, 70))
 
 
-LEFT_OUT = "left out: 1 stretch of under 10 samples"
+LEFT_OUT = "left out: 1 segment of under 10 samples"
 
 
-def test_all_or_an_open_part_of_a_drive_in_stretches_may_be_taken() -> None:
+def test_all_or_an_open_part_of_a_drive_in_segments_may_be_taken() -> None:
     made = in_three()
     assert made.taken(slice(None)).breaks == (40, 70)
     assert made.taken(slice(20, None)).breaks == (20, 50)
@@ -129,7 +129,7 @@ def test_all_or_an_open_part_of_a_drive_in_stretches_may_be_taken() -> None:
         (np.r_[0:9, 50:59], None, ()),
     ],
 )
-def test_scraps_of_stretches_are_left_out_and_told(
+def test_scraps_of_segments_are_left_out_and_told(
     kept: slice | np.ndarray, expected: slice | np.ndarray | None, breaks: tuple[int, ...]
 ) -> None:
     made = in_three()
@@ -144,7 +144,7 @@ def test_scraps_of_stretches_are_left_out_and_told(
     assert part.notes == ((LEFT_OUT,) if scraps else ())
 
 
-def test_a_time_that_cuts_a_stretch_short_leaves_it_out() -> None:
+def test_a_time_that_cuts_a_segment_short_leaves_it_out() -> None:
     part = in_three().between(0.35, 99.0)
     assert part.t[0] == pytest.approx(1.4)
     assert part.notes == (LEFT_OUT,)
@@ -209,7 +209,7 @@ def test_writing_leaves_one_file_and_refuses_other_endings(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("gap", [0.105, 0.05])
-def test_stretches_are_read_back_where_gaps_are_long_or_the_map_says_so(
+def test_segments_are_read_back_where_gaps_are_long_or_the_map_says_so(
     tmp_path: Path, gap: float
 ) -> None:
     t = 0.01 * np.arange(300)

@@ -226,7 +226,7 @@ def test_time_must_rise_in_seconds(tmp_path: Path) -> None:
     assert "lasts 0.05 s" in refusal(path)
 
 
-def test_a_gap_cuts_a_log_into_stretches_and_it_is_said(tmp_path: Path) -> None:
+def test_a_gap_cuts_a_log_into_segments_and_it_is_said(tmp_path: Path) -> None:
     path, lines = tmp_path / "a.csv", rows(400)
     write(path, HEADER, lines[:150] + lines[161:])
     got = read_recording(path)
@@ -234,11 +234,11 @@ def test_a_gap_cuts_a_log_into_stretches_and_it_is_said(tmp_path: Path) -> None:
     assert got.t[149] == 1.49 and got.t[150] == 1.61 and got.dt == 0.01
     assert got.duration == pytest.approx(3.87)
     note = got.notes[-1]
-    assert "2 stretches" in note and "lasts 0.12 s, after 1.49 s" in note
+    assert "2 segments" in note and "lasts 0.12 s, after 1.49 s" in note
     write(path, HEADER, lines[:50] + lines[61:])
     short = read_recording(path)
     assert short.t[0] == 0.61 and not short.breaks
-    assert short.notes[-1:] == ("left out: 1 stretch of less than 1 s",)
+    assert short.notes[-1:] == ("left out: 1 segment of less than 1 s",)
 
 
 @pytest.mark.parametrize("source", [0.001, 0.0025, 0.004, 0.02, 0.05])
@@ -380,11 +380,11 @@ def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored
     assert len(read_recording(data, log_map=RIGHT)) == len(log)
 
 
-def test_at_a_coarse_interval_a_stretch_of_too_few_samples_is_left_out(tmp_path: Path) -> None:
+def test_at_a_coarse_interval_a_segment_of_too_few_samples_is_left_out(tmp_path: Path) -> None:
     lines = rows(40, dt=0.05) + rows(200, dt=0.05, start=10.0)  # 2 s and 10 s
     path = write(tmp_path / "coarse.csv", "t,vx,vy,r,delta_f", lines)
     fine = read_recording(path, dt=0.05)
-    assert len(fine.stretches) == 2 and not any("left out" in note for note in fine.notes)
+    assert len(fine.segments) == 2 and not any("left out" in note for note in fine.notes)
     coarse = read_recording(path, dt=0.25)
     assert coarse.breaks == () and len(coarse) >= 40
-    assert coarse.notes[-1:] == ("left out: 1 stretch of less than 2.5 s",)
+    assert coarse.notes[-1:] == ("left out: 1 segment of less than 2.5 s",)

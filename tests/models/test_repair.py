@@ -318,25 +318,25 @@ def test_a_repair_in_blocks_has_the_bits_of_one_in_a_piece(drive, name, monkeypa
 
 @pytest.fixture(scope="module")
 def broken(drive):
-    """The drive with two gaps: stretches of 900, 15 and 800 samples."""
+    """The drive with two gaps: segments of 900, 15 and 800 samples."""
     return drive.taken(np.r_[0:900, 1000:1015, 1200:2000])
 
 
 SHORT = slice(900, 915)
 
 
-def test_a_stretch_that_a_delay_leaves_nothing_of_is_left_out_and_told(broken):
+def test_a_segment_that_a_delay_leaves_nothing_of_is_left_out_and_told(broken):
     repaired, _ = Repair(delay={"r": 0.08}).apply(broken, CAR)
     assert repaired.breaks == (892,) and len(repaired) == 892 + 792
-    assert repaired.notes == ("left out: 1 stretch of which delays leave nothing",)
+    assert repaired.notes == ("left out: 1 segment of which delays leave nothing",)
     np.testing.assert_array_equal(repaired.t[892:], broken.t[915:-8])
     np.testing.assert_allclose(repaired.r[892:], broken.r[923:], atol=1e-12)
-    with pytest.raises(RecordingError, match="leave nothing of any stretch"):
+    with pytest.raises(RecordingError, match="leave nothing of any segment"):
         Repair(delay={"r": 30.0}).apply(broken, CAR)
 
 
 @pytest.mark.parametrize("name", [*REPAIRS, "low pass"])
-def test_a_repair_of_a_stretch_looks_at_no_other(drive, broken, name):
+def test_a_repair_of_a_segment_looks_at_no_other(drive, broken, name):
     repair = Repair(lag={"r": 0.1}) if name == "low pass" else REPAIRS[name][1]
     repaired, _ = repair.apply(broken, CAR)
     alone, _ = repair.apply(broken.taken(SHORT), CAR)
@@ -346,7 +346,7 @@ def test_a_repair_of_a_stretch_looks_at_no_other(drive, broken, name):
         np.testing.assert_array_equal(getattr(repaired, channel)[middle], getattr(alone, channel))
 
 
-def test_stretches_one_step_apart_are_repaired_as_they_are(drive):
+def test_segments_one_step_apart_are_repaired_as_they_are(drive):
     whole = replace(drive, breaks=(5 * 200,))
     repaired, _ = Repair(offset={"r": 0.1}, acceleration_sensor_x=0.2).apply(whole, CAR)
     np.testing.assert_array_equal(repaired.t, drive.t)

@@ -102,7 +102,7 @@ def test_what_swells_as_no_log_does_is_refused_below_the_limit(tmp_path, monkeyp
         ('{"a":' * 33 + "1" + "}" * 33, "levels of tables and lists must be at most 32"),
         ('{"a": ' + "9" * 5000 + "}", "cannot be read as JSON: a number or date that cannot be"),
         ("{", "cannot be read as JSON"),
-        ('[{"a": {"b": 1, "c": 2, "b": 1}}]', "cannot be read as JSON: 'b' is told twice in one"),
+        ('[{"a": {"b": 1, "c": 2, "b": 1}}]', "cannot be read as JSON: 'b' is given twice in one"),
         ("\udcff", "not a text file in UTF-8"),
     ],
 )

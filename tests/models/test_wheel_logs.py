@@ -73,7 +73,7 @@ def test_our_names_without_a_unit_are_in_si(run, wheels):
 
 
 def test_the_notes_say_of_what_the_speed_is_made_and_what_was_left_out(run, wheels):
-    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is made" in one)
+    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is computed" in one)
     assert "wheel_fl, wheel_fr, wheel_rl, wheel_rr" in note
     share = float(note.split(" % of the samples")[0].split()[-1])
     assert 8.0 < share < 13.0  # 2 of 20 s
@@ -136,7 +136,9 @@ def test_a_log_without_the_second_speed_is_read_by_the_same_map(run, wheels, tmp
     turns = columns(run, wheels, 1.0 / RADIUS)
     later = read_recording(turns, log_map=told)
     np.testing.assert_allclose(later.v_x, run.v_x, atol=0.5)
-    assert any("there is no column 'gnss': vx is made of the wheels" in one for one in later.notes)
+    assert any(
+        "there is no column 'gnss': vx is computed from the wheels" in one for one in later.notes
+    )
     first = read_recording({**turns, "gnss": run.v_x}, log_map=told)
     np.testing.assert_array_equal(first.v_x, run.v_x)
 
@@ -168,7 +170,7 @@ def test_axes_and_signs_that_a_map_turns_are_turned_before_wheels_are_brought_ov
 @pytest.mark.parametrize(
     ("change", "told", "rule"),
     [
-        ({}, {"wheel_fl": "wheel_fl [rpm]"}, "is in rpm, a rate of turns: tell the radius"),
+        ({}, {"wheel_fl": "wheel_fl [rpm]"}, "is in rpm, a rate of turns: give the radius"),
         ({}, {"wheel_fl": "wheel_fl [bar]"}, "must be in a unit of a speed"),
         ({"wheel_fl": np.nan}, {}, "wheel_fl must be finite, 1 of 2000 values"),
         ({"wheel_fl": 1e6}, {}, "wheel_fl must be of a car"),

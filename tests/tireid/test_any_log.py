@@ -73,7 +73,7 @@ def test_mdf_with_three_rates_a_gap_and_a_hand_wheel(log, car, in_si, tmp_path, 
     assert main(["channels", path, "--columns", word, "--write", told]) == 0
     capsys.readouterr()
     found = learnt(["identify", path, "--vehicle", car, "--log", told], tmp_path / "out")
-    assert "gaps cut the log into 2 stretches" in capsys.readouterr().err
+    assert "gaps cut the log into 2 segments" in capsys.readouterr().err
     np.testing.assert_allclose(found, in_si, rtol=0.08)  # within three sigma
 
 

@@ -128,7 +128,7 @@ def test_the_tire_of_a_run_is_what_it_freezes_to_with_a_calibrated_band(log, car
     run = ti.identify(log, car, "axle")
     tire, frozen = run.tire, run.freeze()
     assert tire.band_calibrated and "calibrated on the drive" in tire.summary()
-    assert not frozen.band_calibrated and "run.tire checks it" in frozen.summary()
+    assert not frozen.band_calibrated and "run.tire calibrates it" in frozen.summary()
     checked = {name: tire.to_dict()[name] for name in ("band", "force_missed")}
     assert tire.to_dict() == frozen.to_dict() | checked
     surely = run.guarantee(0.3)
@@ -508,7 +508,7 @@ def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch
 
 
 def test_no_method_goes_on_from_a_curve(tires, tmp_path):
-    with pytest.raises(ValueError, match="no method can go on learning from a CurveModel"):
+    with pytest.raises(ValueError, match="no method can continue a CurveModel"):
         ti.export(tires["linear"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

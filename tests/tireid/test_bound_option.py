@@ -28,7 +28,7 @@ def result(words, tmp_path_factory):
 
 def test_the_files_hold_what_is_guaranteed(result):
     model = load_model(result / "weights.json")
-    assert model.calibration is not None and not model.guarantee.told
+    assert model.calibration is not None and not model.guarantee.given
     head, *rows = (result / "curve.csv").read_text(encoding="utf-8").splitlines()
     names = head.split(",")
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows])

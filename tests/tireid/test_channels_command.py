@@ -57,7 +57,7 @@ def test_it_lists_what_is_there_and_what_is_missing(folder, capsys):
     row = next(line for line in said.splitlines() if line.startswith("Vel Lat"))
     assert "km/h" in row and "vy: lateral velocity (95%)" in row and " 100 " in row
     row = next(line for line in said.splitlines() if line.startswith("Steered Angle"))
-    assert "perhaps delta_f" in row and "tell its ratio" in row
+    assert "perhaps delta_f" in row and "give its ratio" in row
     assert '--columns "delta_f=Steered Angle [deg] /RATIO"' in said
     assert main(["channels", str(folder / "plain.csv")]) == 0
     assert "all that is needed is there" in capsys.readouterr().out
@@ -102,7 +102,7 @@ def test_an_error_shows_the_word_that_mends_it(folder, capsys):
     assert main(words) == 2
     said = capsys.readouterr().err
     assert "column delta_f is missing; did you mean 'Steered Angle' of the hand wheel" in said
-    assert 'tell it by --columns "delta_f=Steered Angle [deg] /RATIO"' in said
+    assert 'declare it by --columns "delta_f=Steered Angle [deg] /RATIO"' in said
     assert "delta_fr" not in said
 
 
@@ -198,7 +198,7 @@ def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, t
         (["plain.csv", "--write", "log.json"], "must end in .toml"),
         (["plain.csv", "--run", "lap"], "so no run 'lap'; leave it out"),
         (["plain.csv", "--columns", "speed=vx"], "'speed' is no column of ours"),
-        (["plain.csv", "--columns", "r=a", "r=b"], "tells r twice"),
+        (["plain.csv", "--columns", "r=a", "r=b"], "gives r twice"),
         (["plain.csv", "--log", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -250,11 +250,11 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     assert main(["channels", str(path), "--write", str(by)]) == 0
     said = capsys.readouterr().out
     assert "vy has no value in 301 of 4000 cells of 'vy', the first in line 1002" in said
-    assert "they are refused but with --cut-holes" in said
+    assert "they are rejected without --cut-holes" in said
     read = read_recording(path, log_map=by)
     assert read.breaks == (1000,) and len(read) == 3700
     assert "cells without a value are cut out: 301 of vy" in read.notes
-    assert any("gaps cut the log into 2 stretches" in note for note in read.notes)
+    assert any("gaps cut the log into 2 segments" in note for note in read.notes)
     kept = np.r_[0 : lost.start, lost.stop : len(log)]
     known = kept != single
     assert np.array_equal(read.v_y[known], log.v_y[kept][known])
@@ -331,7 +331,7 @@ def test_a_channel_that_may_be_v_y_is_named_where_the_log_is_read_without(log, t
     note = next(one for one in got.notes if one.startswith("no lateral velocity is read"))
     word = '--columns "vy=Seitwärts [km/h]"'
     assert "if 'Seitwärts [km/h]' for vy (by a word of its name and its unit) is one" in note
-    assert note.endswith(f"tell it by {word}")
+    assert note.endswith(f"declare it by {word}")
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 0
     said = capsys.readouterr().out
     assert note in said and "perhaps vy (50%)" in said
@@ -348,7 +348,7 @@ def test_two_channels_that_may_be_a_y_are_named_beside_a_v_y_that_is_read(log, t
     assert got.a_y is None and got.v_y is not None
     note = (
         "ay is left aside, as it is not sure: 'INS_AccLateral [m/s^2]' or 'ESP_LatAcc [m/s^2]' for "
-        'ay, equally; tell it by --columns "ay=INS_AccLateral [m/s^2]"'
+        'ay, equally; declare it by --columns "ay=INS_AccLateral [m/s^2]"'
     )
     assert note in got.notes
     assert main(["channels", str(path)]) == 0
@@ -365,10 +365,10 @@ def test_two_channels_that_may_be_a_y_are_named_where_no_v_y_is_there(log, tmp_p
     said = str(caught.value)
     assert "column vy (or ay, from which it is estimated) is missing; did you mean 'INS_Acc" in said
     assert "'ESP_LatAcc [m/s^2]' for ay, equally?" in said
-    assert 'tell it by --columns "ay=INS_AccLateral [m/s^2]"' in said
+    assert 'declare it by --columns "ay=INS_AccLateral [m/s^2]"' in said
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
     said = capsys.readouterr().out
-    assert "vy (lateral velocity) is missing, ay would stand in for it: 'INS_AccLateral" in said
+    assert "vy (lateral velocity) is missing, ay can replace it: 'INS_AccLateral" in said
     assert '--columns "ay=INS_AccLateral [m/s^2]"\n' in said
     assert "# [signals.a_y]" in (tmp_path / "log.toml").read_text(encoding="utf-8")
 
@@ -384,7 +384,9 @@ def test_words_that_are_proposed_for_a_log_without_units_read_it(log, tmp_path, 
     assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
     said = capsys.readouterr().out
     assert "perhaps r in deg/s (70%)" in said
-    words = re.findall(r'"([^"]+)"', next(x for x in said.splitlines() if x.startswith("tell it")))
+    words = re.findall(
+        r'"([^"]+)"', next(x for x in said.splitlines() if x.startswith("declare it"))
+    )
     assert words == [
         "beta=Slip_Angle [deg]",
         "ay=Lat_Acc [g]",

@@ -151,16 +151,16 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     assert code == 0
     assert said.out.startswith("sedan: axle, the default in a car\n")
     assert said.out.splitlines()[-1] == "verdict: pass"
-    held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).held
+    held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).limits
     least, most = held["grip_static_axle_loads"]
     assert re.search(rf"grip_static_axle_loads +{number(least)} to {number(most)}\n", said.out)
     assert set(held) <= set(said.out.split())
     numbers = json.loads((tmp_path / "judged" / "certificate.json").read_text(encoding="utf-8"))
-    assert numbers["held_by_construction"] == held
+    assert numbers["limits"] == held
     code, said = checked(capsys, "--json")
     assert (code, json.loads(said.out)) == (0, numbers)
     linear = checked(capsys, "--method", "linear")[1].out
-    assert "nothing is held by construction" in linear
+    assert "no limits are enforced by construction" in linear
     assert "verdict: not certified; no margin and no bound of its error is proven" in linear
 
 
@@ -257,9 +257,9 @@ def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--log", "drive.csv"], "wants a log.toml"),
-        (["--columns", "r=yaw"], "--columns says how a drive is read: give one by --along LOG"),
-        (["--dbc", "car.dbc"], "--dbc says how a drive is read"),
+        (["--log", "drive.csv"], "must be a log.toml"),
+        (["--columns", "r=yaw"], "--columns is for a drive: give one by --along LOG"),
+        (["--dbc", "car.dbc"], "--dbc is for a drive"),
     ],
 )
 def test_words_about_a_drive_want_a_drive(capsys, words, said):

@@ -113,7 +113,7 @@ def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
     for out, more in (("here", ["--jobs", "1"]), ("there", ["--scheduler", address])):
         assert main([*words, "--out", out, *more]) == 0
         printed = capsys.readouterr()
-        assert "2 learnt now, 0 before; 0 not valid, 0 could not be used" in printed.out
+        assert "2 identified now, 0 before; 0 not valid, 0 could not be used" in printed.out
         assert "threads" not in printed.err
     files = [sorted(Path(out).rglob("*.parquet")) for out in ("here", "there")]
     assert [one.read_bytes() for one in files[0]] == [one.read_bytes() for one in files[1]]

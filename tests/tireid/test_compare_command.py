@@ -85,7 +85,7 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
 def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
     out, names = tmp_path / "out", ("linear", "textbook_ekf", "magic_formula_ekf")
     assert main([*words, "--method", *names, "--out", str(out)]) == 0
-    learnt = "magic_formula_ekf: lag of the tires and offsets of the sensors are learnt"
+    learnt = "magic_formula_ekf: lag of the tires and offsets of the sensors are identified"
     without = "textbook_ekf: the textbook's, without lag and offsets"
     for text in (
         capsys.readouterr().out,
@@ -162,9 +162,9 @@ def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
     for row in rows:
         method = numbers["methods"][row["method"]]
         if row["kind"] == "frozen":
-            error = method["frozen_N"][row["learnt_on"]][row["replayed_on"]]
+            error = method["frozen_N"][row["identified_on"]][row["replayed_on"]]
         else:
-            assert row["learnt_on"] == row["replayed_on"]
+            assert row["identified_on"] == row["replayed_on"]
             error = method["online_N"][row["replayed_on"]]
         assert_shares(row, error, numbers["recordings"][row["replayed_on"]]["rms_force_N"])
 
@@ -241,7 +241,7 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
     words.append("fit")
     assert main([*words, "--out", str(tmp_path / "refused")]) == 3
     assert "0 of 1" in (tmp_path / "refused" / "report.html").read_text(encoding="utf-8")
-    assert "default learnt on mirrored: verdict: NOT VALID" in capsys.readouterr().out
+    assert "default identified on mirrored: verdict: NOT VALID" in capsys.readouterr().out
     assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
     found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]
     assert found["mirrored"]["valid"] is False

@@ -53,7 +53,7 @@ def test_a_good_log_ends_with_0_and_says_what_it_cannot_tell(clinic, capsys):
     assert doctor(clinic, "good.csv") == 0
     told = capsys.readouterr().out
     assert "doctor: nothing found" in told
-    assert "cannot be seen: mass" in told
+    assert "not observable: mass" in told
 
 
 def test_a_faulty_log_ends_with_3_and_each_fault_has_a_line(clinic, capsys):
@@ -95,11 +95,11 @@ def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
     words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
     assert main([*words, "--repair", str(log_map), "--out", str(out)]) == 0
     told = capsys.readouterr().out
-    assert "repaired, in what was learnt on and replayed: factor.r" in told
+    assert "repaired, in identification and replay: factor.r" in told
     assert "verdict: valid" in told
     found = json.loads((out / "doctor.json").read_text())
     assert found["applied"] == LogMap.from_toml(log_map).repair.tables()
-    assert "Is the log right?" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Doctor" in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, tmp_path, capsys):
@@ -113,7 +113,7 @@ def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, 
 def test_nothing_sure_changes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
     log_map = tmp_path / "log.toml"
     assert doctor(clinic, "good.csv", "--repair", log_map) == 0
-    assert "nothing is sure enough" in capsys.readouterr().out
+    assert "no sure repair" in capsys.readouterr().out
     assert LogMap.from_toml(log_map) == LogMap()
     assert doctor(clinic, "good.csv", "--log", log_map) == 0  # the next command of docs/doctor.md
     (tmp_path / "mine.toml").write_text("mine")
@@ -127,7 +127,7 @@ def test_what_is_found_in_a_log_that_its_map_repairs_is_taken_out_after_that(tmp
     halved = Finding(
         code="factor", channel="r", confidence=1.0, repair=Repair(factor={"r": 0.5}), sure=True
     )
-    diagnosis = Diagnosis(name="log", findings=(halved,), unseen=())
+    diagnosis = Diagnosis(name="log", findings=(halved,), unobservable=())
     written = write_repair(tmp_path / "log.toml", told, diagnosis)
     assert LogMap.from_toml(tmp_path / "log.toml") == written
     assert written.repair == Repair(
@@ -156,7 +156,7 @@ def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():
     fine, nothing = Verdict(findings=(), numbers=(), measures={}), Repair()
 
     def said(*findings, repair=nothing):
-        return with_doctor(fine, Diagnosis(name="log", findings=findings, unseen=()), repair)
+        return with_doctor(fine, Diagnosis(name="log", findings=findings, unobservable=()), repair)
 
     assert said(doubtful) == fine
     noted = said(late)

@@ -236,7 +236,9 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     ]
     said = refusal(capsys, words)
     masses = f"(mass {1.1 * car.mass:.6g} there, {car.mass:.6g} here)"
-    assert f"was learnt on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said
+    assert (
+        f"was identified on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said
+    )
     assert "tireid init" in said and "docs/driving.md" in said
     replace(tire, vehicle=replace(car, name="mine")).save(tmp_path / "mine.json")
     words = ["drive", "--path", bend, "--weights", tmp_path / "mine.json", "--film", "none"]

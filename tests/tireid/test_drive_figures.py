@@ -231,7 +231,10 @@ def test_the_film_shows_the_curves_as_they_were_known_then(t):
     assert len(panels) == 2
     for axle, axes in enumerate(panels):
         drawn = curves(axes)
-        for label, force in (("learnt by now", KNOWN.learnt), ("steered by, now", KNOWN.steering)):
+        for label, force in (
+            ("identified so far", KNOWN.learnt),
+            ("steered by, now", KNOWN.steering),
+        ):
             inside = np.abs(ALPHA) < 0.02  # beyond, a curve leaves the panel
             np.testing.assert_allclose(
                 1e3 * drawn[label][inside, 1], force[k][inside, axle], atol=1e-6

@@ -13,7 +13,7 @@ from tireid.cli import main
 from tireid.commands.drive_case import parse_fault
 from tireid.driving import learn as drive_learn
 
-TOLD = ("v_y_told_m_s", "v_y_told_sd_m_s", "side_slip_observable", "a_y_level_m_s2")
+TOLD = ("v_y_estimated_m_s", "v_y_estimated_sd_m_s", "side_slip_observable", "a_y_level_m_s2")
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +45,11 @@ def test_the_files_hold_what_was_told_in_place_of_what_was_not_measured(result):
     drive = columns(result / "drive.csv")
     assert set(TOLD) < set(drive.dtype.names)
     assert "v_y_measured_m_s" not in drive.dtype.names
-    error = drive["v_y_told_m_s"] - drive["v_y_m_s"]
+    error = drive["v_y_estimated_m_s"] - drive["v_y_m_s"]
     told = summary_of(result)["lateral_velocity"]
     assert told["rms_error_m_s"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-5)
     assert told["within_two_sd"] == pytest.approx(
-        np.mean(np.abs(error) <= 2.0 * drive["v_y_told_sd_m_s"]), abs=0.01
+        np.mean(np.abs(error) <= 2.0 * drive["v_y_estimated_sd_m_s"]), abs=0.01
     )
     assert told["within_two_sd"] > 0.9
     assert 0.0 < told["rms_error_m_s"] < 0.05
@@ -87,7 +87,7 @@ def test_the_line_that_is_printed_says_how_right_it_was(result, bend, tmp_path, 
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out
     assert "no noise, no v_y" in printed
-    assert "frozen: v_y told to 0.0" in printed
+    assert "frozen: v_y estimated to 0.0" in printed
 
 
 def test_a_fault_of_what_is_not_measured_is_one_clear_line(bend, tmp_path, capsys):  # noqa: F811
@@ -107,7 +107,7 @@ def test_the_public_function_takes_the_same_road(result):
     tire = load_model(result / "weights.json")
     run = ti.drive(path, car, tire, sensors="imu", learning=True, share=0.6)
     assert run.scores.completed
-    assert set(run.drive.told) >= {"v_y", "v_y_sd", "observable"}
-    assert np.std(run.drive.told["v_y"] - run.drive.v_y) < 0.05
+    assert set(run.drive.estimates) >= {"v_y", "v_y_sd", "observable"}
+    assert np.std(run.drive.estimates["v_y"] - run.drive.v_y) < 0.05
     with pytest.raises(ValueError, match="sensors must be one of full, imu, not 'gps'"):
         ti.drive(path, car, tire, sensors="gps")

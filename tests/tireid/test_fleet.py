@@ -24,7 +24,7 @@ from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX
 from identifier.tire_model import load_model
-from identifier.verdict import judge_taught
+from identifier.verdict import judge_identification
 from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tireid.cli import main
@@ -121,7 +121,7 @@ def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
     assert (good.vehicle, good.tires, good.date) == ("blue", "summer", "2026-03-01")
     assert isinstance(good.frozen, FittedModel) and good.parts[0].seconds > 3.0
     assert good.frozen.cornering_stiffness[0] == good.stiffness_front
-    assert good.told_car.name == "blue" and good.valid is not None
+    assert good.declared_car.name == "blue" and good.valid is not None
 
 
 def test_a_store_is_read_without_the_threads_of_a_dataset(store):
@@ -137,15 +137,15 @@ def test_a_store_is_read_without_the_threads_of_a_dataset(store):
 def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_path, capsys):
     store = shutil.copytree(store, tmp_path / "store")
     assert learnt(store) == 1
-    assert "0 learnt now, 13 before" in capsys.readouterr().out
+    assert "0 identified now, 13 before" in capsys.readouterr().out
     assert learnt(store, "--again") == 1
-    assert "1 learnt now, 12 before" in capsys.readouterr().out
+    assert "1 identified now, 12 before" in capsys.readouterr().out
     extra = fleet / "blue" / "summer" / "2026-03-20-more.csv"
     extra.write_bytes((fleet / "blue/summer/2026-03-01-quick.csv").read_bytes() + b"\n" * 9)
     try:
         before = digest(store)
         assert learnt(store) == 1
-        assert "1 learnt now, 13 before" in capsys.readouterr().out
+        assert "1 identified now, 13 before" in capsys.readouterr().out
         changed = {name for name, one in digest(store).items() if before.get(name) != one}
         assert len(changed) == 1  # its bucket alone
     finally:
@@ -193,7 +193,7 @@ def test_a_row_whose_numbers_do_not_fit_is_named_with_its_column(store, name, ch
 def test_a_car_and_a_reach_that_are_none_are_named(store):
     row = next(row for row in Store(store).rows() if row.parts)
     with pytest.raises(StoreError, match=r"bucket-.*: car is none: vehicle\.mass is missing"):
-        _ = replace(row, car="{}").told_car
+        _ = replace(row, car="{}").declared_car
     with pytest.raises(StoreError, match="reach must hold 8 numbers, not 7"):
         merge(lambda: iter([replace(row, reach=row.reach[1:])]), [])
 
@@ -203,7 +203,7 @@ def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):
     runs = [f"{one},{k}" for k, some in enumerate(lines) for one in some[1:]]
     (tmp_path / "two.csv").write_text("\n".join([f"{lines[0][0]},run", *runs]) + "\n")
     words = ["fleet", "learn", str(tmp_path / "*.csv"), "--vehicle", "cars/red.toml", "--jobs", "1"]
-    for told in ("1 learnt now, 0 before", "0 learnt now, 1 before"):
+    for told in ("1 identified now, 0 before", "0 identified now, 1 before"):
         assert main([*words, "--out", str(tmp_path / "store")]) == 0
         assert told in capsys.readouterr().out
     rows = Store(str(tmp_path / "store")).rows()
@@ -237,10 +237,10 @@ def learns(pattern, out, *more, vehicle="car.toml"):
 def test_the_same_logs_from_another_folder_are_known_and_counted_once(garage, monkeypatch, capsys):
     store, car, merged = garage / "store", garage / "one" / "car.toml", garage / "merged"
     for folder, pattern, told in (
-        (garage, garage / "one" / "logs" / "*.csv", "4 learnt now, 0 before"),
-        (garage / "two", garage / "one" / "logs" / "*.csv", "0 learnt now, 4 before"),
-        (garage / "one" / "logs", "*.csv", "0 learnt now, 4 before"),
-        (garage, "two/../one/logs/*.csv", "0 learnt now, 4 before"),
+        (garage, garage / "one" / "logs" / "*.csv", "4 identified now, 0 before"),
+        (garage / "two", garage / "one" / "logs" / "*.csv", "0 identified now, 4 before"),
+        (garage / "one" / "logs", "*.csv", "0 identified now, 4 before"),
+        (garage, "two/../one/logs/*.csv", "0 identified now, 4 before"),
     ):
         monkeypatch.chdir(folder)
         assert learns(pattern, store, vehicle=car) == 0
@@ -258,9 +258,9 @@ def test_two_cars_whose_folders_look_alike_lose_no_log(garage, monkeypatch, caps
     for car in ("one", "two"):
         monkeypatch.chdir(garage / car)
         assert learns("logs/*.csv", garage / "named", "--root", "logs") == 0
-        assert "4 learnt now, 0 before" in capsys.readouterr().out
+        assert "4 identified now, 0 before" in capsys.readouterr().out
         assert learns("logs/*.csv", store) == 0
-        assert "4 learnt now, 0 before" in capsys.readouterr().out
+        assert "4 identified now, 0 before" in capsys.readouterr().out
     assert len(rows_in(store)) == 8
     names = [row.log for row in rows_in(garage / "named")]
     assert names == sorted(2 * [f"{day}.csv" for day in range(4)])
@@ -283,7 +283,7 @@ def test_a_copy_counts_once_whichever_is_learnt_and_is_named(garage, monkeypatch
     capsys.readouterr()
     assert learns("logs/b.csv", "store") == 0
     printed = capsys.readouterr()
-    assert "1 logs" in printed.out and "0 learnt now, 1 before" in printed.out
+    assert "1 logs" in printed.out and "0 identified now, 1 before" in printed.out
     assert f"{garage}/one/logs/b.csv: is in the store as {garage}/one/logs/2.csv" in printed.err
 
 
@@ -295,16 +295,16 @@ def test_what_was_learnt_otherwise_is_told_of_and_replaced_where_asked(garage, m
     capsys.readouterr()
     assert learns("logs/*.csv", "store") == 0
     printed = capsys.readouterr()
-    assert "1 learnt now, 3 before" in printed.out and len(rows_in("store")) == 5
-    assert "3.csv and 0 others stand in the store with another car, other options" in printed.err
+    assert "1 identified now, 3 before" in printed.out and len(rows_in("store")) == 5
+    assert "3.csv and 0 others are in the store with another car, other options" in printed.err
     assert learns("logs/*.csv", "store", "--part", "60") == 0
     assert len(rows_in("store")) == 9
     assert main(["fleet", "merge", "store", "--out", "merged"]) == 2
-    assert "was learnt with two settings" in capsys.readouterr().err
+    assert "has rows of two settings" in capsys.readouterr().err
     for _ in range(2):
         assert learns("logs/*.csv", "store", "--part", "60", "--replace") == 0
     assert len(rows_in("store")) == 4 and len({row.setting for row in rows_in("store")}) == 1
-    assert "taken out of the store, as were 4 others" in capsys.readouterr().err
+    assert "removed from the store, as were 4 others" in capsys.readouterr().err
     assert main(["fleet", "merge", "store", "--out", "merged"]) == 0
 
 
@@ -384,7 +384,7 @@ def test_a_row_tells_how_its_log_was_driven_and_what_was_learnt(store, logs):
         assert getattr(row, f"relaxation_{axle}") == model.relaxation_length[i]
         assert getattr(row, f"known_{axle}") == model.known_slip[i]
     assert row.reach == [*model.driven, *model.speeds, *model.a_x, *model.unexplained]
-    judged = judge_taught(model, log)
+    judged = judge_identification(model, log)
     assert row.valid is judged.valid and len(row.findings) == len(judged.findings)
     assert [row.missed_front, row.missed_rear] == list(judged.measures["force_missed"])
     assert all(one.code in told for one, told in zip(judged.findings, row.findings, strict=True))

@@ -144,7 +144,7 @@ def test_a_merged_model_is_the_optimum_of_prior_and_logs():
     k = INDEX["v_y_bias"]
     assert model.covariance[k, k] > sd[CHANGES.index("v_y_bias")] ** 2  # of the next log
     assert model.driven.tolist() == [0.02, 0.1] and model.speeds.tolist() == [8.0, 20.0]
-    assert model.a_x.tolist() == [-1.0, 0.2] and one.told.seconds == 360.0
+    assert model.a_x.tolist() == [-1.0, 0.2] and one.information.seconds == 360.0
 
 
 def test_a_log_of_a_wet_road_does_not_lower_the_grip_of_the_others():
@@ -170,7 +170,7 @@ def test_rows_are_grouped_by_what_they_say_and_a_log_counts_once():
     assert key_of(rows[4], ["week", "date"]) == (("week", "2026-W02"), ("date", "2026-01-05"))
     assert key_of(row_of(0, [], date="2024-12-30T10:00"), ["week"]) == (("week", "2025-W01"),)
     again = replace(rows[3], setting="otherwise")
-    with pytest.raises(MergeError, match=r"^003 was learnt with two settings, told and otherwise"):
+    with pytest.raises(MergeError, match=r"^003 has rows of two settings, told and otherwise"):
         merged([*rows, again], [])
     assert len(merged([*rows, again], ["setting"])) == 2
     assert merged([*rows, replace(rows[3], run="2")], [])[0].logs == 41
@@ -219,7 +219,7 @@ def test_a_fleets_prior_is_where_expectation_and_maximization_rest():
     known = []
     for one, car in zip(groups, cars, strict=True):  # what is marginal, by the inverse of a whole
         usual, moves = Priors.of(car), np.flatnonzero(Priors.of(car).moves)
-        _, slope, H = one.told.around(one.model.p)
+        _, slope, H = one.information.around(one.model.p)
         sensors = [k for k in moves if k not in TIRES]
         H[np.ix_(sensors, sensors)] += usual.information[np.ix_(sensors, sensors)]
         covariance = np.linalg.inv(H[np.ix_(moves, moves)])

@@ -66,7 +66,7 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
         assert rmse["frozen_against_online"]["8"] == {"slalom": None, "quick": None}
     elif summary["law"] == "axle":
         assert certificate["verdict"] == "pass"
-        assert certificate["held_by_construction"]["grip_static_axle_loads"] == [0.1, 3.0]
+        assert certificate["limits"]["grip_static_axle_loads"] == [0.1, 3.0]
     else:
         assert certificate["verdict"] in ("pass", "warn", "fail")
     quick = read_recording(logs / "quick.csv")
@@ -220,7 +220,7 @@ def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
     page = (result / "report.html").read_text(encoding="utf-8")
     tiles = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page)
     assert tiles[1][1] == f"{front} / {rear} %"
-    assert f"missed of the force that the motion shows: {front} / {rear} %" in printed
+    assert f"model error over the force in the motion: {front} / {rear} %" in printed
     curve = page.index("Figure 1.</b> ")
     assert re.match("(NOT VALID. )?Axle force over slip angle", page[curve + 14 :])
     notes = page.index('<ul class="warnings' if '<ul class="warnings' in page else "No warnings.")
@@ -374,7 +374,7 @@ def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys, unmad
     assert summary["gains"]["eta_W"] == 12.5
     for extra, said in (
         (["--method", "integral"], "give only one of --method, --design"),
-        (["--seed", "0"], f"--seed goes with a method: that of {design} stands in it"),
+        (["--seed", "0"], f"--seed is for a method: the seed is in {design} stands in it"),
     ):
         assert said in refusal(capsys, [*words[:-1], tmp_path / "other", *extra])
 
@@ -416,7 +416,7 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
     log.write_text("\n".join([f"{header},run", *runs]))
     words = ["identify", f"{log}:a b", "--vehicle", logs / "car.toml"]
     line = refusal(capsys, [*words, "--replay", f"{log}:a/b", "--out", tmp_path / "out"])
-    assert "every recording needs a name of its own" in line
+    assert "every recording needs a different name" in line
 
 
 @pytest.mark.parametrize(
@@ -428,7 +428,7 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
         (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
-        (["--vehicle", "slalom.csv"], "--vehicle slalom.csv: wants the .toml of a car"),
+        (["--vehicle", "slalom.csv"], "--vehicle slalom.csv: must be the .toml of a car"),
     ],
 )
 def test_wrong_words_are_one_clear_line_and_leave_nothing(logs, tmp_path, capsys, extra, said):
@@ -439,7 +439,7 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(logs, tmp_path, capsys
 
 
 def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsys, unmade):
-    """What was learnt on the slalom serves from the first sample of the next drive."""
+    """Tires of the slalom serve from the first sample of the next drive."""
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--method", law, "--accept"]  # the paper's network needs a longer drive
     if law == "fit":
@@ -601,7 +601,7 @@ def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
     )
     words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml"]
     line = refusal(capsys, [*words, "--out", tmp_path / "out"])
-    assert "slalom: at 8 s no tires were learnt: axle forces must rise with slip" in line
+    assert "slalom: at 8 s no tires were identified: axle forces must rise with slip" in line
     assert list(tmp_path.iterdir()) == []
 
 
@@ -620,19 +620,19 @@ def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path
         assert verdict_of(tmp_path / name)["valid"] is False
         page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
         assert "NOT VALID" in page
-        assert "Is it good?" in page
+        assert "Verdict" in page
         assert '<div class="bad"><dt>the verdict' in page
         assert page.count('class="struck"') > 4, "numbers of the refused axles"
         assert '<div class="good">' not in page
     ask = ["predict", str(tmp_path / "refused" / "weights.json"), str(logs / "quick.csv")]
     assert main([*ask, "--accept", "--out", str(tmp_path / "asked")]) == 0
-    assert "was found not valid when it was learnt" in capsys.readouterr().err
+    assert "was not valid on its identification drive" in capsys.readouterr().err
 
 
 def test_a_valid_answer_says_so_with_what_each_number_is_worth(result, law):
     verdict = verdict_of(result)
     page = (result / "report.html").read_text(encoding="utf-8")
-    assert "Is it good?" in page
+    assert "Verdict" in page
     if law != "integral":
         assert verdict["valid"]
         assert json.loads((result / "weights.json").read_text())["valid"] is True

@@ -171,7 +171,7 @@ def test_a_network_cannot_be_learnt_on_from_a_model():
         ({"forces": 1}, [], "the outputs must be the two forces"),
         ({"iso": True}, [], "must rise with slip"),
         ({}, ["--network-inputs", "alpha_f"], "inputs must be 2 different signals"),
-        ({}, ["--freeze", "4"], "--freeze is for what is learnt"),
+        ({}, ["--freeze", "4"], "--freeze is for identified models"),
     ],
 )
 def test_what_cannot_be_used_is_one_line_and_leaves_nothing(

@@ -226,7 +226,7 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     assert len(page) < 4e6 and faults_of(page) == []
     told = outline(page).text
     assert not re.search(r"\^|\blambda\b|\beta\b|\bxi\b|->", told), "mathematics is printed"
-    assert page.index("What was learnt</h2>") < page.index("<details>")
+    assert page.index("Identified tires</h2>") < page.index("<details>")
     assert "phase margin of the sampled loop [deg]" in page
     assert "http" not in page.replace("http-equiv", "")
     assert (tmp_path / "demo" / "identify" / "weights.json").is_file()

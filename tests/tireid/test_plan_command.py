@@ -75,7 +75,7 @@ def test_a_plan_follows_what_was_learnt(tmp_path, undrawn):
         (["--area", "12x8"], "the area must be"),
         (["--speed", "15kn"], "--speed wants"),
         (["--speed", "1e999"], "--speed wants"),
-        (["--speed", "2"], "nothing is learnt below"),
+        (["--speed", "2"], "no sample counts below"),
         (["--time", "nan"], "the time must be"),
         (["--mu", "9"], "--mu must lie between 0.05 and 3, it is 9"),
         (["--grip", "nan"], "--grip must lie between 20 and 97, it is nan"),
@@ -101,7 +101,7 @@ def test_a_model_that_does_not_know_how_sure_it_is_is_refused(tmp_path, capsys, 
     log = ti.read_recording(logs / "quick.csv")
     ti.identify(log, car, ti.make_method("linear", car)).freeze().save(tmp_path / "linear.json")
     assert plan(tmp_path / "out", "--after", str(tmp_path / "linear.json")) == 2
-    assert "needs to know how sure a model is" in capsys.readouterr().err
+    assert "needs a model with a covariance" in capsys.readouterr().err
 
 
 def test_areas_and_speeds_are_read_with_their_units():

@@ -72,7 +72,7 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
         assert page.count("<img") == 4
         front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
         assert f"<dd>{front} / {rear} %</dd>" in page
-        assert f"missed of the force that the motion shows: {front} / {rear} %" in (
+        assert f"model error over the force in the motion: {front} / {rear} %" in (
             capsys.readouterr().out
         )
         assert '<div class="good"><dt>the verdict' in page
@@ -88,7 +88,7 @@ def test_a_refused_answer_looks_refused(model, logs, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
     assert "NOT VALID. Axle force over slip angle" in page
-    assert '<li class="bad">' in page and "was found not valid when it was learnt" in page
+    assert '<li class="bad">' in page and "was not valid on its identification drive" in page
     assert '<div class="good">' not in page
 
 
@@ -100,7 +100,7 @@ def test_without_truth_it_says_what_of_the_motion_is_explained(model, logs, tmp_
     assert not [name for name in columns if "true" in name]
     assert 0.9 < summary["motion"]["explained_lateral"] <= 1.0
     said = capsys.readouterr().out
-    assert "cannot be said in newtons" in said
+    assert "cannot be given in newtons" in said
     share = 100.0 * summary["motion"]["explained_lateral"]
     assert f"explained are {share:.1f} % of the lateral" in said
 
@@ -217,7 +217,7 @@ def test_another_road_is_told_with_its_friction(model, tmp_path, capsys):
     assert 10.0 < road["first"] < 14.0 and abs(road["ratio"] - 0.5) < 3.0 * road["sd"]
     table = np.genfromtxt(out / "friction.csv", delimiter=",", names=True)
     assert table["another"][table["t_s"] > road["first"] + 1.0].min() > 0.5
-    assert "of the friction of the drive that taught" in capsys.readouterr().out
+    assert "of the friction of the identification drive" in capsys.readouterr().out
 
 
 def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
@@ -226,10 +226,10 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
     ti.identify(log, ti.sedan(), make_method("axle", ti.sedan())).freeze().save(unchecked)
     summary, _ = predicted(tmp_path / "out", unchecked, logs / "quick.csv")
     assert summary["friction"] is None and not (tmp_path / "out" / "friction.csv").exists()
-    assert "friction: cannot be told, the band is what learning" in capsys.readouterr().out
+    assert "friction: not observable, the band is of the identifier" in capsys.readouterr().out
 
 
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):
     summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
-    assert summary["friction"] == {"as_taught": True, "roads": []}
-    assert "friction: that of the drive that taught" in capsys.readouterr().out
+    assert summary["friction"] == {"unchanged": True, "roads": []}
+    assert "friction: that of the identification drive" in capsys.readouterr().out

@@ -74,8 +74,8 @@ def test_the_table_has_a_column_of_side_slip_and_a_dash_for_methods_that_read_it
         assert rows[name][0] in page
     names = ", ".join(TOLD)
     for file in ("report.html", "tables.txt"):
-        assert f"{names}: shown no " in (result / file).read_text(encoding="utf-8")
-    assert "Side slip as methods without a lateral velocity told it." in page
+        assert f"{names}: get no " in (result / file).read_text(encoding="utf-8")
+    assert "Side slip estimated by methods without a lateral velocity." in page
     assert faults_of((result / "report.html").read_text(encoding="utf-8")) == []
     assert (result / "side_slip.png").read_bytes().startswith(b"\x89PNG")
 
@@ -174,5 +174,5 @@ def test_without_a_recorded_v_y_the_figure_shows_the_estimate_alone(slalom):
     told = {"joint_ekf": {slalom.name: made_up(slalom, 0.9, sd=0.1)}}
     (axes,) = side_slip_figure([blind], told).axes
     assert "recorded" not in axes.get_legend_handles_labels()[1]
-    with pytest.raises(ValueError, match="no method told a lateral velocity"):
+    with pytest.raises(ValueError, match="no method estimated a lateral velocity"):
         side_slip_figure([blind], {"axle": {}})

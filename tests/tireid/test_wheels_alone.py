@@ -121,7 +121,7 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     assert main(["channels", alone]) == 1  # turns, and nobody knows of which radius
     said = capsys.readouterr().out
     assert "wheel_fl: speed of the front left wheel" in said
-    assert "a rate of turns: tell the radius of the wheels, in m, by [wheels] radius" in said
+    assert "a rate of turns: give the radius of the wheels, in m, by [wheels] radius" in said
     assert "all that is needed is there" not in said
     first = driven(5, 2.0, lambda t: 18.0 + np.sin(0.3 * t))
     slips = shown(first, gentle_slip(first), np.random.default_rng(2))
@@ -137,8 +137,10 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     words = ["identify", alone, "--vehicle", str(tmp_path / "car.toml"), "--log", str(told)]
     assert main([*words, "--out", str(out), "--accept"]) == 0
     captured = capsys.readouterr()
-    assert "there is no column 'Ground Speed [km/h]': vx is made of the wheels" in captured.err
-    assert "vx is made of wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
+    assert (
+        "there is no column 'Ground Speed [km/h]': vx is computed from the wheels" in captured.err
+    )
+    assert "vx is computed from wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
     assert "a log has no lateral velocity: fit learns" in captured.err
     assert json.loads((out / "summary.json").read_text())
 
@@ -154,7 +156,7 @@ def test_identify_says_what_a_speed_tells_of_wheels_and_uses_the_speed(run, whee
     data["wheel_rr"] = np.where((run.t > 3.0) & (run.t < 5.0), np.nan, data["wheel_rr"])
     write(path, data)
     recording = ti.read_recording(path, columns=told)
-    assert any("of the wheels nothing is learnt" in note for note in recording.notes)
+    assert any("the wheels are not used" in note for note in recording.notes)
     assert recording.t.size == run.t.size
 
 

@@ -1,4 +1,4 @@
-"""Logs of an IMU, wheel speed and steering alone: read, learnt on, judged and predicted."""
+"""Logs of an IMU, wheel speed and steering alone: read, identified, judged and predicted."""
 
 import csv
 import json
@@ -89,7 +89,7 @@ def test_a_right_answer_is_valid_and_says_what_it_cannot_see(history):
     verdict = history.verdict
     assert verdict.valid
     assert "l_f and l_r swapped" in " ".join(verdict.lines)
-    assert any("l_f and l_r swapped" in line for line in verdict.to_dict()["unseen"])
+    assert any("l_f and l_r swapped" in line for line in verdict.to_dict()["not_observable"])
 
 
 @pytest.mark.parametrize(("channel", "factor"), [("a_y", 1.6), ("v_x", 1.25), ("r", 1.25)])
@@ -185,11 +185,13 @@ def test_the_command_learns_and_tells_side_slip_with_its_deviation(log, exact, t
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr()
     assert "fit learns, and estimates it" in said.err
-    assert "side slip was told to ±" in said.out
+    assert "side slip was estimated to ±" in said.out
     assert "the log has no lateral velocity" in said.out
     with (tmp_path / "out" / "forces.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    told, sd = (np.array([float(row[c]) for row in rows]) for c in ("v_y_told_m_s", "v_y_sd_m_s"))
+    told, sd = (
+        np.array([float(row[c]) for row in rows]) for c in ("v_y_estimated_m_s", "v_y_sd_m_s")
+    )
     assert np.mean(np.abs(told - exact.v_y) < 2.0 * sd) > 0.8
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["law"] == "fit"

@@ -38,7 +38,7 @@ TAIL = 80  # samples
 SMALL = 7.0  # points of the text
 MANY = 9  # entries of a legend that one row does not hold
 STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steered by, now"}
-LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "learnt by now"}
+LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "identified so far"}
 
 
 class _ForcePanel:

@@ -19,20 +19,20 @@ from typing import Any, cast
 
 COMMANDS: Mapping[str, str] = MappingProxyType(
     {
-        "demo": "the whole story on the built-in car, with a report",
-        "sample": "a log to learn from, driven by the built-in car, where there is none",
+        "demo": "demonstration on the built-in car, with a report",
+        "sample": "an example log, driven by the built-in car",
         "init": "a commented vehicle file to fill in",
-        "channels": "what a log holds, what its channels probably are, and a log.toml that says so",
-        "doctor": "what is wrong with a log or with its car's file, and a log.toml that mends it",
-        "plan": "what to drive next: the steering that teaches most in the space there is",
-        "identify": "learn tire forces from a recording, freeze the weights and test them",
-        "predict": "axle forces of a drive by a stored model, and what they miss",
-        "compare": "learn, freeze and replay with every method, side by side",
+        "channels": "channels of a log, with unit, rate and probable signal; writes a log.toml",
+        "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
+        "plan": "the most informative steering within an area",
+        "identify": "tire curves from a log, with error bars and a verdict",
+        "predict": "axle forces of a drive by a stored model, and their error",
+        "compare": "all methods on the same logs, side by side",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
-        "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        "export": "C for a microcontroller, FMU and ONNX for simulators",
         "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
-        "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
-        "paper": "Tables I and II of the paper, beside ours, over many seeds",
+        "drive": "steer a car along a path at the limit of grip, on the identified tires",
+        "paper": "Tables I and II of the paper and ours, over many seeds",
     }
 )
 

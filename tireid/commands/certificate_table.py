@@ -51,14 +51,14 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
     default = ", the default in a car" if name == LIVE else ""
     rows = [
         [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
-        for title, value in certificate.held.items()
+        for title, value in certificate.limits.items()
     ]
     lines = [f"{vehicle.name}: {name}{default}"]
     if rows:
-        lines += ["held after every sample, by construction, whatever is measured:"]
+        lines += ["limits enforced after every sample, by construction, for any measurement:"]
         lines += [text_table(rows)]
     else:
-        lines += ["nothing is held by construction"]
+        lines += ["no limits are enforced by construction"]
     if certificate.properties:
         told = f"at {driving.v_x:.3g} m/s on a friction of {driving.friction:g}"
         lines += [f"proven, of drops of friction {told}:", certificate_text(certificate, 1.0)]

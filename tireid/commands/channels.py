@@ -14,19 +14,19 @@ from models.files import write_atomically
 from models.logs.clock import holes
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, told_by
-from models.logs.units import SI, is_told
+from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
+from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.options import add_force, add_log_map, require_toml, told_map
+from tireid.commands.options import add_force, add_log_map, given_map, require_toml
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 _MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
-_CUT_BY_MAP = "refused but with --cut-holes, or by a map that says so, as --write makes it"
+_CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
@@ -50,7 +50,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 1 where a signal that is needed is missing or not sure."""
     path, named = split_log_argument(options.log)
-    told = told_map(options)
+    told = given_map(options)
     if options.write is not None:
         require_toml(options.write)
         require_free(options.write, force=options.force)
@@ -108,7 +108,7 @@ def _wheels(
             scales = wheel_scales(log, signals, told, run)
         except RecordingError as error:
             kept = replace(plain, signals={n: one for n, one in signals.items() if n not in WHEELS})
-            return f"of the wheels nothing is learnt: {error}", kept, True
+            return f"the wheels are not used: {error}", kept, True
         wheels, scaled = with_scales(told.wheels, signals, scales)
         return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
     try:
@@ -116,7 +116,7 @@ def _wheels(
             wheel_factor(choice.column_of(name), name, unit, told.wheels)
     except RecordingError as error:
         return str(error), plain, False
-    return "vx is made of the wheels", plain, True
+    return "vx is computed from the wheels", plain, True
 
 
 def _head(log: LogFile, run: str | None) -> list[str]:
@@ -185,8 +185,8 @@ def _meaning(
                     f"{choice.column_of(name)}, not read beside {choice.column_of(INSTEAD[name])}"
                 )
             if channel in one.channel and name not in signals:
-                unit = f" in {one.unit}" if one.unit and not is_told(listed.unit) else ""
-                hand = ", of the hand wheel: tell its ratio" if one.hand else ""
+                unit = f" in {one.unit}" if one.unit and not is_given(listed.unit) else ""
+                hand = ", of the hand wheel: give its ratio" if one.hand else ""
                 doubt = "; another is as likely" if name in proposal.rivals else ""
                 return f"perhaps {choice.column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
     return ""
@@ -212,7 +212,7 @@ def missing_text(
 ) -> str:
     """Return what is missing, and the words that would tell it."""
     if not missing:
-        there = told_by(signals)
+        there = given_by(signals)
         needed = [name for name in NEEDED if name in there]
         if "v_y" not in there:
             needed.append("a_y")
@@ -222,7 +222,7 @@ def missing_text(
     for name in missing:
         likely = choice.stand_ins(name, proposal)
         texts = " or ".join(choice.likely_text(one, proposal) for one in likely)
-        instead = ", ay would stand in for it" if likely == ["a_y"] and name != "a_y" else ""
+        instead = ", ay can replace it" if likely == ["a_y"] and name != "a_y" else ""
         lines.append(
             f"{choice.column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
             f"{instead}: {texts}"
@@ -231,7 +231,7 @@ def missing_text(
         )
         told = [choice.column_word(one, proposal) for one in likely]
         words += told or [f'"{choice.column_of(name)}=CHANNEL"']
-    return "\n".join([*lines, f"tell it: tireid channels {log} --columns {' '.join(words)}"])
+    return "\n".join([*lines, f"declare it: tireid channels {log} --columns {' '.join(words)}"])
 
 
 def _unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:

@@ -94,13 +94,13 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
-        description="Say what is certified of an identifier; without options, of the axle "
-        "identifier, the default in a car: boxes, curve, jumps, the time to follow a drop of "
-        "friction; with --along LOG, also of the tires that it learns there: sector, and the "
-        "largest error of the force. Gains of the paper's laws (--paper, --method NAME, --design "
-        "FILE) are judged at the worst regressor: poles, sampling, gain and phase margin, damping, "
-        "drift, proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With "
-        "--tune, find gains and write them.",
+        description="Certify an identifier; with no option the axle identifier, the default in "
+        "a car: limits, curve, jumps, the time to follow a drop of friction; with --along LOG "
+        "also the tires identified there: sector, and the largest force error. Gains of the "
+        "paper's laws (--paper, --method NAME, --design FILE) are judged at the worst "
+        "regressor: poles, sampling, gain and phase margin, damping, drift, proven bounds. Exit "
+        "code 0: nothing fails, 1: something does, 2: bad input. With --tune, find gains and "
+        "write them.",
     )
     shared.add_vehicle(parser)
     shared.add_method(parser, LIVE)
@@ -122,9 +122,8 @@ def add_parser(commands: Any) -> None:
     text = "find gains and write them, for --design FILE"
     shared.add_options(parser, Path, {"--tune FILE": text})
     text = (
-        "for --tune: what keeps the weights over hours, the paper's leakage (which forgets "
-        "them), a leakage with a dead zone, or a projection in its place "
-        f"({DEFAULT_KEEPING})"
+        "for --tune: bound of the weights over hours: the paper's leakage (which forgets "
+        f"them), a leakage with a dead zone, or a projection in its place ({DEFAULT_KEEPING})"
     )
     parser.add_argument("--keep", choices=KEEPINGS, help=text)
     shared.add_output(parser, None)
@@ -146,7 +145,7 @@ def run(options: argparse.Namespace) -> int:
     certificate = certify(method, vehicle, driving)
     history = None
     if options.along is not None:
-        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
+        drive = shared.read_log(options.along, vehicle, shared.given_map(options), dt=method.dt)
         history = identify(drive, vehicle, method)
     if options.tune is not None:
         require_free(options.tune, force=options.force)
@@ -263,7 +262,7 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
     said = f"conditions: {'as stored in the design' if stored else told}"
     if not changed or (stored and driving == design.driving):
         return said
-    return f"{said}, but for {changed}" + (": not the file's own verdict" if stored else "")
+    return f"{said}, but for {changed}" + (": not the verdict of the file" if stored else "")
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:

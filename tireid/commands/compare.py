@@ -31,11 +31,11 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "compare",
         help=COMMANDS["compare"],
-        description="Learn on each recording, freeze at its end and replay on all of them, with "
-        "every method; write report.html, compare.json, compare.csv, tables.txt and figures. "
-        "Methods that estimate lateral velocity are judged on side slip too. Where a recording has "
-        "no true forces, all are judged by the force that the motion shows. Without a LOG the "
-        "plant of the car drives slaloms, a step steer and a lane change with noisy sensors.",
+        description="Identify on each recording, freeze at its end and replay on all of them, "
+        "with every method; write report.html, compare.json, compare.csv, tables.txt and "
+        "figures. Methods that estimate lateral velocity are judged on side slip too. Where a "
+        "recording has no true forces, all are judged by the force in the motion. Without a LOG "
+        "the plant of the car drives slaloms, a step steer and a lane change with noisy sensors.",
         epilog=f"methods: {', '.join(methods())}",
     )
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
@@ -128,7 +128,7 @@ def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    told = shared.told_map(options)
+    told = shared.given_map(options)
     recordings = [
         shared.read_log(log, vehicle, told, check=not options.no_check) for log in options.logs
     ]

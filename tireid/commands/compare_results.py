@@ -1,13 +1,12 @@
 """The files of `tireid compare`: compare.json, whose keys are stable, tables, CSV and figures.
 
 compare.json: recordings (samples, duration, rms_force_N); judged_by (truth, or motion: mean forces
-over 0.3 s that the motion shows); methods: by name online_N by recording,
-frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
-recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
-methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio (null: it
-learns from whole logs); left_out: by
-name why a method is not compared.
-verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
+from the motion over 0.3 s); methods: by name online_N by recording, frozen_N by recording of
+identification and of replay (null: a signal, no model), diverged_at_s by recording, percent (means
+of both axles: online, in_sample, other), side_slip by recording of methods that estimate v_y
+(rms_deg, within_two_sigma_percent), step_s and step_ratio (null: it learns from whole logs);
+left_out: by name why a method is not compared.
+verdict: by recording, of the default identified there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
 """
 
@@ -21,7 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Trial, where_learnt_and_elsewhere
+from identifier.compare.course import Trial, same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
@@ -37,13 +36,13 @@ from tireid.progress import say
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
     """Return the means over recordings of every method, best on other recordings first."""
-    lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
+    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
         time = NOT_TOLD
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
-        pairs = where_learnt_and_elsewhere(trial.frozen or {})
+        pairs = same_and_other(trial.frozen or {})
         means = [_mean(comparison, some) for some in ([*trial.online.items()], *pairs)]
         if trial.diverged_at:
             means = ["diverged"] * 3
@@ -54,7 +53,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
 
 SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
 NOT_TOLD = "-"
-_NOT_SHOWN = "shown no v_y; they tell it, and side slip is judged by the recorded one"
+_NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recorded one"
 
 
 def _slip_cells(trial: Trial) -> list[str]:
@@ -91,7 +90,7 @@ def remarks(comparison: Comparison) -> list[str]:
 
 
 def pair_tables(comparison: Comparison) -> str:
-    """Return one table for each recording learnt on and recording replayed."""
+    """Return one table for each recording identified on and recording replayed."""
     blocks = []
     for learnt in comparison.names:
         for replayed in comparison.names:
@@ -102,7 +101,7 @@ def pair_tables(comparison: Comparison) -> str:
                     error = frozen.get(learnt, {}).get(replayed)
                     cell = "diverged" if error is None else _mean(comparison, [(replayed, error)])
                     lines.append([name, cell])
-            blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
+            blocks.append(_text(f"identified on {learnt}, frozen, replayed on {replayed}", lines))
     return "\n".join(blocks)
 
 
@@ -206,7 +205,7 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
 
 
 ERROR_COLUMNS = (
-    *("method", "kind", "learnt_on", "replayed_on", "front_N", "rear_N"),
+    *("method", "kind", "identified_on", "replayed_on", "front_N", "rear_N"),
     *("front_percent", "rear_percent", "both_percent"),
 )
 

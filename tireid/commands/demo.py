@@ -95,22 +95,22 @@ def _demo_report(
 
 def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> page.Section:
     return page.Section(
-        heading="What was learnt",
+        heading="Identified tires",
         blocks=[
             page.Paragraph(
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
-                f"drives a slalom at {SPEED:g} m/s. The identifier sees what any log has, speed, "
-                "lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it never "
-                "sees a force."
+                f"drives a slalom at {SPEED:g} m/s. The identifier gets what any log has, speed, "
+                "lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it gets no "
+                "force."
             ),
             page.Paragraph(
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
-                "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
-                "moved by the sway of the body. The curves are learnt by recursive least squares "
-                "from motion alone; what was never excited keeps what is believed of any tire. It "
-                "learns sample by sample, in a car too; tireid identify makes one "
-                "estimate of a whole log."
+                "saturates. Slip is lagged by the relaxation of the tire, which is identified "
+                "too, and moved by the sway of the body. The curves are identified by recursive "
+                "least squares from motion alone; where nothing was excited the prior remains. "
+                "It works sample by sample, in a car too; tireid identify makes one estimate of "
+                "a whole log."
             ),
             curve_drawing(figures, verdict),
             *learnt_blocks("the axle identifier", model, figures)[1:],
@@ -128,9 +128,9 @@ def _predict(story: Story) -> page.Section:
     told = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         page.Paragraph(
-            text="Reproducing the drive that was learnt is the easier half. The same frozen "
-            "weights predict two other maneuvers, beside them the paper's network and law, learnt "
-            "on the same slalom with gains from the phase margin of their loop."
+            text="The same frozen weights predict two other maneuvers, not used for "
+            "identification: beside them the paper's network and law, identified on the same "
+            "slalom with gains from the phase margin of their loop."
         ),
         page.Table(
             caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
@@ -143,9 +143,9 @@ def _predict(story: Story) -> page.Section:
         name = history.recording.name
         said = name.replace("_", " ")
         figure = side_by_side_figure(story.side_by_side(name))
-        caption = f"Both methods, frozen after the slalom, asked about the {said}."
+        caption = f"Both methods, frozen after the slalom, on the {said}."
         blocks.append(drawing(figure, caption, READ["replay"]))
-    return page.Section(heading="Drives that were not learnt are predicted", blocks=blocks)
+    return page.Section(heading="Prediction of validation drives", blocks=blocks)
 
 
 def _certify(story: Story, learning: Path) -> list[page.Block]:
@@ -175,7 +175,7 @@ def _certify(story: Story, learning: Path) -> list[page.Block]:
         page.Picture(
             image=learning / "bounds.png",
             caption="Proven bounds on the error norm, and the error that happened.",
-            read="The error stays below each bound; the gap is what the proof gives away.",
+            read="The error stays below each bound; the gap is the conservatism of the proof.",
         ),
     ]  # fmt: skip
 
@@ -212,7 +212,7 @@ def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
         page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(
             text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
-            "them: a law that follows the instant forgets what it learnt before. "
+            "them: a law that follows the instant forgets earlier driving. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
         _table(
@@ -240,11 +240,11 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
     return [
         page.Subheading(text="The frozen-weight reproducibility test: step steer"),
         page.Paragraph(
-            text="The step is held from 29 s on and goes back to half its angle at 36 s. By "
-            "the paper's measure the order of the laws is the reverse of the slalom's; against "
-            "truth it is not: what the integral law said online on the ramp was further from "
-            "the truth than what its frozen weights say of it. After 36 s, at "
-            "an angle that was not learnt, all of them miss more than the linear tire."
+            text="The step is held from 29 s on and goes back to half its angle at 36 s. By the "
+            "paper's measure the order of the laws is the reverse of the slalom's; against truth "
+            "it is not: what the integral law said online on the ramp was further from the truth "
+            "than what its frozen weights say of it. After 36 s, at an angle outside the "
+            "identification drive, all have a larger error than the linear tire."
         ),
         _table(
             study,
@@ -262,15 +262,14 @@ def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[p
     ]
 
 
-_TITLE = "tireid: lateral tire forces, learnt while driving"
+_TITLE = "tireid: lateral tire forces, identified while driving"
 SUMMARY = (
-    "A car drives, its tire forces are learnt from speed, lateral velocity, yaw rate and steering, "
-    "the weights are frozen, and the frozen model steers the car and predicts drives that it has "
-    "not seen."
+    "tireid identifies the tire forces of a driven car from speed, lateral velocity, yaw rate "
+    "and steering. The frozen model then predicts validation drives and steers the car."
 )
 SEEDS = 20
 LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
-_TESTING, DRIVING = "the frozen-weight test of the paper", "driving on what was learnt"
+_TESTING, DRIVING = "the frozen-weight test of the paper", "driving on the identified tires"
 _REPORTING = "writing the report"
 PARTS = {
     LEARNING: 15.0,
@@ -287,7 +286,8 @@ def add_parser(commands: Any) -> None:
         help=COMMANDS["demo"],
         description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
-        "tables, and steer the car along a path on what it learnt; leaves one report.html to read.",
+        "tables, and steer the car along a path on the identified tires; leaves one report.html to "
+        "read.",
     )
     shared.add_output(parser, "demo")
     parser.set_defaults(run=run)

@@ -27,7 +27,7 @@ from tireid.reports.drive import SCORES, known_blocks, score_rows
 LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 FILM = FORMATS[0]
 DELAY = 2  # periods of 10 ms
-_SOURCE = "frozen ones learnt on the slalom"
+_SOURCE = "frozen ones identified on the slalom"
 NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
 
 
@@ -56,11 +56,11 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
 def drive_text(driven: dict[str, Driven]) -> str:
     """Return what came of the drives, as lines of text."""
     blocks = [f"{headline(one.conditions)}\n{drive_lines(one.runs)}" for one in driven.values()]
-    return "\n\n".join(["Driving on what was learnt:", *blocks]) if blocks else NOT_DRIVEN
+    return "\n\n".join(["Driving on the identified tires:", *blocks]) if blocks else NOT_DRIVEN
 
 
 def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
-    heading = "The car drives on what it learnt"
+    heading = "The car drives on the identified tires"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
     lane, slippery = driven[LANE_CHANGE], driven[_SLIPPERY]
@@ -68,9 +68,9 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
         Paragraph(
             text="A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
             "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
-            "slalom the friction drops to half, which takes all that is left, and nobody tells "
-            "the car. One tracker goes on learning: it is told of another tire where the last "
-            "moments say so, and where what is learnt explains the last seconds better. The "
+            "slalom the friction drops to half, which is the limit of this path, and no tracker "
+            "gets this friction. One tracker goes on identifying: its tire is replaced where "
+            "recent innovations require it and the new one explains the last seconds better. The "
             "others keep the tires that were frozen before, or the linear ones."
         ),
         Picture(
@@ -84,8 +84,8 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
         *known_blocks(slippery.runs, slippery.figures),
         Paragraph(
             text="The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
-            "can give: told of the frozen model the tracker drives as well as one that is told of "
-            f"the true tires. The film is {LANE_CHANGE}/drive.{FILM}."
+            "can give: with the frozen model the tracker drives as well as with the true tires. "
+            f"The film is {LANE_CHANGE}/drive.{FILM}."
         ),
         _scores(lane),
         drawing(lane.figures["errors"], "Deviation and the rest along the lane change.",
@@ -197,9 +197,9 @@ def package_section(shipped: Shipped) -> Section:
     name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(
-            text="The axle identifier, beginning with what it has just learnt, is written as a C99 "
-            f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
-            f"README, every symbol begins with {name}_; hash {about['hash']}. It is what "
+            text="The axle identifier, beginning with the weights of this drive, is written as a "
+            f"C99 package to the folder {FOLDER}/ beside this report: library, example, self-test "
+            f"and README, every symbol begins with {name}_; hash {about['hash']}. It is what "
             "tireid export writes."
         )
     ]
@@ -229,4 +229,4 @@ def package_section(shipped: Shipped) -> Section:
     else:
         missing = ", ".join(missing_tools())
         blocks.append(Paragraph(text=f"Costs on Arm are not measured, missing: {missing}."))
-    return Section(heading="What was learnt becomes C for a controller", blocks=blocks)
+    return Section(heading="The identifier as C for a controller", blocks=blocks)

@@ -92,8 +92,8 @@ class Story:
         rows = [["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in told)]]
         return "\n".join(
             [
-                "Frozen after the slalom, asked about drives that were not learnt: RMSE [kN]; the "
-                "axle identifier and the paper's (network, integral law)",
+                "Frozen after the slalom, on validation drives: RMSE [kN]; the axle identifier "
+                "and the paper's (network, integral law)",
                 text_table([*rows, *self.rows()], "<>>>>>>", indent="  "),
             ]
         )

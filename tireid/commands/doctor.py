@@ -20,11 +20,11 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "doctor",
         help=COMMANDS["doctor"],
-        description="Find what is wrong with LOG, or with what --vehicle says of its car, in the "
-        "log alone: units, signs, steering-wheel angle, offsets, delays, sensors that sit or look "
-        "elsewhere, frozen or lost samples, another car. Exit code 3 where something was found "
-        "that matters. --repair writes the log.toml with which other commands read it as it should "
-        "be (--log FILE).",
+        description="Find faults of LOG, or of its car as declared by --vehicle, in the log "
+        "alone: units, signs, steering-wheel angle, offsets, delays, sensors at other places or "
+        "angles, frozen or lost samples, another car. Exit code 3 where something was found "
+        "that matters. --repair writes the log.toml with which other commands read it as it "
+        "should be (--log FILE).",
     )
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     shared.add_vehicle(parser, required=True)
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     if options.repair is not None:
         shared.require_toml(options.repair)
         require_free(options.repair, force=options.force)
-    vehicle, told = shared.read_vehicle(options), shared.told_map(options)
+    vehicle, told = shared.read_vehicle(options), shared.given_map(options)
     recording = shared.read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
@@ -70,10 +70,10 @@ def run(options: argparse.Namespace) -> int:
 def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
     """Say what the repair is, and what is left after it."""
     if after is None:
-        tell(f"nothing is sure enough to be repaired: with {options.repair} the log stays as it is")
+        tell(f"no sure repair: with {options.repair} the log stays as it is")
         return
     tell(f"repaired: {repair_text(repair)}")
-    tell(f"after the repair, {diagnosis_text(after, unseen=False)}")
+    tell(f"after the repair, {diagnosis_text(after, unobservable=False)}")
 
 
 def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> dict[str, Any]:

@@ -188,7 +188,7 @@ def frozen_tires(
     """Return where frozen tires come from, and the model where one is needed."""
     setup = conditions.setup
     if not {runs.FROZEN, runs.LEARNING} & set(labels):
-        return "nothing was learnt", None
+        return "no tires were identified", None
     if options.weights is not None:
         model = stored_model(options.weights)
         assert model is not None
@@ -209,12 +209,12 @@ def frozen_tires(
             progress=progress,
         )
     run = identify(recording, setup.vehicle, method, check=False)
-    warn_of(run.verdict, f"what {law} learnt to drive on")
+    warn_of(run.verdict, f"the identification drive of {law}")
     assert recording.a_y is not None
     learnt = run.tire if conditions.caution > 0.0 else run.freeze()
     return (
-        f"frozen ones learnt by {law} on {recording.duration:.0f} s of random steering on an open "
-        f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
+        f"frozen ones identified by {law} on {recording.duration:.0f} s of random steering on an "
+        f"open field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
     ), learnt
 
 
@@ -222,7 +222,7 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
     """Refuse tires that were learnt on another car than is driven, whatever either is called."""
     if learnt.bicycle == setup.vehicle.bicycle:
         return
-    mine = f"{options.weights} was learnt on the car {learnt.name!r}, driven is "
+    mine = f"{options.weights} was identified on the car {learnt.name!r}, driven is "
     driven = setup.vehicle
     apart = "; ".join(
         f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"
@@ -231,6 +231,6 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
     )
     raise ValueError(
         f"{mine}{driven.name!r} ({apart}): give that car by --vehicle FILE, with its table "
-        "[chassis] (tireid init writes one, docs/driving.md says what it holds), or leave "
-        "--weights out to learn on the car that is driven"
+        "[chassis] (tireid init writes one, see docs/driving.md), or leave --weights out to "
+        "identify the driven car"
     )

@@ -14,7 +14,7 @@ from identifier.frozen import vehicle_numbers
 from identifier.tire_model import TireModel
 from models.files import digest
 from models.vehicle import Vehicle
-from mpc.loop.record import Drive, told_scores
+from mpc.loop.record import Drive, estimate_scores
 from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film
@@ -141,7 +141,7 @@ def write_drives(
         "tires": drive_tires_figure(first.drive, curves),
         "solve_times": drive_solve_figure(first.drive),
     }
-    if first.drive.told:
+    if first.drive.estimates:
         figures["lateral"] = drive_lateral_figure(first.drive)
     save_figures(folder, figures)
     if film != NO_FILM:
@@ -167,14 +167,14 @@ def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[st
 
 def _scores(run: Run) -> dict[str, Any]:
     notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
-    told = told_scores(run.drive)
+    told = estimate_scores(run.drive)
     lateral = {} if told is None else {"lateral_velocity": told._asdict()}
     return {**run.scores.to_dict(), **lateral, "ending": run.drive.ending, "notes": notes}
 
 
-_COLUMNS_TOLD = {
-    "v_y": "v_y_told_m_s",
-    "v_y_sd": "v_y_told_sd_m_s",
+_COLUMNS_ESTIMATED = {
+    "v_y": "v_y_estimated_m_s",
+    "v_y_sd": "v_y_estimated_sd_m_s",
     "observable": "side_slip_observable",
     "a_y": "a_y_level_m_s2",
     "inertial_v_y": "v_y_inertial_m_s",
@@ -205,7 +205,7 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
         **{f"{name}_measured_{UNITS[name]}": values for name, values in measured if name != "t"},
-        **{_COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
+        **{_COLUMNS_ESTIMATED[name]: values for name, values in drive.estimates.items()},
     }
 
 
@@ -230,18 +230,18 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
 def drive_lines(runs: Sequence[Run]) -> str:
     """Return the scores of drives as lines of text."""
     lines = [text_table([SCORES, *score_rows(runs)], "<>><>>")]
-    lines += [f"{run.label}: {_told_words(run)}" for run in runs if run.drive.told]
+    lines += [f"{run.label}: {_estimate_words(run)}" for run in runs if run.drive.estimates]
     for run in runs:
         lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
     return "\n".join(lines)
 
 
-def _told_words(run: Run) -> str:
+def _estimate_words(run: Run) -> str:
     """Return how right the v_y was that was told, in one line."""
-    told = told_scores(run.drive)
+    told = estimate_scores(run.drive)
     assert told is not None
     return (
-        f"v_y told to {told.rms_error_m_s:.3f} m/s, side slip to {told.rms_error_deg:.2f} of "
+        f"v_y estimated to {told.rms_error_m_s:.3f} m/s, side slip to {told.rms_error_deg:.2f} of "
         f"{told.rms_deg:.2f} degrees rms; {100.0 * told.within_two_sd:.0f} % of the errors within "
         f"two standard deviations"
     )

@@ -18,9 +18,9 @@ from tireid.commands.options import (
     add_jobs,
     add_log_map,
     add_options,
+    given_map,
     jobs_of,
     stored_model,
-    told_map,
 )
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
@@ -196,7 +196,7 @@ def _learn(options: argparse.Namespace) -> int:
     for log, why in list(left.items())[:SHOWN]:
         say(f"{log}: left out, {why}")
     telling = Telling(
-        log_map=told_map(options),
+        log_map=given_map(options),
         start=stored_model(options.weights),
         judging=options.judge,
         check=not options.no_check,
@@ -319,7 +319,7 @@ def _merge(options: argparse.Namespace) -> int:
                     **dict(one.key),
                     "file": file,
                     "logs": one.logs,
-                    "learning_s": one.told.seconds,
+                    "learning_s": one.information.seconds,
                     "cornering_stiffness_N_rad": C.tolist(),
                     "known_slip_rad": one.model.known_slip.tolist(),
                     "on_another_road": one.elsewhere,
@@ -343,7 +343,7 @@ def _table(groups: list[Merged]) -> str:
             [
                 one.name,
                 str(one.logs),
-                f"{one.told.seconds / 60.0:.1f} min",
+                f"{one.information.seconds / 60.0:.1f} min",
                 f"{C[0]}, {C[1]} kN/rad",
                 f"{known[0]:.1f}, {known[1]:.1f} deg",
             ]

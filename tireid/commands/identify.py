@@ -36,14 +36,13 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "identify",
         help=COMMANDS["identify"],
-        description="Learn axle forces over LOG sample by sample, freeze the weights, replay LOG "
-        "and other recordings; write report.html, summary.json, weights.json, curves as CSV and "
-        "figures.",
+        description="Identify the axle forces of LOG, freeze the model, replay LOG and other "
+        "recordings; write report.html, summary.json, weights.json, curves as CSV and figures.",
         epilog="LOG is a log of any format with the columns t [s], vx, vy [m/s], r [rad/s], "
         "delta_f [rad] and, where known, delta_r [rad], ay [m/s2], Fyf, Fyr [N] (or Fyf_inv, "
         "Fyr_inv: forces computed backwards from the motion), run; x forward, y left, delta and r "
-        "positive to the left. Other names, units and signs are told by --columns or --log; tireid "
-        "channels LOG lists what is there. Several logs are learnt on as one drive, in order.",
+        "positive to the left. --columns or --log give other names, units and signs; tireid "
+        "channels LOG lists what is there. Several logs are used as one drive, in order.",
     )
     parser.add_argument(
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
@@ -54,23 +53,20 @@ def add_parser(commands: Any) -> None:
     several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     text = "freeze at these times [s] (the end)"
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
-    text = "recordings to predict, each with a verdict"
+    text = "validation drives to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
     text = (
-        "state forces that are guaranteed where no force differs from the best curve by more "
-        "than E static axle loads, or, with a second number, is late by more [s] (estimated)"
+        "guaranteed forces, if no force differs from the best curve by more than E static "
+        "axle loads; a second number: lateness [s] (estimated)"
     )
     parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
-    add_repair(parser, "learn on what is left, and write it to")
-    shared.add_weights(parser, "begin learning with it")
+    add_repair(parser, "learn on what repaired log, and write the repair to")
+    shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
-    shared.add_network_arguments(parser, "freeze nothing, judge this network instead")
+    shared.add_network_arguments(parser, "judge this network instead")
     shared.add_accept(parser)
-    text = (
-        "as what curves over time are written (csv); parquet is smaller, sooner written and "
-        "has all digits"
-    )
+    text = "format of curves over time (csv); parquet is smaller and faster, with all digits"
     parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
@@ -83,10 +79,12 @@ def run(options: argparse.Namespace) -> int:
     beside = options.network is not None  # of which something learns online
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
-        raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
+        raise ValueError("--freeze is for identified models: the network of --network is frozen")
     bound = None if options.bound is None else AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
-        raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
+        raise ValueError(
+            "--bound is for identified models: a network has no set of possible weights"
+        )
     start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
@@ -179,7 +177,7 @@ def run(options: argparse.Namespace) -> int:
             verdict_text(verdict),
         )
     if repair:
-        write_repair(options.repair, shared.told_map(options), diagnosis)
+        write_repair(options.repair, shared.given_map(options), diagnosis)
         say(f"wrote {options.repair}")
     tell("\n".join(part for part in told if part))
     say(f"wrote {options.out}/")
@@ -207,7 +205,7 @@ def _require_tires(learnt: History, t: float) -> None:
         require_alive(FrozenModelError, learnt.freeze(t))
     except FrozenModelError as error:
         raise FrozenModelError(
-            f"{learnt.recording.name}: at {freeze_key(t)} s no tires were learnt: {error}"
+            f"{learnt.recording.name}: at {freeze_key(t)} s no tires were identified: {error}"
         ) from None
 
 
@@ -238,7 +236,7 @@ def _read(
     recording = shared.read_log(
         log,
         vehicle,
-        shared.told_map(options),
+        shared.given_map(options),
         run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,
@@ -253,7 +251,7 @@ def _require_distinct(recordings: list[Recording]) -> None:
         if files.count(name) > 1:
             raise ValueError(
                 f"{recording.name} is given twice, or its files would be named as those of another "
-                f"recording, {name}: every recording needs a name of its own"
+                f"recording, {name}: every recording needs a different name"
             )
 
 

@@ -67,8 +67,8 @@ def read_vehicle(options: argparse.Namespace) -> Vehicle:
     path: Path | None = options.vehicle
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
-            f"--vehicle {path}: wants the .toml of a car, by its ending; tireid init writes one to "
-            "fill in"
+            f"--vehicle {path}: must be the .toml of a car, by its ending; tireid init writes one "
+            "to fill in"
         )
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
     say_estimates(vehicle, options.vehicle)
@@ -227,7 +227,9 @@ def chosen_method(
     method_is_given(options)
     if options.design is not None:
         if seed is not None:
-            raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
+            raise ValueError(
+                f"--seed is for a method: the seed is in {options.design} stands in it"
+            )
         design = read_design(options.design)
         return Chosen(design.law, design)
     usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
@@ -261,16 +263,14 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         help="read column COLUMN of the logs as NAME, for example r=yaw_rate; behind it a unit, "
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
-    add_options(
-        parser, str, {"--dbc FILE": "DBC that tells the signals in the frames of a CAN log"}
-    )
+    add_options(parser, str, {"--dbc FILE": "DBC with the signals in the frames of a CAN log"})
     add_options(
         parser, float, {"--rate HZ": "samples per second, where no column of the logs is a time"}
     )
     flags = {
-        "--cut-holes": "leave cells without a value (NaN) out of the logs, which are refused else",
-        "--mend-clock": "sort samples by time, leave out those that share a stamp, and learn on "
-        "what follows where the clock starts again as after a gap; refused else",
+        "--cut-holes": "drop samples without a value (NaN); else such logs are rejected",
+        "--mend-clock": "sort samples by time, drop repeated stamps, and treat a clock that "
+        "what follows where the clock starts again as a gap; else such logs are rejected",
     }
     add_options(parser, bool, flags)
 
@@ -280,13 +280,13 @@ def _map_path(options: argparse.Namespace) -> Path | None:
     path: Path | None = getattr(options, "log_map", None)
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
-            f"--log {path}: wants a log.toml that says how logs are read, by its ending; a log "
-            "itself stands behind the command (check: behind --along)"
+            f"--log {path}: must be a log.toml, by its ending; give a log after the command "
+            "(check: after --along)"
         )
     return path
 
 
-def told_map(options: argparse.Namespace) -> LogMap:
+def given_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
     told = with_columns(map_of(_map_path(options)), _column_words(options.columns))
     if options.cut_holes:
@@ -331,7 +331,7 @@ def _column_words(pairs: Sequence[str]) -> dict[str, str]:
         if not (name and equals and column):
             raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
         if name in columns:
-            raise ValueError(f"--columns tells {name} twice")
+            raise ValueError(f"--columns gives {name} twice")
         columns[name] = column
     return columns
 
@@ -348,7 +348,7 @@ _CONVENTIONS = (
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option and what belongs to it."""
-    group = parser.add_argument_group("a tire network of your own", _CONVENTIONS)
+    group = parser.add_argument_group("your tire network", _CONVENTIONS)
     add_options(group, Path, {"--network FILE.onnx": what})
     text = f"what its columns are, in order, of {', '.join(SIGNALS)}"
     group.add_argument("--network-inputs", nargs="+", metavar="SIGNAL", help=text)

@@ -60,12 +60,11 @@ MEASURES = {
 }
 MEASURES_MEAN = (
     "Frozen weights are measured in two ways. The paper's section IV-A compares the past, t < "
-    "T_freeze, with what was identified online then: do the weights still say what they once said? "
-    "The rows against truth ask whether it is right. They part where the online output was wrong: "
-    "on the step steer the integral law lets the force overshoot before it has learnt that the "
-    "tire saturates, and its frozen weights, which by then know, are far from that output and near "
-    "the truth. The rows after the freeze ask for prediction: from 36 s on the step steer is at an "
-    "angle that was not learnt."
+    "T_freeze, with what was identified online then: consistency. The rows against truth measure "
+    "accuracy. They part where the online output was wrong: on the step steer the integral law "
+    "lets the force overshoot before its weights saturate, and its frozen weights, which by then "
+    "know, are far from that output and near the truth. The rows after the freeze ask for "
+    "prediction: from 36 s on the step steer is at an angle outside the identification drive."
 )
 MEANING = (
     "The third column is the conventional instantaneous law with its learning rates divided by "

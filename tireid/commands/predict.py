@@ -34,11 +34,11 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "predict",
         help=COMMANDS["predict"],
-        description="Predict the axle forces of LOG with a stored model, which learns nothing from "
-        "it; write report.html, figures, forces.csv, summary.json and, where it can be told, "
-        "friction.csv, of the road over that of the drive that taught. Where LOG has true forces, "
-        "say how much is missed; else how much of the measured lateral and yaw acceleration the "
-        "forces explain, in means over 0.2 s.",
+        description="Predict the axle forces of LOG with a stored model, which stays as it is; "
+        "write report.html, figures, forces.csv, summary.json and, where observable, "
+        "friction.csv: friction of the road over that of the identification drive. Where LOG "
+        "has true forces, give the error; else how much of the measured lateral and yaw "
+        "acceleration the forces explain, in means over 0.2 s.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     recording = shared.read_log(
         options.log,
         model.vehicle,
-        shared.told_map(options),
+        shared.given_map(options),
         run_name=options.run_name,
         check=not options.no_check,
     )
@@ -102,8 +102,8 @@ def _model(options: argparse.Namespace) -> TireModel:
     if not model.scales_with_load:
         raise ValueError(
             f"{options.model} is of the car {model.vehicle.name!r} and cannot be mounted on "
-            f"{vehicle.name!r}, as models of the axle identifier can: leave --vehicle out to ask "
-            "it of its own car"
+            f"{vehicle.name!r}, as models of the axle identifier can: leave --vehicle out to use "
+            f"its stored car"
         )
     say(f"{options.model} is of the car {model.vehicle.name!r}: scaled by the axle loads")
     return model.mounted_on(vehicle)
@@ -184,7 +184,7 @@ def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str,
         "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
         "friction": None
         if friction is None
-        else {"as_taught": friction.as_taught, "roads": [one._asdict() for one in friction.roads]},
+        else {"unchanged": friction.unchanged, "roads": [one._asdict() for one in friction.roads]},
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
@@ -223,10 +223,10 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
     motion, model, lines = prediction.motion, prediction.model, []
     inside, held, beyond, known = facts.inside, facts.held, facts.beyond, model.known_slip
     if prediction.against_truth is None:
-        lines.append("no true forces in the log: what the forces miss cannot be said in newtons")
+        lines.append("no true forces in the log: the error cannot be given in newtons")
     if motion is not None:
         lines.append(
-            f"of the measured motion they miss {motion.lateral:.3g} of {motion.lateral_rms:.3g} "
+            f"error over the measured motion: {motion.lateral:.3g} of {motion.lateral_rms:.3g} "
             f"m/s² lateral and {motion.yaw:.3g} of {motion.yaw_rms:.3g} rad/s² yaw acceleration, "
             f"rms, sensor noise included; {prediction.motion_text()}"
         )
@@ -239,7 +239,7 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
     if inside is not None:
         lines.append(
             f"in {100.0 * inside[0]:.0f} / {100.0 * inside[1]:.0f} % of the windows of 0.3 s the "
-            "force that the motion shows lies in the band of 90 % (front / rear)"
+            f"force in the motion lies in the band of 90 % (front / rear)"
         )
     if held is not None:
         lines.append(
@@ -249,12 +249,12 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
     if facts.against is not None:
         lines.append(_contradiction_line(*facts.against))
     if model.has_band and not model.band_calibrated:
-        lines.append(f"friction: cannot be told, the band is {UNCALIBRATED}")
+        lines.append(f"friction: not observable, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
         lines.append(
-            "friction: that of the drive that taught, as far as the tires show it"
-            if friction.as_taught
-            else "friction: the tires slide too little to show it"
+            "friction: that of the identification drive, as far as observable"
+            if friction.unchanged
+            else "friction: not observable, slip is too small"
         )
     return "\n".join(lines)
 
@@ -262,7 +262,7 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
 def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
     """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
-        return "no moment of the drive contradicts the forces that are guaranteed"
+        return "no moment of the drive contradicts the guaranteed forces"
     front, rear = 100.0 * broken.mean(axis=0)
     return (
         f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "

@@ -16,7 +16,7 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "sample",
         help=COMMANDS["sample"],
-        description="Write what the sensors of a simulated car see on an open field, steered at "
+        description="Write the sensor signals of a simulated car on an open field, steered at "
         "random and ever harder until it slides, with the true axle forces: a log for tireid "
         "identify.",
     )

@@ -221,7 +221,7 @@ def require_compiler() -> None:
         )
 
 
-def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
+def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
     """Return the tire that a tracker is told at the start."""
     if label == LINEAR:
         return prediction_tire(setup.vehicle)
@@ -236,7 +236,7 @@ def run_drive(
 ) -> Run:
     """Drive the path once with the tracker told of a tire."""
     setup, problem = conditions.setup, Problem()
-    model = told_tire(label, setup, learnt)
+    model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
     try:
         tracker = Tracker(

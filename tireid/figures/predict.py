@@ -23,7 +23,7 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
     figure, panels = style.axle_panels([2.0, 1.0])
     for axle, (upper, lower) in enumerate(panels.T):
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
-        upper.plot(shown.t, seen, color=style.BLACK, label="shown by the motion", **POINTS)
+        upper.plot(shown.t, seen, color=style.BLACK, label="from the motion", **POINTS)
         upper.plot(shown.t, said, color=style.ORANGE, label="model", **POINTS)
         lower.axhline(0.0, color=style.BLACK, linewidth=0.6)
         lower.plot(shown.t, said - seen, color=style.ORANGE, **POINTS)
@@ -46,7 +46,7 @@ def friction_figure(friction: RoadFriction) -> Figure:
     upper.fill_between(t, *ends, label="one standard deviation", **shade)
     upper.plot(t, ratio, color=style.BLUE, label="friction")
     upper.axhline(1.0, color=style.GREY, linewidth=0.8, linestyle="--", label="as taught")
-    upper.set(ylabel="friction over that\nof the drive that taught", ylim=(0.0, None))
+    upper.set(ylabel="friction over that of\nthe identification drive", ylim=(0.0, None))
     lower.plot(t, friction.another[some], color=style.ORANGE, label="another road")
     look: Mapping[str, Any] = {"color": style.BLACK, "linestyle": ":"}
     lower.plot(t, friction.unexplained[some], label="no friction explains it", **look)

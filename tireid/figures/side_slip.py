@@ -40,7 +40,7 @@ def side_slip_figure(
     drawn = list(recordings)[:MOST]
     told = {name: by_name for name, by_name in told.items() if by_name}
     if not told:
-        raise ValueError("no method told a lateral velocity")
+        raise ValueError("no method estimated a lateral velocity")
     has_band = {n: any(one.v_y_sd is not None for one in told[n].values()) for n in told}
     first = max(told, key=lambda name: (name == FIRST, has_band[name]))
     known = [recording.logged_v_y is not None for recording in drawn]
@@ -106,11 +106,11 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the v_y that was told over the true one, and its error, each with the band of two
     sigma.
     """
-    told, band = drive.told["v_y"], SIGMAS * drive.told["v_y_sd"]
-    inertial = drive.told["inertial_v_y"]
+    told, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
+    inertial = drive.estimates["inertial_v_y"]
     figure = style.new_figure(style.PAGE, 3.6)
     above, below = figure.subplots(2, 1, sharex=True)
-    shade: Mapping[str, Any] = {**_SHADE, "label": "told, two sigma"}
+    shade: Mapping[str, Any] = {**_SHADE, "label": "estimate, two sigma"}
     told_look: Mapping[str, Any] = {**style.ONLINE, "label": "told"}
     alone: Mapping[str, Any] = {"color": style.GREY, "label": "inertial identifier alone"}
     above.fill_between(drive.s, told - band, told + band, **shade)

@@ -44,13 +44,13 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
 
 
 def drawn_times(recording: Recording, t: Array) -> Array:
-    """Return times as a line is drawn over them: none where a stretch begins, so that it has a gap.
+    """Return times as a line is drawn over them: none where a segment begins, so that it has a gap.
 
     t : times of some of its samples, rising (k,) [s].
     """
     begins = recording.t[list(recording.breaks)]
-    stretch = np.searchsorted(begins, t, side="right")
-    return np.where(np.diff(stretch, prepend=stretch[:1]) > 0, np.nan, t)
+    segment = np.searchsorted(begins, t, side="right")
+    return np.where(np.diff(segment, prepend=segment[:1]) > 0, np.nan, t)
 
 
 def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:

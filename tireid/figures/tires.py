@@ -216,7 +216,7 @@ def learnt_axles_figure(
     if drawn is None:
         drawn = drawn_tracks(history)
         if drawn is None:
-            raise TypeError(f"{history.design} does not say what it learns of the axles")
+            raise TypeError(f"{history.design} has no estimates of the axles")
         for block in history.blocks():
             drawn.take(block)
     tracks, t = history.tracks_over(next(history.blocks())), history.recording.t

@@ -38,7 +38,7 @@ from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
 from identifier.run import identify
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict import judge_taught
+from identifier.verdict import judge_identification
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
@@ -360,7 +360,7 @@ def conditions(recording: Recording) -> dict[str, Any]:
 
 
 def _judged(model: FittedModel, recording: Recording) -> dict[str, Any]:
-    verdict = judge_taught(model, recording)
+    verdict = judge_identification(model, recording)
     codes = [f"{one.code}{f' {one.axle}' if one.axle else ''}" for one in verdict.findings]
     missed = verdict.measures.get("force_missed")
     each = missed if isinstance(missed, tuple) else (None, None)
@@ -419,7 +419,7 @@ class LearnSome:
 
     def died(self, task: _Task) -> Learnt:
         """Return the row of a log that processes die of."""
-        why = "the process that learnt it died, twice: it may want more memory than there is"
+        why = "its process died twice: it may need more memory than there is"
         return Learnt([replace(row_of(task, self.cars[task.vehicle]), error=why)], [])
 
 

@@ -62,7 +62,7 @@ class Merged:
     key: Key
     logs: int
     elsewhere: int
-    told: Information
+    information: Information
     model: FittedModel
 
     @property
@@ -129,7 +129,7 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, Lo
         setting = settings.setdefault((key, *row.key[:2]), row.setting)
         if setting != row.setting:
             raise MergeError(
-                f"{row.name} was learnt with two settings, {setting} and {row.setting}, and would "
+                f"{row.name} has rows of two settings, {setting} and {row.setting}, and would "
                 "count twice: merge --by setting, choose one by --where, or keep the newest by "
                 "fleet learn --replace"
             )
@@ -146,7 +146,7 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
     for _ in range(ROUNDS):
         for key, row in grouped(rows(), by):
             if key not in sums:
-                sums[key] = _Sum(row.told_car)
+                sums[key] = _Sum(row.declared_car)
             sums[key].add(row)
         for one in sums.values():
             one.end_round()
@@ -170,7 +170,7 @@ class _Sum:
 
     def _begin_round(self) -> None:
         self.logs = self.elsewhere = 0
-        self.told, self.reach = Information.nothing(), Reach()
+        self.information, self.reach = Information.nothing(), Reach()
 
     def end_round(self) -> None:
         """Go on to the next round; the last one stays."""
@@ -188,7 +188,7 @@ class _Sum:
             own = self._on_its_road(one)
             if own is not one:
                 self.elsewhere = before + 1
-            self.told += own
+            self.information += own
         slip, speeds, a_x, unexplained = row.numbers("reach", 4, 2)
         seconds = float(sum(row.part_seconds))
         self.reach = self.reach.with_(Reach(slip, speeds, a_x, seconds * unexplained**2, seconds))
@@ -212,7 +212,7 @@ class _Sum:
 
     def settled(self) -> tuple[Array, Array]:
         """Return the optimum and its covariance, as of `settled`."""
-        return settled(self.beliefs.after(self.told), self.beliefs.mean)
+        return settled(self.beliefs.after(self.information), self.beliefs.mean)
 
     def merged(self, key: Key) -> Merged:
         p, covariance = self.settled()
@@ -220,7 +220,11 @@ class _Sum:
         covariance[of_next, of_next] += self.errors[1] ** 2
         model = _model(self.vehicle, p, covariance, self.reach)
         return Merged(
-            key=key, logs=self.logs, elsewhere=self.elsewhere, told=self.told, model=model
+            key=key,
+            logs=self.logs,
+            elsewhere=self.elsewhere,
+            information=self.information,
+            model=model,
         )
 
 
@@ -307,7 +311,7 @@ def _of_size(one: Merged) -> tuple[Array, Array, Array, Array]:
     """
     model = one.model
     usual, size = Priors.of(model.vehicle), sizes(model.vehicle)
-    _, slope, H = one.told.around(model.p)
+    _, slope, H = one.information.around(model.p)
     known = H[np.ix_(OFF, OFF)] + usual.information[np.ix_(OFF, OFF)]
     across = H[np.ix_(TIRES, OFF)]
     matrix = H[np.ix_(TIRES, TIRES)] - across @ np.linalg.solve(known, across.T)

@@ -151,7 +151,7 @@ class LogRow:
         return f"bucket-{word.digest()[0] % _BUCKETS:02d}.parquet"
 
     @property
-    def told_car(self) -> Vehicle:
+    def declared_car(self) -> Vehicle:
         """The car as it was told."""
         try:
             return vehicle_from(json.loads(self.car))

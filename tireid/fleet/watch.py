@@ -79,7 +79,7 @@ class Part(NamedTuple):
     log: str
     date: str
     begin: float
-    told: Information
+    information: Information
 
 
 class Seen(NamedTuple):
@@ -196,7 +196,7 @@ def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watc
     parts: dict[str, list[Part]] = {}
     for key, row in grouped(rows, by):
         name = " ".join(value or "-" for _, value in key) or "all"
-        cars.setdefault(name, row.told_car)
+        cars.setdefault(name, row.declared_car)
         parts.setdefault(name, []).extend(parts_of(row))
     compared = {
         name: _against_baseline(sorted(some, key=_when), cars[name], watching)
@@ -247,15 +247,15 @@ def _against_baseline(
     parts: Sequence[Part], vehicle: Vehicle, watching: Watching
 ) -> _Compared | None:
     """Return the parts of a car against its baseline; None where there are none after it."""
-    learnt = np.cumsum([one.told.seconds for one in parts])
+    learnt = np.cumsum([one.information.seconds for one in parts])
     count = int(np.searchsorted(learnt, watching.baseline)) + 1
     if count >= len(parts):
         return None
     beliefs, told = Priors.of(vehicle), Information.nothing()
     for one in parts[:count]:
-        told += one.told.loosened(*errors_of(beliefs))
+        told += one.information.loosened(*errors_of(beliefs))
     p, _ = settled(beliefs.after(told), beliefs.mean)
-    changes = [change_from(one.told, p, beliefs) for one in parts]
+    changes = [change_from(one.information, p, beliefs) for one in parts]
     z, S = (np.array(each) for each in zip(*changes, strict=True))
     return _Compared(tuple(parts), z, S, list(range(count)))
 
@@ -284,7 +284,7 @@ def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     T = np.maximum((HELD * fleet + count * one.scatter) / (HELD + count), floor)
     usual = np.median(one.z[one.baseline], axis=0)
     z, variance = one.z[count:] - usual, one.S[count:] + T
-    seconds = np.array([part.told.seconds for part in one.parts[count:]])
+    seconds = np.array([part.information.seconds for part in one.parts[count:]])
     h = watching.threshold(float(seconds.mean()))
     delta = np.array([watching.stiffness, watching.stiffness, watching.friction])
     sums, g = np.zeros((len(z), 2, 3)), np.zeros((2, 3))

@@ -31,8 +31,8 @@ def write_compare_report(
     course, learnt = comparison.course, "recordings on which what the default learnt is valid"
     captions = {
         "methods": "Errors of every method.",
-        "matrix": "Learnt on one recording, asked about another.",
-        "side_slip": "Side slip as methods without a lateral velocity told it.",
+        "matrix": "Identified on one recording, validated on another.",
+        "side_slip": "Side slip estimated by methods without a lateral velocity.",
     }
     blocks: list[Block] = [
         Table(
@@ -45,19 +45,19 @@ def write_compare_report(
     blocks += drawings(figures, captions)
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
-        summary="Every method learns on each recording, is frozen at its end and asked about all "
-        "of them.",
+        summary="Each method is identified on each recording, frozen at its end and replayed on "
+        "all.",
         numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
         warnings=[
             *_compare_warnings(comparison),
             *(
                 one
                 for name, verdict in verdicts.items()
-                for one in verdict_warnings(verdict, f"The default learnt on {name}: ")
+                for one in verdict_warnings(verdict, f"The default identified on {name}: ")
             ),
         ],
         sections=[
-            Section(heading="Which method knows the tires", blocks=blocks),
+            Section(heading="Errors of the methods", blocks=blocks),
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
         ],
     )
@@ -72,9 +72,9 @@ def _compare_headlines(comparison: Comparison) -> list[Headline]:
         shares = comparison.shares(name)
         value = shares.other if elsewhere else shares.in_sample
         if value is not None and np.isfinite(value):
-            where = "frozen, on other recordings" if elsewhere else "frozen, where learnt"
+            where = "frozen, on other recordings" if elsewhere else "frozen, same drive"
             numbers.append(
-                Headline(f"{value:.1f} %", f"of the rms force missed by {name}, {where}")
+                Headline(f"{value:.1f} %", f"error in % of the rms force, {name}, {where}")
             )
     return numbers[:4]
 
@@ -85,13 +85,13 @@ def _compare_warnings(comparison: Comparison) -> list[str]:
     said = [f"{vehicle.estimates}."] if vehicle.estimates else []
     if comparison.course.by_motion:
         said.append(
-            "Without true forces methods are judged by the motion: by mean forces over 0.3 s, the "
-            "noise of the sensors taken off. A wrong mass scales all of them alike."
+            "Without true forces, methods are judged by the mean force in the motion over 0.3 s, "
+            "sensor noise subtracted. A wrong mass scales all alike."
         )
     for name, trial in comparison.trials.items():
         at = [f"{where} at {freeze_key(t)} s" for where, t in trial.diverged_at.items()]
         if at:
             said.append(f"{name} diverged on {', '.join(at)}.")
     if len(comparison.names) == 1:
-        said.append("One recording: nothing says how a method does on a drive it did not learn on.")
+        said.append("One recording only: give a second one as validation drive.")
     return said

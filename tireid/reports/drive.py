@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from models.files import digest
 from mpc.handover.rules import Verdict
-from mpc.loop.record import told_scores
+from mpc.loop.record import estimate_scores
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
@@ -34,9 +34,9 @@ def write_drive_report(
         warnings=_drive_warnings(runs),
         sections=[
             Section(heading="How the car drove", blocks=_drive_blocks(runs, figures, film)),
-            Section(heading="What the tracker knew", blocks=known_blocks(runs, figures)),
+            Section(heading="The tracker's tires", blocks=known_blocks(runs, figures)),
             Section(
-                heading="Was it in time?",
+                heading="Timing",
                 blocks=drawings(figures, {"solve_times": "How long a step took."}),
             ),
             origin(
@@ -70,12 +70,12 @@ def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
         )
         for run in runs[1:]
     ]
-    told = told_scores(runs[0].drive)
+    told = estimate_scores(runs[0].drive)
     if told is not None:
         numbers.append(
             Headline(
                 f"{told.rms_error_deg:.2f}°",
-                f"rms error of the side slip that was told, of {told.rms_deg:.2f}°",
+                f"rms error of the estimated side slip, of {told.rms_deg:.2f}°",
             )
         )
     median, p99 = first.solve_ms["median"], first.solve_ms["p99"]
@@ -141,7 +141,7 @@ def _drive_blocks(
     captions = {
         "path": "The path from above.",
         "errors": "Deviation, heading, acceleration and speed along the path.",
-        "steering": "What was asked of the front wheels.",
+        "steering": "Steering command.",
     }
     return [*blocks, *drawings(figures, captions)]
 
@@ -149,12 +149,12 @@ def _drive_blocks(
 def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
     """Return what trackers believed of the tires, and what they were told on the way."""
     captions = {
-        "tires": "Forces of the first drive, and what trackers believed of the tires.",
+        "tires": "Forces of the first drive, and the tire models of the trackers.",
         "lateral": "Lateral velocity, which no sensor measured: the truth and the estimate.",
     }
     blocks: list[Block] = [*drawings(figures, captions)]
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
         header = ["tires", "time [s]", "what"]
-        blocks.append(Table(caption="What was decided on the way.", header=header, rows=notes))
+        blocks.append(Table(caption="Decisions along the way.", header=header, rows=notes))
     return blocks

@@ -22,9 +22,9 @@ DRAWN = 6  # cars with an alarm that are drawn
 
 _READ_STIFFNESS = (
     "Dots of a car lie on a level line; a step or a slope is a change of its tires, its load or a "
-    "sensor. Hollow dots are logs whose answer the verdict refuses."
+    "sensor. Hollow dots are rejected logs."
 )
-_READ_CURVES = "Each curve ends where it is known; a dotted one is the prior: nothing was learnt."
+_READ_CURVES = "Each curve ends where it is known; a dotted one is the prior alone."
 _READ_WATCH = (
     "Dots around zero are tires as in the baseline. A change stays away from zero by more than its "
     "bars, for as long as it lasts."
@@ -64,7 +64,7 @@ def write_fleet_report(
         drawing(stiffness_figure(learnt), "Cornering stiffness, log by log.", _READ_STIFFNESS),
     ]
     sections = [
-        Section(heading="What the logs say together", blocks=models),
+        Section(heading="Merged models", blocks=models),
         Section(heading="What changed", blocks=_watch_blocks(watched)),
     ]
     if errors or refused:
@@ -77,10 +77,10 @@ def write_fleet_report(
             rows=listed[:LISTED],
             verbatim=True,
         )
-        sections.append(Section(heading="What was left out", blocks=[table], folded=True))
+        sections.append(Section(heading="Logs left out", blocks=[table], folded=True))
     report = Report(
         title=f"Fleet of {store}",
-        summary="What each log tells of the tires adds up: one model for each group of logs.",
+        summary="The information of the logs adds up: one model for each group.",
         numbers=numbers,
         warnings=warnings,
         sections=[*sections, _origin(command, store, rows)],
@@ -93,7 +93,7 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
     lasting = [alarm for alarm in watched.alarms if not alarm.ended]
     report = Report(
         title=f"Changes in the fleet of {store}",
-        summary="Each car's tires against its own baseline.",
+        summary="Each car's tires against its baseline.",
         numbers=[
             Headline(str(len(watched.seen)), "cars watched"),
             Headline(f"{watched.hours:.3g} h", "learning after their baselines"),
@@ -144,7 +144,7 @@ def _groups_table(groups: Sequence[Merged]) -> Table:
     for one in groups:
         known = map(float, np.degrees(one.model.known_slip))
         C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
-        rows.append([one.name, one.logs, one.told.seconds / 60.0, *C, *known])
+        rows.append([one.name, one.logs, one.information.seconds / 60.0, *C, *known])
     return Table(
         caption=f"Merged models{_first(len(rows))}.",
         header=["group", "logs", "learning [min]", "stiffness front [kN/rad]", "rear [kN/rad]",

@@ -49,7 +49,7 @@ def write_identify_report(
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
         verdicts.verdict_section(verdict),
-        page.Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
+        page.Section(heading="Identified tires", blocks=learnt_blocks(law, model, figures)),
         page.Section(
             heading="How well it predicts",
             blocks=[*_asked(asked), *_errors([runs[0], *parts, *runs[1:]], frozen, figures)],
@@ -68,7 +68,7 @@ def write_identify_report(
     ]
     notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, runs)]
     report = page.Report(
-        title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
+        title=f"Tires of {learnt.vehicle.name}, identified on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
             verdicts.verdict_headline(verdict, notes),
@@ -101,8 +101,8 @@ def _how_learnt(learnt: History) -> str:
     estimated = learnt.recording.logged_v_y is None
     lateral = "acceleration" if estimated else "velocity"
     told = side_slip_text(learnt)
-    more = f" Nobody measured lateral velocity: {told}." if estimated and told else ""
-    how = "learnt sample by sample" if learnt.online else "one estimate of tires and sensors"
+    more = f" Lateral velocity was not measured: {told}." if estimated and told else ""
+    how = "identified sample by sample" if learnt.online else "one estimate of tires and sensors"
     return (
         f"{learnt.recording.duration:.4g} s of driving, {how} from speed, "
         f"lateral {lateral}, yaw rate and steering.{more}"
@@ -117,7 +117,10 @@ def side_slip_text(learnt: History) -> str:
     sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
     seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
     median = float(np.degrees(np.median(sd)))
-    return f"side slip was told to ± {median:.2g} deg (median), observable {seen:.0f} % of the time"
+    return (
+        f"side slip was estimated to ± {median:.2g} deg (median), observable {seen:.0f} % of the "
+        "time"
+    )
 
 
 def identify_headlines(
@@ -125,22 +128,22 @@ def identify_headlines(
 ) -> list[page.Headline]:
     """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers = []
-    for kind, some in (("not learnt on", runs[1:]), ("learnt on", runs[:1])):
+    for kind, some in (("of validation", runs[1:]), ("of identification", runs[:1])):
         shares = [share for run in some if (share := _share(run, replays)) is not None]
         if shares:
-            meaning = f"of the rms force missed on drives {kind}, frozen"
+            meaning = f"of the rms force: error on drives {kind}, frozen"
             numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
     return [*numbers, *verdicts.known_headline(model)]
 
 
 def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
-    """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
-    meaning = "replayed drives, not learnt on, whose motion the model gives back"
+    """Return on how many validation drives a model is valid, and its error."""
+    meaning = "replayed validation drives with a valid prediction"
     numbers = verdicts.verdicts_headline(asked, meaning)
     shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
     if shares:
         front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
-        meaning = "missed of the force that the motion of these drives shows, front / rear"
+        meaning = "error over the force in the motion of these drives, front / rear"
         numbers.append(page.Headline(f"{front} / {rear} %", meaning))
     return numbers
 
@@ -169,12 +172,11 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
             said.append(f"{name}: learning diverged at {freeze_key(run.diverged_at)} s.")
         if recording.axle_force is None and run.online:
             said.append(
-                f"{name} has no true forces: errors are against what was identified online over "
-                "it, which asks only whether the model agrees with itself."
+                f"{name} has no true forces: errors are against the forces identified online."
             )
         said += _extrapolated(model, recording)
     if model.known_slip is None:
-        said.append("This kind of model cannot tell where it knows the tires and where it guesses.")
+        said.append("This kind of model does not report the slip range that it was identified for.")
     return said
 
 
@@ -203,19 +205,19 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     blocks: list[page.Block] = [
         page.Paragraph(
             text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
-            "left. curve.csv holds the curve with what is known of it, weights.json the model."
+            "left. curve.csv has the curve with its uncertainty, weights.json the model."
         )
     ]
     if facts:
         blocks.append(
-            page.Table(caption=f"What {law} knows of the tires.", header=["", *AXLES], rows=facts)
+            page.Table(caption=f"Parameters of the tires, {law}.", header=["", *AXLES], rows=facts)
         )
     for told in (band_sentence(model), guaranteed_sentence(model)):
         if told:
             blocks.append(page.Paragraph(text=told))
     captions = {
         "side_slip": "Side slip as it was estimated.",
-        "learnt": "What was learnt over time.",
+        "learnt": "Estimates over time.",
         "error": "Norm of the observer's error.",
         "weights": "Weights of the network.",
     }
@@ -233,8 +235,7 @@ def band_sentence(model: TireModel) -> str:
     return (
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
-        f"width: {model.band_origin}. "
-        "Where slip is not known it widens to what was believed before the drive."
+        f"width: {model.band_origin}. Where slip is not known it widens to the prior."
     )
 
 
@@ -256,12 +257,12 @@ def guaranteed_sentence(model: TireModel) -> str:
         f"{late_rear:.0f} ms times how fast it changes. Where slip is beyond that of the drive, "
         f"or a force changes faster than there, by more than {fast_front:.1f} / {fast_rear:.1f} "
         "static axle loads a second, the difference may be as much larger. That bound was "
-        f"{'told' if given.told else 'estimated from the drive'}."
+        f"{'given' if given.given else 'estimated from the drive'}."
     )
 
 
 def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
-    """Return the verdicts on a model over drives that it was not learnt on, as a table."""
+    """Return the verdicts on a model over drives that it was of validation, as a table."""
     rows: list[list[page.Cell]] = []
     for name, verdict in asked.items():
         missed = verdict.force_missed or (None, None)
@@ -271,8 +272,8 @@ def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
     if not rows:
         return []
     caption = (
-        "The verdict on each replayed drive, as of tireid predict, and what is missed of the "
-        "force that the motion shows."
+        "The verdict on each replayed drive, as of tireid predict, and the error over the force "
+        "in the motion."
     )
     return [
         page.Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)
@@ -306,7 +307,7 @@ def _errors(
         blocks.append(drawing(figures["forces"], caption, read))
     for name, figure in figures.items():
         if name.startswith("replay_"):
-            caption = f"The frozen model asked about {name.removeprefix('replay_')}."
+            caption = f"The frozen model on {name.removeprefix('replay_')}."
             blocks.append(drawing(figure, caption, READ["replay"]))
     return blocks
 

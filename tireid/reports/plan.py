@@ -73,7 +73,7 @@ def write_plan_report(
 ) -> None:
     words = plan_words(found, driven)
     report = Report(
-        title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",
+        title=f"Maneuver in {found.space.length:g} x {found.space.width:g} m",
         summary=words[0],
         numbers=[
             Headline(f"{100.0 * found.error:.1f} %", "expected error of the forces over the grip"),
@@ -84,15 +84,15 @@ def write_plan_report(
         warnings=_plan_warnings(found, driven),
         sections=[
             Section(
-                heading="What to drive",
+                heading="Maneuver",
                 blocks=[
-                    drawing(figures["area"], "The passes in the area.", READ["plan_area"]),
-                    drawing(figures["steering"], "What to steer.", READ["plan_steering"]),
+                    drawing(figures["area"], "Passes in the area.", READ["plan_area"]),
+                    drawing(figures["steering"], "Steering.", READ["plan_steering"]),
                     Paragraph(text=_how(found)),
                 ],
             ),
             Section(
-                heading="What it will teach",
+                heading="Expected gain",
                 blocks=[
                     drawing(
                         figures["band"], "The band of 90 % before and after.", READ["plan_band"]
@@ -101,7 +101,7 @@ def write_plan_report(
                     _rivals(found),
                 ],
             ),
-            Section(heading="How safe it is", blocks=[Paragraph(text=text) for text in words[2:]]),
+            Section(heading="Safety", blocks=[Paragraph(text=text) for text in words[2:]]),
             origin(
                 command,
                 found.tires.vehicle,
@@ -120,11 +120,11 @@ def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
         "for possible, a wet place or a lower speed change the way."
     ]
     if not found.space.held:
-        said.append("Nobody holds the course: whatever pushes the car stays in its way.")
+        said.append("Open loop: disturbances of the course are not corrected.")
     if driven and least(driven) < 0.0:
         said.append(
             f"The double-track car of the vehicle file leaves the area by {-least(driven):.2g} m: "
-            "its tires are not among those planned for. Tell --mu, or ask for less --grip."
+            "its tires are outside the planned set. Set --mu, or ask for less --grip."
         )
     return said
 
@@ -134,19 +134,19 @@ def _how(found: Plan) -> str:
     space, lag = found.space, 1e3 * float(found.tires.steering_lag[0])
     paths = "path.csv" if len(found.passes) == 1 else "path.csv, path_2.csv, ..."
     how = (
-        "steering.csv holds the angle asked of the front wheels [rad], to the left positive, over "
-        "the time since the entry of each pass, and the course of the center of gravity that "
-        "follows: X along the longer side of the area, Y to the left of it, both from the corner "
-        f"in which the area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. "
-        f"The speed is held. {paths}: the course with a straight run-up, as tireid drive --path "
-        f"path.csv --speed {space.speed:g}m/s and other path trackers read it; who tracks it well "
-        "steers much the same."
+        "steering.csv has the front wheel angle [rad], to the left positive, over the time since "
+        "the entry of each pass, and the course of the center of gravity that follows: X along "
+        "the longer side of the area, Y to the left of it, both from the corner in which the "
+        f"area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. The speed is "
+        f"constant. {paths}: the course with a straight run-up, as tireid drive --path path.csv "
+        f"--speed {space.speed:g}m/s and other path trackers read it; who tracks it well steers "
+        "much the same."
     )
     if not space.held:
         return how
     hold = hold_of(found.tires, space.speed)
     return (
-        f"{how} Who plays steering.csv, a robot or a person, also holds the course, slowly: add "
+        f"{how} The robot or driver of steering.csv also corrects the course, slowly: add "
         f"{hold.heading:.3g} rad per rad of heading that is missing and {hold.aside:.3g} rad per "
         "meter that the car is off to the right."
     )
@@ -169,9 +169,9 @@ def rival_rows(found: Plan) -> list[list[str]]:
 def _rivals(found: Plan) -> Table:
     """Return the plan beside slalom and random steering."""
     return Table(
-        caption="The plan beside maneuvers of the same length at the same share of the grip, error "
-        "in parts of the grip; their room is what the car takes on an open field, without margins; "
-        "random is the median of eight.",
+        caption="The plan and maneuvers of the same length at the same share of the grip, error "
+        "over the grip; their room is that on an open field, without margins; random is the "
+        "median of eight.",
         header=RIVALS,
         rows=rival_rows(found),
     )

@@ -43,9 +43,9 @@ def write_predict_report(
     found: list[page.Block] = [*_errors(prediction)]
     found += [page.Paragraph(text=page.printed(line)) for line in told.splitlines()]
     captions = {
-        "motion": "Mean force over windows of 0.3 s: shown by the motion, and by the model.",
+        "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
         "forces": "Axle forces over time.",
-        "friction": "Friction of the road over that of the drive that taught.",
+        "friction": "Friction of the road over that of the identification drive.",
     }
     found += [
         drawing(figures[name], caption, READ["replay" if name == "forces" else name])
@@ -56,9 +56,9 @@ def write_predict_report(
         page.Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))
     ]
     report = page.Report(
-        title=f"Tires of {source.name} asked about {recording.name}",
-        summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, from which the "
-        "model learnt nothing.",
+        title=f"Tires of {source.name} on {recording.name}",
+        summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
+        "identification.",
         numbers=[
             verdict_headline(verdict, notes),
             *of_answer(verdict, [*missed_headline(verdict), *_predict_headlines(prediction)]),

@@ -1,4 +1,4 @@
-/* What was learnt, for the prediction of the tracker. */
+/* The identified tire, for the prediction of the tracker. */
 #include "tireid_handover.h"
 
 #include <math.h>

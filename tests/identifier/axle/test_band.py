@@ -121,7 +121,7 @@ def test_where_nobody_was_the_band_is_the_priors(swinging, model):
     narrowed = replace(
         new,
         calibration=replace(
-            BandCalibration.told(new.reference_speed),
+            BandCalibration.declared(new.reference_speed),
             factors=np.full((2, 6), 0.1),
             color=np.full(2, 9.0),
         ),

@@ -168,7 +168,7 @@ def test_another_road_contradicts_the_guarantee(model):
 
 def test_a_told_bound_is_taken_or_its_violation_is_told(run, model):
     told = guaranteed(run, 0.3)
-    assert told.guarantee.told and not model.guarantee.told
+    assert told.guarantee.given and not model.guarantee.given
     assert told.guarantee.bound == ForceBound(error=(0.3, 0.3))
     with pytest.raises(BoundViolatedError, match=r"violated at the front axle: .* from .* s on"):
         guaranteed(run, 0.002)
@@ -216,13 +216,13 @@ def test_a_stored_guarantee_comes_back(model, tmp_path):
         ("corners", [[[1.0, 2.0]], [[1.0, 2.0]]]),
         ("error_static_axle_loads", [0.1]),
         ("lateness_s", [0.0, -1.0]),
-        ("told", "yes"),
+        ("given", "yes"),
         ("speed_m_s", -3.0),
     ):
         with pytest.raises(FrozenModelError):
             type(model).from_dict(data | {"guarantee": data["guarantee"] | {key: wrong}}, "file")
     with pytest.raises(FrozenModelError, match="missing"):
-        type(model).from_dict(data | {"guarantee": {"told": True}}, "file")
+        type(model).from_dict(data | {"guarantee": {"given": True}}, "file")
 
 
 def test_a_calibrated_model_can_carry_it(run, model):
@@ -321,11 +321,11 @@ def test_the_bound_grows_with_a_rate_that_did_not_teach(model):
     """Twice as fast as anything that taught: the error may be twice as large, beside τ ρ."""
     given, axles = model.guarantee, ("front", "rear")
     for i, axle in enumerate(axles):
-        as_taught = model.guaranteed_band(0.02, axle, rate=given.fastest[i])
+        unchanged = model.guaranteed_band(0.02, axle, rate=given.fastest[i])
         twice = model.guaranteed_band(0.02, axle, rate=2.0 * given.fastest[i])
         more = given.bound.error[i] + given.bound.lateness[i] * given.fastest[i]
         more *= model.vehicle.axle_loads[i]
-        np.testing.assert_allclose(np.subtract(twice, as_taught), [-more, more], rtol=1e-9)
+        np.testing.assert_allclose(np.subtract(twice, unchanged), [-more, more], rtol=1e-9)
 
 
 def test_the_bound_grows_with_slip_that_did_not_teach(model):
@@ -343,7 +343,7 @@ def test_the_bound_grows_with_slip_that_did_not_teach(model):
 
 
 def test_an_empty_guarantee_is_refused():
-    told = {"bound": ForceBound(error=(1, 1)), "told": True, "speed": 9.0}
+    told = {"bound": ForceBound(error=(1, 1)), "given": True, "speed": 9.0}
     with pytest.raises(ValueError, match="corners"):
         Guarantee(**told, corners=(np.ones((0, 4)),) * 2, fastest=(1.0, 1.0))
     with pytest.raises(ValueError, match="fastest force"):

@@ -1,4 +1,4 @@
-"""A diagnosis: what comes first, what is sure, what is unseen, and a repair that mends the log."""
+"""A diagnosis: the order, what is sure, what is not observable, and a repair of the log."""
 
 import json
 from dataclasses import replace
@@ -44,12 +44,12 @@ def test_a_right_log_is_healthy_and_what_it_cannot_tell_is_said(driven):
     fine = diagnose(log, car)
     assert fine.healthy
     assert fine.findings == () and not fine.repair
-    assert fine.unseen[0].startswith("mass")
-    assert any("mirrored" in line for line in fine.unseen)
+    assert fine.unobservable[0].startswith("mass")
+    assert any("mirrored" in line for line in fine.unobservable)
     assert "nothing found" in fine.summary()
-    assert not any("a_y" in line for line in fine.unseen)
+    assert not any("a_y" in line for line in fine.unobservable)
     bare = diagnose(replace(log, a_y=None), car)
-    assert any("no a_y" in line for line in bare.unseen)
+    assert any("no a_y" in line for line in bare.unobservable)
 
 
 def test_the_ratio_of_the_steering_wheel_is_found(found):
@@ -86,7 +86,7 @@ def test_a_diagnosis_is_ready_for_json_and_short_to_print(found):
     data = json.loads(json.dumps(found.to_dict()))
     assert data["findings"][0]["repair"] == data["repair"]
     assert repr(found).startswith("<Diagnosis of 'sedan, straight': steering_ratio delta_f")
-    assert "cannot be seen: mass" in found.summary()
+    assert "not observable: mass" in found.summary()
 
 
 def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
@@ -99,7 +99,7 @@ def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
         ),
         Finding(code="offset", channel="r", confidence=0.6, repair=Repair(offset={"r": 0.1})),
     )
-    whole = Diagnosis(name="log", findings=findings, unseen=())
+    whole = Diagnosis(name="log", findings=findings, unobservable=())
     assert whole.repair == Repair(factor={"r": 0.55})
     assert combined(findings).offset == {"r": 0.1}
 
@@ -122,15 +122,15 @@ def test_whether_something_is_wrong_is_one_question_and_which_of_several_another
     )
     alone = Finding(code="lag", channel="v_y", confidence=0.45, group=0.45)
     assert one.alarm == 0.9 and one.matters
-    assert not Diagnosis(name="log", findings=(one, other), unseen=()).healthy
-    assert Diagnosis(name="log", findings=(alone,), unseen=()).healthy
+    assert not Diagnosis(name="log", findings=(one, other), unobservable=()).healthy
+    assert Diagnosis(name="log", findings=(alone,), unobservable=()).healthy
     assert one.to_dict()["alarm"] == 0.9
     assert Finding(code="straight", confidence=0.99).alarm == 0.99
 
 
 def test_a_log_alone_proves_nothing():
     certain = Finding(code="straight", confidence=1.0, text="it goes straight ahead")
-    found = Diagnosis(name="log", findings=(certain,), unseen=())
+    found = Diagnosis(name="log", findings=(certain,), unobservable=())
     assert certain.percent == "99 %"
     assert found.lines() == ["it goes straight ahead (confidence 99 %)"]
 
@@ -165,7 +165,7 @@ def test_nothing_is_looked_for_where_nothing_was_driven(driven):
     standing = replace(log, v_x=0.0 * log.v_x, v_y=0.0 * log.v_y, r=0.0 * log.r)
     found = diagnose(standing, sedan())
     assert not found.healthy
-    assert any(line.startswith("offsets, delays") for line in found.unseen)
+    assert any(line.startswith("offsets, delays") for line in found.unobservable)
 
 
 def test_a_law_that_no_reading_mends_is_told_as_it_is(driven):

@@ -1,4 +1,4 @@
-"""Planted faults are found with their sizes, none on a clean drive, and what is unseen is said."""
+"""Planted faults are found with their sizes, none on a clean drive; the rest is listed."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,7 @@ from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from identifier.doctor import Finding, diagnose, examine
 from identifier.doctor.faults import Candidate, Search, _all_move, prepared
-from identifier.doctor.pieces import stretches_of
+from identifier.doctor.pieces import segments_of
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
 from identifier.estimate.solve import descend, simulate
@@ -57,8 +57,8 @@ def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
     car, log, _ = driven
     said = examine(log, car)
     assert said.findings == ()
-    assert all("would not be seen" in line for line in said.unseen)
-    assert len(said.unseen) < 3
+    assert all("is not observable" in line for line in said.unobservable)
+    assert len(said.unobservable) < 3
 
 
 @pytest.mark.parametrize("kind", SIZED)
@@ -345,7 +345,7 @@ def test_a_log_that_no_fault_explains_is_found_to_be_one(driven):
     (found,) = said.findings
     assert found.matters and found.code == "no_tire" and found.channel == "delta_f"
     assert "front axle" in found.text and "commanded" in found.text
-    assert said.unseen == ("sizes of faults: no tire explains the log",)
+    assert said.unobservable == ("sizes of faults: no tire explains the log",)
 
 
 def test_what_a_straight_drive_cannot_tell_is_said(driven):
@@ -354,14 +354,14 @@ def test_what_a_straight_drive_cannot_tell_is_said(driven):
     straight = replace(log, **{name: 0.003 * getattr(log, name) for name in names})
     said = examine(straight, car)
     assert said.findings == ()
-    assert any(line.startswith("center of gravity") for line in said.unseen)
+    assert any(line.startswith("center of gravity") for line in said.unobservable)
 
 
 def test_a_drive_that_never_drives_is_not_asked(driven):
     car, log, _ = driven
     said = examine(replace(log, v_x=0.01 * log.v_x), car)
     assert said.findings == ()
-    assert "hardly drives" in said.unseen[0]
+    assert "hardly drives" in said.unobservable[0]
 
 
 def test_a_long_log_is_looked_at_where_it_is_lively(driven):
@@ -375,12 +375,12 @@ def test_a_long_log_is_looked_at_where_it_is_lively(driven):
             for name in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
         },
     )
-    parts = stretches_of(longer, car, longest=60.0, pieces=4)
+    parts = segments_of(longer, car, longest=60.0, pieces=4)
     assert len(parts) == 4
     assert sum(part.duration for part in parts) == pytest.approx(60.0, abs=0.1)
     turning = math.sqrt(sum(np.mean(part.r**2) for part in parts) / 4.0)
     assert turning > math.sqrt(np.mean(log.r**2))
-    assert stretches_of(log, car, longest=61.0, pieces=4) == (log,)
+    assert segments_of(log, car, longest=61.0, pieces=4) == (log,)
 
 
 @pytest.mark.parametrize("n", range(6000, 6006))
@@ -391,7 +391,7 @@ def test_a_log_that_is_hardly_longer_than_what_is_looked_at_is_cut_all_the_same(
     names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
     signals = {name: np.interp(fine, log.t, getattr(log, name)) for name in names}
     minute = replace(log, t=0.01 * np.arange(n), **signals)
-    parts = stretches_of(minute, car, longest=60.0, pieces=4)
+    parts = segments_of(minute, car, longest=60.0, pieces=4)
     if minute.duration <= 60.0:
         assert parts == (minute,)
     else:
@@ -404,7 +404,7 @@ def test_nothing_is_made_of_the_jump_over_a_gap(driven):
     kept = np.r_[0 : n // 3, n // 3 + 700 : n // 3 + 750, n // 2 : n]
     broken = log.taken(kept)
     assert len(broken.breaks) == 2
-    parts = stretches_of(broken, car, longest=61.0, pieces=4)
+    parts = segments_of(broken, car, longest=61.0, pieces=4)
     assert [len(part) for part in parts] == [n // 3, n - n // 2]  # half a second is left out
     assert not any(part.breaks for part in parts)
     assert found_in(broken, car) == ()
@@ -424,7 +424,7 @@ def test_a_suspect_repairs_what_it_says(suspect, driven):
     assert "±" in suspect.words(size, 0.1 * size, car)
 
 
-def test_a_late_signal_is_read_on_time_within_each_stretch(driven):
+def test_a_late_signal_is_read_on_time_within_each_segment(driven):
     car, log, exact = driven
     n = len(log)
     late = Late(channels=("v_y", "r"), delay=0.1).apply(exact)

@@ -1,4 +1,4 @@
-"""Which stretches of a long drive the doctor looks at, and what it holds to find them."""
+"""Which segments of a long drive the doctor looks at, and what it holds to find them."""
 
 import tracemalloc
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from codegen import arrays
-from identifier.doctor.pieces import stretches_of
+from identifier.doctor.pieces import segments_of
 from models.recordings import Recording
 from models.vehicle import sedan
 
@@ -21,10 +21,10 @@ def drive(rng) -> Recording:
 
 
 def places(drive: Recording) -> list[float]:
-    return [float(one.t[0]) for one in stretches_of(drive, sedan(), longest=60.0, pieces=4)]
+    return [float(one.t[0]) for one in segments_of(drive, sedan(), longest=60.0, pieces=4)]
 
 
-def test_the_liveliest_stretch_of_each_part_is_looked_at(drive):
+def test_the_liveliest_segment_of_each_part_is_looked_at(drive):
     length, quarter = round(15.0 / DT), N // 4
     for k, begin in enumerate(places(drive)):
         starts = np.arange(k * quarter, (k + 1) * quarter - length + 1, length // 10)

@@ -97,7 +97,7 @@ def test_a_v_y_that_hardly_stands_out_of_its_noise_has_no_unit_of_its_own(kind, 
     found = screen(calm, car)
     assert found.findings == ()
     assert "v_y" in Motion.of(calm).hidden
-    assert any(line.startswith("unit of v_y") for line in found.unseen)
+    assert any(line.startswith("unit of v_y") for line in found.unobservable)
     lively = log.taken(slice((1 - half) * n, (2 - half) * n))
     assert Motion.of(lively).hidden == frozenset()
     assert screen(scaled("v_x", 3.6).apply(calm), car).findings[0].code == "unit"
@@ -415,10 +415,10 @@ def long(one):
 
 
 def part_of(recording, **signals):
-    """The recording with other values in its first stretch."""
+    """The recording with other values in its first segment."""
     changed = {name: getattr(recording, name).copy() for name in signals}
     for name, value in signals.items():
-        changed[name][recording.stretches[0]] = value
+        changed[name][recording.segments[0]] = value
     return replace(recording, **changed)
 
 
@@ -436,7 +436,7 @@ def test_a_channel_that_rests_for_a_while_is_told_and_the_rest_is_asked(long):
     first, frozen = found.findings
     assert (first.code, first.channel) == ("unit", "r")
     assert (frozen.code, frozen.channel) == ("frozen", "v_y")
-    assert frozen.size == pytest.approx(np.ptp(log.t[log.stretches[0]]), abs=0.05)
+    assert frozen.size == pytest.approx(np.ptp(log.t[log.segments[0]]), abs=0.05)
     assert not found.blind
 
 

@@ -24,7 +24,7 @@ from mpc.path.gates import iso_3888_2
 from mpc.tires import prediction_tire
 from mpc.tires.tire import DOUBT_STEP, Car, Point
 from tireid import exporting
-from tireid.driving.runs import LEARNING, make_learner, told_tire
+from tireid.driving.runs import LEARNING, given_tire, make_learner
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.planning import plan
 
@@ -204,7 +204,7 @@ def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
     path = iso_3888_2()
     wish = SpeedWish(0.9, None)
     setup = Setup(path=path, vehicle=CAR, mu=1.0, drops=(), wish=wish)
-    told = told_tire(LEARNING, setup, fitted)
+    told = given_tire(LEARNING, setup, fitted)
     learner = make_learner(fitted, CAR)
     handed = prediction_tire(learner.supervisor.identifier.model())
     assert told.structure == handed.structure

@@ -187,7 +187,7 @@ def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
     assert not {"not_observable", "a_y_late"} & {code for code, _ in learnt.notes}
 
 
-def test_nothing_goes_from_one_stretch_to_the_next(exact):
+def test_nothing_goes_from_one_segment_to_the_next(exact):
     log = blind(exact)
     both = joined([log.between(0.0, 8.0), log.between(12.0, 19.9)])
     nodes = Nodes.of(both, CAR)

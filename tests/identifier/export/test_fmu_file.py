@@ -117,9 +117,9 @@ def test_the_switch_of_learning_says_what_it_holds(exported, version, tmp_path):
         return switch.description
 
     step = specialize(DESIGN, CAR)
-    held = said(exported[version]).removeprefix("whether it learns; false holds ")
+    held = said(exported[version]).removeprefix("whether it adapts; false freezes ")
     assert step.learnt and held.split(", ") == list(step.learnt)
     export_fmu(step._replace(learnt=()), tmp_path / "none.fmu", version)
     assert said(tmp_path / "none.fmu").endswith(
-        "holds nothing: this method has no memory of the tire"
+        "freezes nothing: this method has no memory of the tire"
     )

@@ -137,7 +137,7 @@ def test_frozen_weights_hold_through_a_gap(law, shipped, slalom):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_drive_in_stretches_gives_the_forces_of_the_same_run_in_python(law, shipped, slalom):
+def test_a_drive_in_segments_gives_the_forces_of_the_same_run_in_python(law, shipped, slalom):
     drive = slalom if "a_y" in shipped[law].inputs else replace(slalom, a_y=None)
     drive = drive.taken(np.r_[:900, 1100:2000])
     shipped[law].init()

@@ -195,7 +195,7 @@ def unusable(rng):
         "no ONNX graph": b"",
         "Failed to parse ONNX model": b"not a network",
         "Unsupported operation 'Softmax'": network_file([first, second], activation="Softmax"),
-        "reads 3 columns: say with inputs": network_file([three]),
+        "reads 3 columns: declare with inputs": network_file([three]),
         "the outputs must be the two forces": network_file([first, rng.standard_normal((10, 3))]),
         r"must be \(columns,\) or \(batch, columns\)": network_file([first, second], batch=32),
         "FLOAT or DOUBLE, holds": network_file([first, second], number=np.float16),

@@ -126,7 +126,7 @@ def test_a_package_says_what_is_proven_of_it(packages):
     """The boxes and the properties of the default are those of its design."""
     axle, integral = packages["axle"], packages["integral"]
     told = json.loads(axle.files["tireid.json"])["certificate"]
-    held, method = told["held_by_construction"], axle.specialized.method
+    held, method = told["limits"], axle.specialized.method
     assert told["verdict"] == "pass"
     assert told["properties"]["jump"]["value"] == method.certify(CAR)["jump"].value
     bounds = method.bounds

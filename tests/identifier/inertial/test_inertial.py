@@ -223,7 +223,7 @@ def test_a_stored_model_is_gone_on_from(history, banked):
 
 
 def test_how_sure_a_stored_zero_of_the_steering_is_stays_known(history):
-    """What was learnt goes on as one number does: the same covariance, and not the first guess."""
+    """Covariances go on as one number does: the same covariance, and not the first guess."""
     stored = history.freeze()
     again = METHOD.frozen(CAR, METHOD.setup(CAR, stored).carry)
     np.testing.assert_allclose(again.covariance, stored.covariance, rtol=1e-9, atol=1e-15)
@@ -235,13 +235,13 @@ def test_how_sure_a_stored_zero_of_the_steering_is_stays_known(history):
 def test_numbers_at_their_bounds_are_told(history):
     state = history.state_at(history.recording.t[-1])
     assert METHOD.reached(CAR, state) == ()
-    held = METHOD.certify(CAR).held
+    held = METHOD.certify(CAR).limits
     for name, most, refuses in (
         ("a_y_offset_g", 0, True),
         ("roll_rad_per_g", 1, False),
         ("steering_offset_rad", 2, True),
         ("yaw_rate_offset_rad_s", 3, True),
-        ("inverse_yaw_inertia_over_told", 4, False),
+        ("inverse_yaw_inertia_over_declared", 4, False),
         ("v_y_offset_m_s", 5, False),
     ):
         sensors = state["sensors"].ravel().copy()
@@ -284,14 +284,14 @@ def test_bounds_hold_whatever_is_measured(banked):
     assert grip.max() <= b.most_grip
     assert b.least_stiffness <= slope.min()
     assert slope.max() <= b.most_stiffness
-    held, sensors = METHOD.certify(CAR).held, state["sensors"].reshape(-1, 6).T
+    held, sensors = METHOD.certify(CAR).limits, state["sensors"].reshape(-1, 6).T
     for name, values in (
         ("compliance_m", state["own"]),
         ("a_y_offset_g", sensors[0]),
         ("roll_rad_per_g", sensors[1]),
         ("steering_offset_rad", sensors[2]),
         ("yaw_rate_offset_rad_s", sensors[3]),
-        ("inverse_yaw_inertia_over_told", 1 + sensors[4]),
+        ("inverse_yaw_inertia_over_declared", 1 + sensors[4]),
         ("v_y_offset_m_s", sensors[5]),
     ):
         assert held[name][0] <= values.min()

@@ -38,7 +38,7 @@ SPACE = Space(
 
 @pytest.fixture(scope="module")
 def tires():
-    return PlausibleTires.told(CAR, 0.8)
+    return PlausibleTires.declared(CAR, 0.8)
 
 
 @pytest.fixture(scope="module")
@@ -409,9 +409,9 @@ def test_plausible_cars_have_brush_tires_softer_stiffer_and_grippier_by_a_third(
             np.testing.assert_allclose(ours[:, a], brush, atol=0.05)
     lag = CAR.require_chassis().steering_lag
     np.testing.assert_allclose(tires.steering_lag, lag * np.array([1, 0.7, 1.3, 1.3, 0.7, 1.3, 1]))
-    told = PlausibleTires.told(CAR, 0.8, steering_lag=0.1)
+    told = PlausibleTires.declared(CAR, 0.8, steering_lag=0.1)
     assert told.steering_lag[0] == 0.1
-    bare = PlausibleTires.told(replace(CAR, chassis=None), 0.8)
+    bare = PlausibleTires.declared(replace(CAR, chassis=None), 0.8)
     assert bare.steering_lag[0] == 0.04
 
 

@@ -27,7 +27,7 @@ CAR, SPEED = sedan(), 15.0
 
 @pytest.fixture(scope="module")
 def tires():
-    return PlausibleTires.told(CAR, 0.8)
+    return PlausibleTires.declared(CAR, 0.8)
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_a_car_of_slow_steering_goes_where_motion_with_its_lag_says():
     slow = replace(CAR, chassis=replace(CAR.require_chassis(), steering_lag=0.12))
     steering, missed = slalom_of(CAR, 3.0)(0.03), []
     for told in (None, 0.01):  # the vehicle file's; and who believes in quick steering
-        known = PlausibleTires.told(slow, 0.9, steering_lag=told)
+        known = PlausibleTires.declared(slow, 0.9, steering_lag=told)
         t = steps_of(known, 3.0)
         motion = free_motion(known, steering.steering(t)[:, :1], SPEED)
         wanted = np.column_stack([one[:, 0, 0] for one in (motion.X, motion.Y, motion.psi)])
@@ -232,7 +232,7 @@ def test_where_a_car_can_turn_a_pass_has_no_end(tires):
     [
         ({"length": 20.0, "width": 14.0}, 3.0, "must be .* m long, or drive at"),
         ({"width": 3.0}, 3.0, "is 3 m wide and the car with its margins"),
-        ({"speed": 1.0}, 3.0, "nothing is learnt below"),
+        ({"speed": 1.0}, 3.0, "no sample counts below"),
         ({"length": 8.0, "speed": 5.0}, 3.0, "must be .* m long$"),
         ({}, 0.1, "the time must be 0.5 to 60 s"),
         ({"length": 300.0}, 0.6, "needed to steer three times at 15 m/s, the time is 0.6"),
@@ -258,7 +258,7 @@ def test_numbers_of_a_space_are_judged_at_birth(name):
 
 def test_no_told_car_oversteers_at_small_slip():
     soft = replace(CAR, cornering_stiffness_rear=0.5 * CAR.cornering_stiffness_rear)
-    W = PlausibleTires.told(soft, 0.8).W
+    W = PlausibleTires.declared(soft, 0.8).W
     slope = (W / np.array(AxleIdentifier.for_vehicle(soft).ladder)).sum(axis=2)
     assert (slope[:, 1] >= 0.999 * slope[:, 0]).all()
 
@@ -268,7 +268,7 @@ def test_what_a_model_knows_is_not_planned_again(brief):
     model = identify(log, CAR, AxleIdentifier.for_vehicle(CAR, dt=log.dt)).freeze()
     known = PlausibleTires.learnt(model, np.random.default_rng(0))
     np.testing.assert_array_equal(known.W[0], model.W)
-    told = PlausibleTires.told(CAR, 0.8)
+    told = PlausibleTires.declared(CAR, 0.8)
     before = [
         float(expected_error(one, asked(one, SPEED), one.covariance)[()]) for one in (known, told)
     ]
@@ -308,14 +308,14 @@ def test_a_rehearsal_on_the_plant_stays_near_the_course_that_was_planned(tires, 
 
 def test_the_step_scales_with_the_size_of_the_car(tires):
     small = replace(CAR, l_f=0.01 * CAR.l_f, l_r=0.01 * CAR.l_r, yaw_inertia=1e-4 * CAR.yaw_inertia)
-    ratio = time_step(PlausibleTires.told(small, 0.8)) / time_step(tires)
+    ratio = time_step(PlausibleTires.declared(small, 0.8)) / time_step(tires)
     assert ratio == pytest.approx(0.1)
     assert Motion._fields[-1] == "delta"
 
 
 def test_a_car_with_downforce_is_planned_under_the_loads_of_its_speed(tires, brief):
     racer, speed = replace(CAR, downforce_area_front=1.5, downforce_area_rear=2.5), 25.0
-    static = PlausibleTires.told(racer, 0.8)
+    static = PlausibleTires.declared(racer, 0.8)
     np.testing.assert_array_equal(static.at_speed(0.0).W, static.W)
     known = static.at_speed(speed)
     load = 1.0 + 0.5 * 1.2 * np.array([1.5, 2.5]) * speed**2 / CAR.axle_loads

@@ -63,7 +63,7 @@ def test_half_the_friction_is_told_within_a_second_with_its_size(tires, wetter):
 
 def test_the_road_that_taught_is_told_as_such(tires, same):
     found = road_friction(tires, same)
-    assert found.roads == () and found.as_taught
+    assert found.roads == () and found.unchanged
     assert found.unexplained.max() < 0.5
 
 
@@ -106,7 +106,7 @@ def test_a_banked_road_is_taken_off_and_the_verdict_tells_the_same(tires):
 
 def test_a_gentle_drive_tells_nothing(tires):
     found = road_friction(tires, driven(6, Friction(scale=0.5), 0.005))
-    assert found.roads == () and not found.as_taught
+    assert found.roads == () and not found.unchanged
 
 
 def test_more_friction_is_told_where_the_grip_was_learnt_alone(same):
@@ -125,7 +125,7 @@ def test_forces_that_no_friction_makes_are_told_as_such(tires, same):
 def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
     verdict = judge_prediction(tires, wetter)
     assert "another_road" in [one.code for one in verdict.findings if not one.refuses]
-    assert any("of the friction of the drive that taught" in line for line in verdict.lines)
+    assert any("of the friction of the identification drive" in line for line in verdict.lines)
     slippery = judge_prediction(tires, driven(5, Friction(scale=0.5), 0.05))
     assert {one.code for one in slippery.findings if one.refuses} == {"force_missed"}
     assert "another_road" in [one.code for one in slippery.findings]
@@ -143,7 +143,7 @@ def test_tires_on_another_road_keep_their_stiffness(tires):
             tires.at_friction(ratio)
 
 
-def test_a_stretch_begins_where_it_is_sure_and_ends_where_it_is_not_likely():
+def test_a_segment_begins_where_it_is_sure_and_ends_where_it_is_not_likely():
     """Windows of a road, of half its friction, and of the road again, without noise."""
     grid = np.log([0.5, 1.0, 2.0])
     t = 0.15 * np.arange(600)

@@ -108,16 +108,16 @@ def in_range(first, last):
     return (k >= first) & (k < last)
 
 
-def test_the_worst_stretch_is_where_most_of_the_force_is_missed():
+def test_the_worst_segment_is_where_most_of_the_force_is_missed():
     measured = np.column_stack([np.full(100, 0.5), np.full(100, 0.1)])
     modelled = measured.copy()
     modelled[20:40, 0] -= 0.1  # a fifth of the front's force
     modelled[60:80, 1] -= 0.05  # half of the rear's
     found = of(measured, modelled)
-    first, last = found.worst_stretch(0.2)
+    first, last = found.worst_segment(0.2)
     assert (first, last) == (60, 80)
     rest = found.where(~in_range(first, last))
     assert len(rest.windows) == 80 and rest.missed[1] == 0.0 < rest.missed[0]
     np.testing.assert_array_equal(rest.windows.starts, 15 * np.r_[0:60, 80:100])
     assert found.where(~in_range(20, 40) & ~in_range(first, last)).missed.tolist() == [0.0, 0.0]
-    assert found.worst_stretch(0.001)[1] - found.worst_stretch(0.001)[0] == 1
+    assert found.worst_segment(0.001)[1] - found.worst_segment(0.001)[0] == 1

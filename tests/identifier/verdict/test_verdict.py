@@ -79,7 +79,7 @@ def test_a_right_answer_is_valid_and_it_is_right(clean, good, drive):
 def test_a_verdict_is_plain_data(good):
     data = json.loads(json.dumps(good.to_dict()))
     assert data["valid"] is True
-    assert {"findings", "numbers", "measures", "unseen"} < set(data)
+    assert {"findings", "numbers", "measures", "not_observable"} < set(data)
     assert good.lines[0].startswith("verdict: valid for 19.9 to 20 m/s, slip up to 3.3 / 2.9 deg")
     assert "mass" in good.lines[-2]
     front, rear = (100.0 * share for share in good.measures["force_missed"])
@@ -295,14 +295,14 @@ def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
     assert verdict.valid == valid
     assert share.max() < 1.0 / 7.0 or not valid
     assert np.allclose(verdict.measures["force_missed"], share, atol=0.05)
-    learnt = {number.learnt for number in verdict.numbers}
+    learnt = {number.identified for number in verdict.numbers}
     assert (True in learnt) == (name != "linear")
 
 
-def test_a_stretch_that_a_sensor_needed_to_settle_is_a_note(drive):
+def test_a_segment_that_a_sensor_needed_to_settle_is_a_note(drive):
     settling = replace(drive, v_y=drive.v_y + np.clip(ONSET - drive.t, 0.0, 0.5))
     verdict = judge(answer(settling))
-    (note,) = [one for one in verdict.findings if one.code == "stretch"]
+    (note,) = [one for one in verdict.findings if one.code == "segment"]
     assert not note.refuses
     assert verdict.valid
     found = re.match(r"from 0 to ([\d.]+) s the motion is not explained", note.text)

@@ -224,7 +224,7 @@ def test_frames_of_a_bus_in_mdf_lie_on_disk_where_they_are_many(tmp_path, drive,
 
 def test_a_log_of_frames_without_dbc_asks_for_one(tmp_path, drive):
     path = write_can(tmp_path / "log.asc", *drive)
-    assert "give the DBC file that tells their signals, in the [file] of log.toml" in refusal(path)
+    assert "give the DBC file of their signals, in the [file] of log.toml" in refusal(path)
 
 
 def test_a_dbc_that_knows_none_of_the_frames_is_refused(tmp_path, drive):

@@ -91,7 +91,7 @@ def test_the_clock_is_that_of_the_channel_nearest_to_it() -> None:
     assert np.allclose(one.signals["v_x"][100:], one.t[100:])
 
 
-def test_a_gap_of_any_channel_ends_a_stretch_of_all() -> None:
+def test_a_gap_of_any_channel_ends_a_segment_of_all() -> None:
     t = DT * np.arange(1000)
     hole = (t < 3.0) | (t >= 5.0)
     slow = np.arange(0.0, 10.0, 0.1)
@@ -116,7 +116,7 @@ def test_clocks_of_the_calendar_are_compared_to_the_microsecond() -> None:
             assert np.allclose(other.signals[name], values, rtol=0, atol=1e-12)
 
 
-def test_channels_that_never_overlap_have_no_stretch() -> None:
+def test_channels_that_never_overlap_have_no_segment() -> None:
     t = DT * np.arange(100)
     assert on_one_clock({"a": raw(t, t), "b": raw(t + 5.0, t)}, DT, LONGEST_GAP) == []
 

@@ -9,7 +9,7 @@ from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.names import propose
 from models.recordings import LogMap, read_recording
-from models.recordings.map import told_signals
+from models.recordings.map import given_signals
 
 T = 0.01 * np.arange(600)
 SIGNALS = {
@@ -112,7 +112,7 @@ def test_an_amount_has_the_sign_of_another_channel(tmp_path):
         for word in ("LWI_Lenkradwinkel sign(LWI_VZ_Lenkradwinkel) [deg] /15",
                      "sign(LWI_VZ_Lenkradwinkel) * LWI_Lenkradwinkel [deg] /15",
                      "LWI_Lenkradwinkel * sign(LWI_VZ_Lenkradwinkel) [deg] /15"):  # fmt: skip
-            (signal,) = told_signals([f"delta_f={word}"]).values()
+            (signal,) = given_signals([f"delta_f={word}"]).values()
             assert signal.sign == "LWI_VZ_Lenkradwinkel" and signal.channel == (
                 "LWI_Lenkradwinkel",
             )
@@ -125,7 +125,7 @@ def test_an_amount_has_the_sign_of_another_channel(tmp_path):
     log = open_log(path)
     guess = propose(log, log.headings()).guesses["delta_f"]
     assert guess.sign == "LWI_VZ_Lenkradwinkel" and guess.hand
-    lost = LogMap(signals=told_signals(["delta_f=LWI_Lenkradwinkel sign(VZ) [deg] /15"]))
+    lost = LogMap(signals=given_signals(["delta_f=LWI_Lenkradwinkel sign(VZ) [deg] /15"]))
     with pytest.raises(RecordingError, match="no column 'VZ' to read as delta_f"):
         read_recording(path, log_map=lost)
 

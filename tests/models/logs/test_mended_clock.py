@@ -99,7 +99,7 @@ def test_stamps_that_are_shared_throughout_are_refused_all_the_same(drive):
 def test_a_time_that_never_moves_is_refused_all_the_same(drive):
     t, columns = drive
     log = as_arrays(0.0 * t, columns, EVERY, mend=True)
-    with pytest.raises(RecordingError, match="it never moves: tell the column"):
+    with pytest.raises(RecordingError, match="it never moves: declare the column"):
         log.read(["r"])
 
 

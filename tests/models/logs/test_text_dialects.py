@@ -262,8 +262,8 @@ WRONG = {
     ),
     "decimal commas between commas": (
         plain(",", ","),
-        "line 2 has 10 cells, the header has 5: decimal commas cannot be told from commas between "
-        "cells; export with semicolons",
+        "line 2 has 10 cells, the header has 5: decimal commas cannot be distinguished from commas "
+        "between cells; export with semicolons",
     ),
     "a cut row": (plain()[:-12], "line 121 has 4 cells, the header has 5; was the file cut off?"),
     "a header alone": ("t,v\n", "there is a header but no row of data"),

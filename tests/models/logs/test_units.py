@@ -14,7 +14,7 @@ from models.logs.units import (
     SI,
     SPEED,
     TIME,
-    is_told,
+    is_given,
     quantities,
     to_si,
     unit_of_range,
@@ -114,8 +114,8 @@ def test_spellings_that_are_written_in_the_table_are_found_as_they_stand() -> No
 
 
 def test_a_sign_of_no_unit_tells_none() -> None:
-    assert not any(map(is_told, ("", " ", "-", "[]", "none", "1")))
-    assert all(map(is_told, ("m/s", "%", "1/s")))
+    assert not any(map(is_given, ("", " ", "-", "[]", "none", "1")))
+    assert all(map(is_given, ("m/s", "%", "1/s")))
 
 
 def test_a_number_that_no_car_reaches_in_si_is_in_another_unit() -> None:

@@ -77,7 +77,9 @@ def test_a_log_over_distance_is_refused_with_the_reason(tmp_path, name):
 def test_of_several_columns_that_rise_evenly_none_is_taken(tmp_path):
     columns = {"alpha": numbers(0.02 * np.arange(N)), "gamma": numbers(0.5 * np.arange(N))}
     path = written(tmp_path / "log.csv", columns)
-    with pytest.raises(RecordingError, match=r"several columns rise evenly \(alpha, gamma\): tell"):
+    with pytest.raises(
+        RecordingError, match=r"several columns rise evenly \(alpha, gamma\): declare"
+    ):
         open_log(path).read(["vx"])
     steps(open_log(path, clock="alpha"))
 
@@ -149,11 +151,11 @@ def test_a_told_clock_may_have_a_unit_be_words_and_is_not_forgotten(tmp_path, to
     cells = [at(t, "%d-%b-%Y %H:%M:%S.%3") for t in T] if told == "clock" else numbers(1000 * T)
     columns = {told.partition(" ")[0]: cells, "lap time": numbers(T % 2.0)}
     path = written(tmp_path / "log.csv", columns)
-    told_map = with_columns(LogMap(), {"t": told})
-    steps(told_map.opened(path))
-    told_map.to_toml(tmp_path / "log.toml")
+    given_map = with_columns(LogMap(), {"t": told})
+    steps(given_map.opened(path))
+    given_map.to_toml(tmp_path / "log.toml")
     again = LogMap.from_toml(tmp_path / "log.toml")
-    assert again == told_map and read_recording(path, log_map=again).duration == pytest.approx(
+    assert again == given_map and read_recording(path, log_map=again).duration == pytest.approx(
         T[-1]
     )
 

@@ -252,5 +252,5 @@ def test_a_pair_holds_each_package_under_its_own_name(pairs):
 def test_a_car_with_downforce_has_no_handover_in_c():
     racer = replace(sedan(), downforce_area_front=1.0)
     package = build_package(make_method("axle", racer), racer)
-    with pytest.raises(NoHandoverError, match="has downforce, of which the handover in C does not"):
+    with pytest.raises(NoHandoverError, match="has downforce, which the handover in C does not"):
         frozen_start(package)

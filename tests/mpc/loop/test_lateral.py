@@ -19,7 +19,7 @@ from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.drive import drive
 from mpc.loop.lateral import LateralVelocity, Localization, Told
-from mpc.loop.record import told_scores
+from mpc.loop.record import estimate_scores
 from mpc.loop.sensing import CarSensors, FaultySensors, Measured, imu_and_localization
 from mpc.path import Path, iso_3888_1
 from mpc.realtime import Tracker
@@ -179,12 +179,12 @@ def test_the_chassis_tells_how_the_body_rolls(swings):
     """Against what the plant does; a car without a chassis is taken for a usual one."""
     method = InertialIdentifier.for_vehicle(CAR, dt=DT)
     roll, a_y = (np.array([getattr(one, name) for one in swings]) for name in ("roll", "a_y"))
-    told, now, rolled = method.believed_body(CAR), (0.0, 0.0), []
+    told, now, rolled = method.body_prior(CAR), (0.0, 0.0), []
     for value in a_y:
         now = told.step(now, value, DT)
         rolled.append(told.roll * now[0] / GRAVITY)
     np.testing.assert_allclose(rolled, roll, atol=0.1 * np.abs(roll).max())
-    usual = method.believed_body(replace(CAR, chassis=None))
+    usual = method.body_prior(replace(CAR, chassis=None))
     assert usual.sd_roll > told.sd_roll and abs(usual.roll - told.roll) < 2.0 * usual.sd_roll
 
 
@@ -237,14 +237,14 @@ def test_the_tracker_steers_on_what_is_told_and_the_record_says_so():
         lateral=lateral(),
     )
     assert run.completed
-    assert [m.v_y for m in driver.seen] == run.told["v_y"].tolist()
+    assert [m.v_y for m in driver.seen] == run.estimates["v_y"].tolist()
     assert "v_y" not in run.measured
-    assert np.array_equal(run.recording().v_y, run.told["v_y"])
+    assert np.array_equal(run.recording().v_y, run.estimates["v_y"])
     assert run.recording().estimated == ("v_y",)
     assert np.array_equal(run.recording().a_y, run.measured["a_y"])
-    found = told_scores(run)
+    found = estimate_scores(run)
     assert found.rms_error_m_s == pytest.approx(
-        math.sqrt(sum((run.told["v_y"] - run.v_y) ** 2) / len(run))
+        math.sqrt(sum((run.estimates["v_y"] - run.v_y) ** 2) / len(run))
     )
     assert 0.0 < found.rms_error_deg < 0.3
     assert found.within_two_sd > 0.9
@@ -253,7 +253,7 @@ def test_the_tracker_steers_on_what_is_told_and_the_record_says_so():
 def test_what_was_measured_is_not_told():
     path = Path.from_waypoints([0, 20, 40], [0, 0, 0], name="straight")
     run = drive(path, DoubleTrackCar(CAR), Driver(), speed=15.0, rng=np.random.default_rng(0))
-    assert not run.told and told_scores(run) is None and "v_y" in run.measured
+    assert not run.estimates and estimate_scores(run) is None and "v_y" in run.measured
     assert run.recording().estimated == ()
 
 

@@ -104,7 +104,7 @@ def test_what_is_no_force_curve_is_refused(car):
     with pytest.raises(VehicleError, match=r"no \[chassis\]"):
         oracle_tire(replace(car, chassis=None))
     with pytest.raises(
-        VehicleError, match=r'names no tire file .* say which by tire = "my_tire.tir"'
+        VehicleError, match=r'names no tire file .* declare it by tire = "my_tire.tir"'
     ):
         oracle_tire(replace(car, chassis=replace(car.chassis, tire=None)))
     with pytest.raises(CurveFitError):

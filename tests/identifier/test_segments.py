@@ -1,4 +1,4 @@
-"""A drive in stretches: nothing is differenced from one to the next, and what was learnt stays."""
+"""A drive in segments: nothing is differenced from one to the next, and the weights stay."""
 
 from dataclasses import replace
 
@@ -31,12 +31,12 @@ def cut(log: Recording) -> Recording:
     return log.taken(np.r_[0 : n // 2, n // 2 + 200 : n])
 
 
-def test_a_recording_counts_its_stretches_and_not_the_gaps(log, cut) -> None:
+def test_a_recording_counts_its_segments_and_not_the_gaps(log, cut) -> None:
     n = len(log)
     assert cut.breaks == (n // 2,) and len(cut) == n - 200 and cut.dt == log.dt
     assert cut.duration == pytest.approx(log.duration - 2.0 - log.dt)
-    assert [piece.stop for piece in cut.stretches] == [n // 2, n - 200]
-    assert "in 2 stretches" in repr(cut) and "stretches" not in repr(log)
+    assert [piece.stop for piece in cut.segments] == [n // 2, n - 200]
+    assert "in 2 segments" in repr(cut) and "segments" not in repr(log)
     again = cut.between(float(cut.t[100]), float(cut.t[-100]))
     assert again.breaks == (n // 2 - 100,)
     assert cut.between(0.0, 5.0).breaks == ()
@@ -45,19 +45,19 @@ def test_a_recording_counts_its_stretches_and_not_the_gaps(log, cut) -> None:
 @pytest.mark.parametrize(
     ("change", "rule"),
     [
-        ({"breaks": (5,)}, "each stretch of a recording needs at least 10 samples, it has 5"),
+        ({"breaks": (5,)}, "each segment of a recording needs at least 10 samples, it has 5"),
         ({"breaks": ()}, "t must rise in equal steps"),
         ({"breaks": (400,)}, "t must rise in equal steps"),
     ],
 )
-def test_stretches_that_are_none_are_refused(cut, change, rule) -> None:
+def test_segments_that_are_none_are_refused(cut, change, rule) -> None:
     with pytest.raises(RecordingError, match=rule):
         replace(cut, **change)
 
 
-def test_time_must_rise_from_stretch_to_stretch(log) -> None:
+def test_time_must_rise_from_segment_to_segment(log) -> None:
     t = np.concatenate([log.t[:500], log.t[: len(log) - 500]])
-    with pytest.raises(RecordingError, match="from one stretch to the next"):
+    with pytest.raises(RecordingError, match="from one segment to the next"):
         replace(log, t=t, breaks=(500,))
 
 
@@ -70,7 +70,7 @@ def test_logs_are_joined_in_their_order_and_overlapping_clocks_are_moved(log) ->
     assert "moved by" in both.notes[-1]
     later = joined([first, log.between(7.0, 9.0)])
     assert later.t[len(first)] == log.between(7.0, 9.0).t[0] and not later.notes
-    with pytest.raises(RecordingError, match="one interval"):
+    with pytest.raises(RecordingError, match="one sampling interval"):
         joined([first, replace(second, t=2.0 * second.t)])
 
 
@@ -117,7 +117,7 @@ def test_a_step_that_judges_samples_must_tell_how_it_rests(name) -> None:
 
 def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None:
     tire = ti.identify(log, CAR).freeze()
-    second = cut.taken(cut.stretches[1])
+    second = cut.taken(cut.segments[1])
     alone, together = tire.predict(second), tire.predict(cut)
     assert np.array_equal(together[cut.breaks[0] :], alone)
 
@@ -141,11 +141,11 @@ def test_no_window_reaches_over_a_gap(cut) -> None:
     assert jump is not None and jump.lateral > 5.0 * dt
 
 
-def test_a_repair_keeps_to_each_stretch(log, cut) -> None:
+def test_a_repair_keeps_to_each_segment(log, cut) -> None:
     late = Repair(delay={"r": 0.05})
     mended, _ = late.apply(cut, CAR)
-    assert len(mended.stretches) == 2 and len(mended) == len(cut) - 10
-    for piece, source in zip(mended.stretches, cut.stretches, strict=True):
+    assert len(mended.segments) == 2 and len(mended) == len(cut) - 10
+    for piece, source in zip(mended.segments, cut.segments, strict=True):
         alone, _ = late.apply(cut.taken(source), CAR)
         assert np.array_equal(mended.r[piece], alone.r)
 
