@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tireid import errors
     from tireid.driving.learn import sample_recording
     from tireid.driving.runs import drive
+    from tireid.emitting import emit
     from tireid.exporting import export
     from tireid.figures.forces import inputs_figure as plot
     from tireid.learning import identify, replay
@@ -58,6 +59,7 @@ _HOMES = {
     "diagnose": ("identifier.doctor", "diagnose"),
     "errors": ("tireid.errors", ""),
     "drive": ("tireid.driving.runs", "drive"),
+    "emit": ("tireid.emitting", "emit"),
     "export": ("tireid.exporting", "export"),
     "identify": ("tireid.learning", "identify"),
     "make_method": ("identifier.methods", "make_method"),
@@ -90,6 +92,7 @@ __all__ = [
     "certify",
     "diagnose",
     "drive",
+    "emit",
     "errors",
     "export",
     "identify",

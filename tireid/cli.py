@@ -13,7 +13,16 @@ from typing import NoReturn
 
 import tireid
 from models.limits import LimitError, limits_text
-from tireid.commands import BAD_INPUT, COMMANDS, DONE, INTERRUPTED, NOT_TOLD, add_command
+from tireid.commands import (
+    BAD_INPUT,
+    COMMANDS,
+    DONE,
+    INTERRUPTED,
+    NOT_TOLD,
+    add_command,
+    installed,
+    summary,
+)
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 LONGEST_LINE = 900  # characters of a message, command and option not counted
@@ -24,17 +33,8 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print one line and exit with code 2."""
-        complain(f"{self.prog}: error: {one_line(message)} ({_hint(message, self.prog)})")
+        complain(f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
-
-
-def _hint(message: str, program: str) -> str:
-    """Return what to do about wrong words: the word of today for one of yesterday, or the help."""
-    from tireid.commands.options import RENAMED
-
-    words = set(message.split()) if message.startswith("unrecognized") else set()
-    renamed = [f"{old} is {new} now" for old, new in RENAMED.items() if old in words]
-    return "; ".join(renamed) or f"see {program} --help"
 
 
 def build_parser(words: Sequence[str]) -> _Parser:
@@ -49,11 +49,18 @@ def build_parser(words: Sequence[str]) -> _Parser:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     named = next((word for word in words if word in COMMANDS), None)
-    for name, summary in COMMANDS.items():
+    for name, text in COMMANDS.items():
         if name == named:
             add_command(name, commands)
         else:
-            commands.add_parser(name, help=summary)
+            commands.add_parser(name, help=text)
+    if named is None:
+        named = next((word for word in words if word in installed()), None)
+        for name in installed():
+            if name == named:
+                add_command(name, commands)
+            else:
+                commands.add_parser(name, help=summary(name))
     return parser
 
 
@@ -74,7 +81,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         parser = build_parser(words)
-    except LimitError as error:  # of the environment
+    except (LimitError, ValueError) as error:  # of the environment; of another's command
         complain(f"tireid: error: {one_line(error)}")
         return BAD_INPUT
     options = parser.parse_args(words)

@@ -107,6 +107,8 @@ DOORS = (
     _door("predict network", 2, f"{PREDICT} network.json log.csv", "network.json"),
     _door("predict log", 4, f"{PREDICT} axle.json log.csv --no-check", "log.csv"),
     _door("predict car", 3, f"{PREDICT} axle.json log.csv --vehicle sedan.toml", "sedan.toml"),
+    _door("emit axle", 3, "emit axle.json --tir out.tir --ggv out.ggv --understeer", "axle.json"),
+    _door("emit network", 1, "emit network.json --tir out.tir", "network.json"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
     _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),

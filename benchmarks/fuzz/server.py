@@ -195,7 +195,7 @@ def _limit() -> None:
 
 def _listen(note: Callable[[str, Any], None]) -> None:
     """Note where a number in a JSON file was not finite: what is written is null."""
-    clean = tireid.output._finite
+    clean = tireid.output.finite
 
     def listened(data: Any) -> Any:
         found = sorted(set(_not_finite(data, "")))
@@ -203,7 +203,7 @@ def _listen(note: Callable[[str, Any], None]) -> None:
             note("not finite", found[:20])
         return clean(data)
 
-    tireid.output.write_json.__globals__["_finite"] = listened
+    tireid.output.write_json.__globals__["finite"] = listened
 
 
 def _not_finite(data: Any, place: str) -> list[str]:

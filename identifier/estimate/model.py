@@ -338,6 +338,11 @@ class FittedModel(TireModel):
         """Least and largest speed [m/s] of the drives that taught, (2,)."""
         return self.speeds
 
+    @property
+    def lengthwise(self) -> tuple[Array, Array]:
+        """Its parameters (p,) and their covariance (p, p)."""
+        return self.p, self.covariance
+
     def road_differs(self, t: Array) -> NDArray[np.bool_]:
         """Return at which times [s] of the drive that taught the road was another one, (n,)."""
         found = np.zeros(t.shape, dtype=bool)

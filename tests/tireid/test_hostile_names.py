@@ -4,15 +4,18 @@ import json
 import re
 import subprocess
 import zipfile
+from dataclasses import replace
 from shutil import which
 
 import pytest
 
 from codegen import find_compiler
 from identifier.export import processor as figures
+from identifier.methods import make_method
 from models.vehicle import sedan
 from tireid import exporting
 from tireid.cli import main
+from tireid.emitting import emit
 
 ORDER = "x\nexecute_process(COMMAND ${CMAKE_COMMAND} -E touch ran)\n#"
 CONSTRUCTOR = (
@@ -63,6 +66,16 @@ def built(folder):
     ):
         answer = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
         assert answer.returncode == 0, answer.stdout + answer.stderr
+
+
+@pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
+def test_a_name_is_a_comment_in_what_other_tools_read(name, tmp_path):
+    for car in (sedan(), replace(sedan(), name=name)):
+        method = make_method("axle", car)
+        model = method.frozen(car, method.setup(car).carry)
+        emit(model, tir=tmp_path / "car.tir", overwrite=True)
+        lines = (tmp_path / "car_front.tir").read_text(encoding="utf-8").splitlines()
+        assert [line.startswith("$") for line in lines] == [k < 9 for k in range(len(lines))]
 
 
 @pytest.mark.skipif(which("cmake") is None, reason="needs cmake")

@@ -1,32 +1,42 @@
 """The commands of tireid, in the order in which a person meets them.
 
 Each lies in a module of its name, `tireid.commands.NAME` with `add_parser` and `run`, which is
-imported when the command is named: the list alone costs nothing.
+imported when the command is named: the list alone costs nothing. An installed distribution adds
+commands by entry points of the group `tireid.commands`: a name and such a module, whose docstring
+begins with one line of help. Fleets come in that way, too.
 """
 
+import ast
 import importlib
 from collections.abc import Mapping
+from functools import cache
+from importlib.abc import InspectLoader
+from importlib.machinery import ModuleSpec
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 COMMANDS: Mapping[str, str] = MappingProxyType(
     {
         "demo": "demonstration on the built-in car, with a report",
         "sample": "an example log, driven by the built-in car",
         "init": "a commented vehicle file to fill in",
-        "channels": "channels of a log, with unit, rate and probable signal; writes a log.toml",
-        "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
-        "plan": "the most informative steering within an area",
-        "identify": "tire curves from a log, with error bars and a verdict",
-        "predict": "axle forces of a drive by a stored model, and their error",
-        "compare": "all methods on the same logs, side by side",
-        "fleet": "thousands of logs: identify, merge, prior for the next car, watch for changes",
+        "channels": "what a log holds, what its channels probably are, and a log.toml that says so",
+        "doctor": "what is wrong with a log or with its car's file, and a log.toml that mends it",
+        "plan": "what to drive next: the steering that teaches most in the space there is",
+        "identify": "learn tire forces from a recording, freeze the weights and test them",
+        "predict": "axle forces of a drive by a stored model, and what they miss",
+        "compare": "learn, freeze and replay with every method, side by side",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
-        "export": "C for a microcontroller, FMU and ONNX for simulators",
-        "drive": "steer a car along a path at the limit of grip, on the identified tires",
-        "paper": "Tables I and II of the paper and ours, over many seeds",
+        "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
+        "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
+        "paper": "Tables I and II of the paper, beside ours, over many seeds",
     }
 )
+
+GROUP = "tireid.commands"  # of entry points
 
 # Exit codes: how a command ends, told to the shell.
 DONE = 0
@@ -37,6 +47,38 @@ NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could
 INTERRUPTED = 130
 
 
+@cache
+def installed() -> Mapping[str, EntryPoint]:
+    """Return the commands that distributions add, by name."""
+    return {one.name: one for one in entry_points(group=GROUP) if one.name not in COMMANDS}
+
+
+def summary(name: str) -> str:
+    """Return a line on an installed command, of its module's docstring; the module is not run."""
+    module = installed()[name].module
+    try:
+        source = cast(InspectLoader, cast(ModuleSpec, find_spec(module)).loader).get_source(module)
+        text = ast.get_docstring(ast.parse(source or "")) or ""
+    except Exception as error:  # of another's code
+        text = f"cannot be imported: {' '.join(str(error).split())}"
+    return text.partition("\n")[0].rstrip(".").lower()
+
+
 def add_command(name: str, commands: Any) -> None:
-    """Add one command with all its options to the parser."""
-    importlib.import_module(f"tireid.commands.{name}").add_parser(commands)
+    """Add one command with all its options to the parser.
+
+    Raises
+    ------
+    ValueError
+        Where a distribution's command cannot be imported.
+    """
+    if name in COMMANDS:
+        importlib.import_module(f"tireid.commands.{name}").add_parser(commands)
+        return
+    point = installed()[name]
+    try:
+        add_parser = point.load().add_parser
+    except Exception as error:  # of another's code
+        reason = " ".join(str(error).split())
+        raise ValueError(f"command {name} ({point.value}) cannot be imported: {reason}") from error
+    add_parser(commands)

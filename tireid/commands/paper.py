@@ -256,6 +256,6 @@ def run(options: argparse.Namespace) -> None:
         )
         progress.begin(DRAWING)
         write_study(folder, study)
-        told = _study_text(study)
-    tell(told)
+        text = (folder / "tables.txt").read_text(encoding="utf-8").rstrip("\n")
+    tell(text)
     say(f"wrote {options.out}/")

@@ -1,0 +1,101 @@
+"""Limits of acceleration over speed (g-g-v) of a car: from curve, ellipse and load transfer.
+
+Steady turning loads both axles in proportion, so that the weaker one limits the car (Milliken,
+Race Car Vehicle Dynamics, 1995, ch. 9). While tires push f weights forward,
+a_y(f)/g = min_i φ_i max(1 + κ_i v_x² ∓ (h L/l_o) f, 0.2) sqrt(1 - (c_i f)²), l_o the other arm,
+φ_i the largest force of the axle over its slip, c_i of braking or driving. No push is larger than
+1/c_i, nor than the smaller φ_i: tires grip lengthwise as sideways.
+Planners take a_x/a_x,max + a_y/a_y,max <= 1. a_y,max = a_y(0), and a_x,max is the largest for
+which that diamond lies within the diagram: min over f of g f/(1 - a_y(f)/a_y(0)).
+φ_i is the lower end of the band of 90 % within the slips that were identified; h and c_i are the
+ends of theirs that leave less. Each is right or too low in 95 % of cases.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from codegen.escape import visible
+from identifier.axle.band import LEVEL, normal_quantile
+from identifier.estimate.priors import Priors
+from identifier.motion.parameters import INDEX
+from identifier.tire_model import AXLES, TireModel
+from models.vehicle import GRAVITY, LIGHTEST
+
+SPEEDS, PUSHES, SLIPS = 13, 200, 200  # of the table, of a diagram, of a curve
+NUMBERS = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
+
+
+class Limits(NamedTuple):
+    """v_x [m/s]; a_y, and what braking and driving leave of a_x,max [m/s²]: (n,) each."""
+
+    v_x: Array
+    a_y: Array
+    braking: Array
+    driving: Array
+
+
+def limits(model: TireModel) -> Limits:
+    """Return the limits of a model's car from standing to the fastest speed that was driven.
+
+    Load transfer and ellipse of a model that has none are what is believed of its car. A model
+    that cannot tell how sure it is, or is sure at no slip of an axle, is refused.
+    """
+    car, known, own = model.vehicle, model.known_slip, model.lengthwise
+    if known is None or not model.has_band:
+        raise ValueError(f"a {type(model).__name__} cannot tell how sure it is: no proven limits")
+    grip = np.array([_lowest_grip(model, i, float(known[i])) for i in range(2)])
+    priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
+    mean, covariance = (priors.mean, priors.covariance) if own is None else own
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    ends = (mean + normal_quantile(LEVEL) * sd)[index]
+    transfer = ends[0] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
+    top = model.reference_speed if model.known_speeds is None else float(model.known_speeds[1])
+    v_x = np.linspace(0.0, top, SPEEDS)
+    pressed = car.load_ratio(v_x)
+    a_y = (grip * pressed).min(axis=1)
+    sides = [
+        [_side(*at, sign * transfer, grip, use) for at in zip(a_y, pressed, strict=True)]
+        for sign, use in ((-1.0, ends[1:3]), (1.0, ends[3:]))
+    ]
+    return Limits(v_x, *(GRAVITY * np.array([a_y, *sides])))
+
+
+def _lowest_grip(model: TireModel, i: int, known: float) -> float:
+    """Return the largest force of the lower end of an axle's band, in static loads."""
+    alpha = np.linspace(0.0, known, SLIPS + 1)[1:]
+    half = model.half_band(alpha, LEVEL)
+    low = 0.0 if half is None else float((model.force_at(alpha) - half)[:, i].max())
+    if known <= 0.0 or low <= 0.0:
+        raise ValueError(f"the force of the {AXLES[i]} axle is not known at any slip: drive harder")
+    return low / model.vehicle.axle_loads[i]
+
+
+def _side(a_y: float, pressed: Array, transfer: Array, grip: Array, use: Array) -> float:
+    """Return the largest push of the diamond on one side [weights].
+
+    a_y : without a push [weights].   pressed : load over the static one (2,).   transfer : what a
+    push of a weight adds to it (2,).   grip : φ_i (2,).   use : c_i (2,).
+    """
+    most = min(a_y, 1.0 / max(float(use.max()), 1e-9))
+    f = np.linspace(0.0, most, PUSHES + 1)[1:, None]
+    load = np.maximum(pressed + transfer * f, LIGHTEST)
+    left = (grip * load * np.sqrt(np.maximum(1.0 - (use * f) ** 2, 0.0))).min(axis=1)
+    return min(most, float((f[:, 0] / np.maximum(1.0 - left / a_y, 1e-9)).min()))
+
+
+def ggv_text(model: TireModel) -> str:
+    """Return the table as planners read it: rows of v, a_x,max, a_y,max behind comments."""
+    v_x, a_y, braking, driving = limits(model)
+    table = np.column_stack([v_x, np.minimum(braking, driving), a_y])
+    rows = [", ".join(f"{value:.3f}" for value in row) for row in table]
+    return f"""\
+# g-g-v of {visible(model.vehicle.name)}, by tireid from a driving log; friction as on that road.
+# Lower end of a band of 90 %: the force is lower in 5 % of cases. Tires are taken to grip
+# lengthwise as sideways. Neither drag nor the engine is in it: ax_max_machines has that.
+# ax_max is the smaller of braking ({braking.min():.2f} or more) and driving ({driving.min():.2f}),
+# for dyn_model_exp = 1.0 (a diamond); with a larger one planners take more than the tires have.
+# Ends at the fastest speed that was driven.
+# v_mps, ax_max_mps2, ay_max_mps2
+""" + "".join(f"{row}\n" for row in rows)

@@ -1,0 +1,150 @@
+"""The curve of an axle as the nearest Magic Formula, and as a tire property file (PAC2002).
+
+In axle loads: φ(α) = μ sin(C atan(B α - E (B α - atan B α))), B = K/(C μ). Two tires share the
+load and the force of an axle, so that these are the numbers of one tire over its own load too.
+Numbers of equations: Pacejka, Tire and Vehicle Dynamics (2012), 4.3.2.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from codegen.arrays import Array
+from codegen.escape import visible
+from identifier.tire_model import AXLES, Axle, TireModel
+
+WIDEST, BEYOND = 0.6, 0.02  # slip up to which curves are compared [rad]; weight past what is known
+LEAST_REACH, REACH = 0.032, 0.1  # rad, that is followed at least, and where nothing is said
+LOW, HIGH = (0.0, -4.0, 1.0001, -5.0), (6.0, 2.0, 2.4, 0.95)  # of ln K, ln μ, C, E
+WORST = 5.0  # power of the errors whose squares are summed at last: near to the largest one
+MOST_MISSED = 0.1  # of the peak: past that a curve is no Magic Formula
+PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
+
+
+class MagicCurve(NamedTuple):
+    """The Magic Formula nearest to the curve of an axle.
+
+    numbers : K [axle loads/rad], μ, C, E (4,).   sd : of them (4,).   reach : slip up to which it
+    follows the curve [rad].   missed : its largest error up to there over the largest force there.
+    """
+
+    numbers: Array
+    sd: Array
+    reach: float
+    missed: float
+
+
+def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> MagicCurve:
+    """Return the Magic Formula nearest to the curve of an axle; refuse one beyond `MOST_MISSED`.
+
+    drawn : models whose spread is the standard deviation, by one linear step each.
+    """
+    i, known = AXLES.index(axle), model.known_slip
+    reach = REACH if known is None else max(LEAST_REACH, float(known[i]))
+    beyond = np.linspace(reach, max(WIDEST, 1.5 * reach), 60)
+    side = np.concatenate([np.linspace(0.0, reach, 60)[1:], beyond])
+    slip = np.concatenate([side, -side])
+    inside = np.abs(slip) <= reach
+    weight, load = np.where(inside, 1.0, BEYOND), model.vehicle.axle_loads[i]
+    phi = model.force_at(slip)[:, i] / load
+    peak = float(np.abs(phi[inside]).max())
+
+    def errors(z: Array, power: float = 1.0, size: float = 1.0) -> Array:
+        e = weight * (formula(slip, z) - phi) / (size * peak)
+        signed: Array = np.sign(e) * np.abs(e) ** power
+        return signed
+
+    stiff, most = math.log(max(phi[0] / slip[0], 1.1)), math.log(max(float(phi.max()), 0.05))
+    squares = [_solved(errors, (stiff, most, 1.35, E)) for E in (0.0, -1.5)]
+    best = min(squares, key=lambda z: float(np.sum(errors(z) ** 2)))
+    z = _solved(errors, best, WORST, max(float(np.abs(errors(best)).max()), 1e-9))
+    missed = float(np.abs(errors(z))[inside].max())
+    if not missed <= MOST_MISSED:
+        raise ValueError(
+            f"the curve of the {axle} axle is no Magic Formula: the nearest one is off by "
+            f"{100.0 * missed:.2g} % of its peak ({100.0 * MOST_MISSED:g} % are allowed)"
+        )
+    moved = [formula(slip, z + h) - formula(slip, z - h) for h in 1e-5 * np.eye(4)]
+    step = np.linalg.pinv(weight[:, None] * np.column_stack(moved) / 2e-5, rcond=1e-6) * weight
+    steps = [step @ (one.force_at(slip)[:, i] / load - phi) for one in drawn]
+    scale = np.array([*np.exp(z[:2]), 1.0, 1.0])
+    sd = scale * np.std(steps, axis=0) if steps else np.zeros(4)
+    return MagicCurve(np.array([*scale[:2], *z[2:]]), sd, reach, missed)
+
+
+def formula(slip: Array, z: Array) -> Array:
+    """Return φ of the Magic Formula at slips (k,) [rad].   z : ln K, ln μ, C, E (4,)."""
+    K, mu, C, E = math.exp(z[0]), math.exp(z[1]), z[2], z[3]
+    Bx = K / (C * mu) * slip
+    phi: Array = mu * np.sin(C * np.arctan(Bx - E * (Bx - np.arctan(Bx))))
+    return phi
+
+
+def _solved(errors: Callable[..., Array], begin: Sequence[float] | Array, *of: float) -> Array:
+    inside = np.clip(begin, np.array(LOW) + 1e-6, np.array(HIGH) - 1e-6)
+    scale = (0.1, 0.1, 0.1, 0.5)
+    return np.array(least_squares(errors, inside, bounds=(LOW, HIGH), x_scale=scale, args=of).x)
+
+
+def tire_properties(model: TireModel, axle: Axle) -> str:
+    """Return the tire property file of one tire of an axle: lateral force in pure slip.
+
+    D_y = PDY1 F_z (4.E22) and K_y = PKY1 F_z0 sin(2 atan(F_z/(PKY2 F_z0))) (4.E25), PKY2 being
+    large, go with the load, as they do in the model.
+    """
+    found, i = magic_curve(model, axle), AXLES.index(axle)
+    K, mu, C, E = (float(one) for one in found.numbers)
+    load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / PROPORTIONAL
+    slips = found.reach * np.array([0.25, 0.5, 0.75, 1.0])
+    half, force = model.half_band(slips), model.force_at(slips)
+    band = "the model cannot tell how sure it is"
+    if half is not None:
+        band = ", ".join(
+            f"{F:.4g} +- {h:.3g} N at {a:.3g} deg"
+            for a, F, h in zip(np.degrees(slips), 0.5 * force[:, i], 0.5 * half[:, i], strict=True)
+        )
+    return f"""\
+$ One {axle} tire of {visible(model.vehicle.name)}, by tireid from a driving log.
+$ Is: lateral force in pure slip, of an axle over its slip angle, shared by two tires. In it are the
+$ friction of the road that was driven, load transfer between left and right, toe and compliance.
+$ Is not: a measured tire. Longitudinal and combined slip, camber, aligning moment and relaxation
+$ are not in it; the longitudinal coefficients repeat the lateral ones, since readers ask for them.
+$ Load: force is proportional to it, as in the model.
+$ Identified up to a slip of {math.degrees(found.reach):.3g} deg, beyond that extrapolated; differs
+$ from the model by at most {100.0 * found.missed:.2g} % of its largest force there.
+$ Band of 90 % at the nominal load: {band}.
+[MDI_HEADER]
+FILE_TYPE = 'tir'
+FILE_FORMAT = 'ASCII'
+[UNITS]
+LENGTH = 'meter'
+FORCE = 'newton'
+ANGLE = 'radian'
+MASS = 'kg'
+TIME = 'second'
+[MODEL]
+PROPERTY_FILE_FORMAT = 'PAC2002'
+USE_MODE = 2
+TYRESIDE = 'LEFT'
+[VERTICAL]
+FNOMIN = {load:.10g}
+[SLIP_ANGLE_RANGE]
+ALPMIN = {-found.reach:.10g}
+ALPMAX = {found.reach:.10g}
+[VERTICAL_FORCE_RANGE]
+FZMIN = {0.2 * load:.10g}
+FZMAX = {2.0 * load:.10g}
+[LONGITUDINAL_COEFFICIENTS]
+PCX1 = {C:.10g}
+PDX1 = {mu:.10g}
+PKX1 = {K:.10g}
+[LATERAL_COEFFICIENTS]
+PCY1 = {C:.10g}
+PDY1 = {mu:.10g}
+PEY1 = {E:.10g}
+PKY1 = {-K * (1.0 + u**2) / (2.0 * u):.10g}
+PKY2 = {PROPORTIONAL:.10g}
+"""

@@ -1,0 +1,88 @@
+"""Understeer gradient of a car over speed and lateral acceleration, with its standard deviation.
+
+Steady turning: F_i = m a_y l_o/L, l_o the other arm, and δ = L a_y/v_x² + α_f - α_r, so that
+K = ∂(δ - L a_y/v_x²)/∂a_y = (m/L) (l_r/C_f - l_f/C_r), C_i the slope of the force curve at that
+force (Milliken, Race Car Vehicle Dynamics, 1995, ch. 5; Pacejka, Tire and Vehicle Dynamics, 2012,
+1.3). Angles of the wheels are small; the wheels roll freely. Speed enters by downforce alone.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.tire_model import TireModel
+from models.vehicle import GRAVITY
+
+STEP = 1.0  # m/s², of the lateral acceleration
+COUNT = 3  # of speeds
+DRAWN, LOW, HIGH = 100, 0.16, 0.84  # models; shares of them that lie a deviation off
+SLIPS = np.linspace(0.0, 0.6, 301)  # rad
+
+
+class Understeer(NamedTuple):
+    """The gradient at speeds v_x [m/s] (n,) and lateral accelerations a_y [m/s²] (k,).
+
+    gradient, sd : K [rad/(m/s²)], (n, k); NaN where an axle is past what is known of it.
+    """
+
+    v_x: Array
+    a_y: Array
+    gradient: Array
+    sd: Array
+
+    @property
+    def csv(self) -> str:
+        """A table with a row for each speed and acceleration, without those that are NaN."""
+        k, degrees = self.a_y.size, np.degrees(GRAVITY)
+        at = [np.repeat(self.v_x, k), np.tile(self.a_y, self.v_x.size)]
+        columns = [*at, degrees * self.gradient.ravel(), degrees * self.sd.ravel()]
+        rows = [one for one in zip(*columns, strict=True) if np.isfinite(one).all()]
+        lines = [",".join(f"{value:.4g}" for value in row) for row in rows]
+        return "\n".join(["v_x_m_s,a_y_m_s2,gradient_deg_per_g,sd_deg_per_g", *lines]) + "\n"
+
+
+def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understeer:
+    """Return the understeer gradient at the speeds and within the slips that were driven.
+
+    Its standard deviation is half of what lies between the 16 % and 84 % points of models drawn
+    from what the drives left open. A model that cannot tell how sure it is is refused.
+    """
+    drawn = model.samples(DRAWN, rng)
+    known, speeds, car = model.known_slip, model.known_speeds, model.vehicle
+    if known is None or not known.min() > 0.0:
+        raise ValueError("the force of an axle is not known at any slip: drive harder")
+    slow, fast = (model.reference_speed,) * 2 if speeds is None else speeds
+    v_x = np.unique(np.linspace(slow, fast, COUNT))
+    force = model.force_at(SLIPS)
+    reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
+    most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)
+    a_y = np.arange(0.0, most.min(axis=1).max(), STEP)
+    found = _gradients(model, force, v_x, a_y)
+    spread = np.array([_gradients(one, one.force_at(SLIPS), v_x, a_y) for one in drawn])
+    with np.errstate(invalid="ignore"):  # beyond what half of them can reach
+        low, high = np.quantile(spread, (LOW, HIGH), axis=0, method="nearest")
+        sd = 0.5 * (high - low)
+    past = (a_y > most.min(axis=1)[:, None]) | ~np.isfinite(found) | ~np.isfinite(sd)
+    return Understeer(v_x, a_y, np.where(past, np.nan, found), np.where(past, np.nan, sd))
+
+
+def _gradients(model: TireModel, force: Array, v_x: Array, a_y: Array) -> Array:
+    """Return K [rad/(m/s²)], (n, k): infinite where the front axle is at its end, else minus it.
+
+    force : at `SLIPS` under static loads, (s, 2) [N].
+    """
+    masses = np.array(model.vehicle.axle_loads) / GRAVITY
+    pressed = model.vehicle.load_ratio(v_x)
+    gradient = np.zeros((v_x.size, a_y.size))
+    for i, sign in ((1, -1.0), (0, 1.0)):
+        curve = force[:, i]
+        slope, peak = np.gradient(curve, SLIPS), int(curve.argmax())
+        for k, ratio in enumerate(pressed[:, i]):
+            needed = masses[i] * a_y / ratio
+            alpha = np.interp(needed, curve[: peak + 1], SLIPS[: peak + 1])
+            stiff = np.interp(alpha, SLIPS, slope)
+            share = masses[i] / (ratio * np.maximum(stiff, 1e-9))
+            ended = (needed >= curve[peak]) | (stiff <= 0.0)
+            gradient[k] = np.where(ended, sign * np.inf, gradient[k] + sign * share)
+    return gradient

@@ -1,0 +1,101 @@
+"""`tireid emit` and `ti.emit`: what they write, all or nothing, and what they refuse."""
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from identifier.methods import make_method
+from models.tires import MagicFormula
+from tireid.cli import main
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory, logs):
+    """Models as they are stored: of a drive, and of the paper's network, which knows no doubt."""
+    folder, car = tmp_path_factory.mktemp("emit"), ti.sedan()
+    tire = ti.identify(ti.read_recording(logs / "slalom.csv"), car).tire
+    tire.save(folder / "tire.json")
+    method = make_method("integral", car)
+    method.frozen(car, method.setup(car).carry).save(folder / "network.json")
+    return folder
+
+
+def refused(capsys, *words):
+    """Return the one line of an error."""
+    assert main(["emit", *map(str, words)]) == 2
+    (line,) = [one for one in capsys.readouterr().err.splitlines() if "error" in one]
+    return line
+
+
+def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
+    tire = ti.TireModel.load(stored / "tire.json")
+    words = ["--tir", "car.tir", "--ggv", "ggv.csv", "--out", "understeer.csv"]
+    words = [word if word.startswith("--") else str(tmp_path / word) for word in words]
+    assert main(["emit", str(stored / "tire.json"), "--understeer", *words]) == 0
+    printed = capsys.readouterr()
+    names = {"car_front.tir", "car_rear.tir", "ggv.csv", "understeer.csv"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    assert all(f"wrote {tmp_path / name}" in printed.err for name in names)
+    rows = np.loadtxt(tmp_path / "understeer.csv", delimiter=",", skiprows=1)
+    head, first = (line.split() for line in printed.out.splitlines()[:2])
+    assert head == ["v_x_m_s", "a_y_m_s2", "gradient_deg_per_g", "sd_deg_per_g"]
+    assert [float(one) for one in first] == pytest.approx(rows[0])
+    for axle, load in zip(("front", "rear"), tire.vehicle.axle_loads, strict=True):
+        one = MagicFormula.from_tir(tmp_path / f"car_{axle}.tir")
+        pair = 2.0 * float(one.forces(0.02, 0.0, 0.0, 0.5 * load).F_y)
+        assert pair == pytest.approx(tire.force(0.02, axle), rel=0.03)
+    again = ["emit", str(stored / "tire.json"), "--tir", str(tmp_path / "car.tir"), "--force"]
+    before = (tmp_path / "car_rear.tir").read_bytes()
+    assert main(again) == 0
+    assert (tmp_path / "car_rear.tir").read_bytes() == before
+
+
+def test_without_a_flag_one_line_names_them_all(stored, capsys):
+    line = refused(capsys, stored / "tire.json")
+    assert all(flag in line for flag in ("--tir FILE", "--slipx DIR", "--ggv FILE", "--understeer"))
+    assert "--out goes with --understeer" in refused(capsys, stored / "tire.json", "--out", "a.csv")
+
+
+def test_what_cannot_be_written_or_known_leaves_nothing(stored, tmp_path, capsys):
+    model, tir, ggv = stored / "network.json", tmp_path / "a.tir", tmp_path / "ggv.csv"
+    line = refused(capsys, model, "--tir", tir, "--ggv", ggv)
+    assert "NetworkModel cannot tell how sure it is" in line
+    assert "cannot be a file" in refused(capsys, model, "--tir", tir, "--ggv", tmp_path, "--force")
+    line = refused(capsys, stored / "tire.json", "--tir", tir, "--slipx", tmp_path / "car")
+    assert "slipx describes cars of 1:10" in line
+    line = refused(capsys, stored / "tire.json", "--ggv", ggv, "--understeer", "--out", ggv)
+    assert "two outputs have one name" in line
+    assert "tir must name a file" in refused(capsys, stored / "tire.json", "--tir", "")
+    line = refused(capsys, stored / "tire.json", "--ggv", tmp_path / "none" / "ggv.csv")
+    assert f"{tmp_path / 'none' / 'ggv.csv'} cannot be a file" in line
+    assert list(tmp_path.iterdir()) == []
+    ggv.write_text("mine", encoding="utf-8")
+    assert "ggv.csv exists" in refused(capsys, stored / "tire.json", "--tir", tir, "--ggv", ggv)
+    assert ggv.read_text(encoding="utf-8") == "mine" and not (tmp_path / "a_front.tir").exists()
+
+
+def test_a_disk_that_fills_up_leaves_nothing(stored, tmp_path, monkeypatch):
+    def full(path, text):
+        if path.name == "ggv.csv":
+            raise OSError(28, "No space left on device", str(path))
+        path.write_text(text, encoding="utf-8")
+
+    monkeypatch.setattr("tireid.emitting.write_atomically", full)
+    tire = ti.TireModel.load(stored / "tire.json")
+    with pytest.raises(OSError, match="No space left"):
+        ti.emit(tire, tir=tmp_path / "car.tir", ggv=tmp_path / "ggv.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_small_car_becomes_a_folder_of_slipx(stored, tmp_path):
+    small = ti.Vehicle(
+        name="1:10", mass=3.5, yaw_inertia=0.05, l_f=0.16, l_r=0.17,
+        cornering_stiffness_front=200.0, cornering_stiffness_rear=200.0,
+    )  # fmt: skip
+    tire = ti.TireModel.load(stored / "tire.json").mounted_on(small)
+    emitted = ti.emit(tire, slipx=tmp_path / "car", understeer=True)
+    assert emitted.files == (tmp_path / "car",) and emitted.understeer is not None
+    assert len(list((tmp_path / "car" / "tyres").iterdir())) == 2
+    with pytest.raises(ti.errors.OutputError, match="is not empty"):
+        ti.emit(tire, slipx=tmp_path / "car")
+    ti.emit(tire, slipx=tmp_path / "car", overwrite=True)

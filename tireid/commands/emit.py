@@ -1,0 +1,55 @@
+"""`tireid emit MODEL`: a stored tire as other tools read it."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from identifier.tire_model import load_model
+from tireid.commands import COMMANDS
+from tireid.commands import options as shared
+from tireid.emitting import WANTED, emit
+from tireid.output import text_table
+from tireid.progress import say, tell
+from tireid.verdicts import warn_of_stored
+
+
+def add_parser(commands: Any) -> None:
+    parser = commands.add_parser(
+        "emit",
+        help=COMMANDS["emit"],
+        description=f"Write MODEL as other tools read it. Ask for one or more of {WANTED}; all are "
+        "written, or none.",
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
+    text = "tire property files (PAC2002): car.tir gives car_front.tir and car_rear.tir"
+    parser.add_argument("--tir", type=Path, metavar="FILE", help=text)
+    text = "folder of a car of 1:10 for slipx 0.2.0"
+    parser.add_argument("--slipx", type=Path, metavar="DIR", help=text)
+    text = "speed, largest a_x and a_y, for raceline planners; at the lower end of the band"
+    parser.add_argument("--ggv", type=Path, metavar="FILE", help=text)
+    text = "print the understeer gradient over speed and a_y, with its standard deviation"
+    parser.add_argument("--understeer", action="store_true", help=text)
+    text = "with --understeer: also write it as CSV"
+    parser.add_argument("--out", type=Path, metavar="FILE", help=text)
+    shared.add_force(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    if options.out is not None and not options.understeer:
+        raise ValueError("--out goes with --understeer: the other options name their files")
+    model = load_model(options.model)
+    warn_of_stored(options.model)
+    emitted = emit(
+        model,
+        tir=options.tir,
+        slipx=options.slipx,
+        ggv=options.ggv,
+        understeer=options.understeer if options.out is None else options.out,
+        overwrite=options.force,
+    )
+    if emitted.understeer is not None:
+        rows = [line.split(",") for line in emitted.understeer.csv.splitlines()]
+        tell(text_table(rows, ">>>>"))
+    for path in emitted.files:
+        say(f"wrote {path}")

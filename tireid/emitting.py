@@ -1,0 +1,92 @@
+"""A tire as other programs read it: property files, g-g-v, a car of slipx, understeer gradient."""
+
+from contextlib import ExitStack
+from datetime import date
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.writing import write_file
+from identifier.export.ggv import ggv_text
+from identifier.export.slipx import slipx_files
+from identifier.export.tir import tire_properties
+from identifier.export.understeer import Understeer, understeer_gradient
+from identifier.tire_model import AXLES, TireModel
+from models.files import resolved, write_atomically
+from tireid.output import OutputError, output_folder, require_free
+from tireid.run import Run
+
+WANTED = "--tir FILE, --slipx DIR, --ggv FILE, --understeer"
+
+
+class Emitted(NamedTuple):
+    """Files and folders that were written, and the understeer gradient where it was asked for."""
+
+    files: tuple[Path, ...]
+    understeer: Understeer | None
+
+
+def emit(
+    source: Run | TireModel,
+    *,
+    tir: str | PathLike[str] | None = None,
+    slipx: str | PathLike[str] | None = None,
+    ggv: str | PathLike[str] | None = None,
+    understeer: bool | str | PathLike[str] = False,
+    overwrite: bool = False,
+) -> Emitted:
+    """Write a tire as other programs read it: all that is asked for, or nothing.
+
+    Parameters
+    ----------
+    source : a run, of which the tire at its end, or a tire model.
+    tir : tire property files (PAC2002), of pure lateral slip, of one tire each: `car.tir` gives
+        `car_front.tir` and `car_rear.tir`.
+    slipx : folder of a car for slipx 0.2.0.
+    ggv : table of speed and largest a_x and a_y, at the lower end of the band of 90 %.
+    understeer : whether to compute the gradient; a path also writes it as CSV.
+    overwrite : replace what is there.
+
+    Raises
+    ------
+    ValueError
+        Where nothing is asked for, or the model cannot tell what is.
+    OutputError, OSError
+        Where a file is there and not to be replaced, two have one name, or one cannot be written.
+    """
+    if understeer is False and tir is slipx is ggv is None:
+        raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
+    model = source.tire if isinstance(source, Run) else source
+    if tir is not None and not Path(tir).name:
+        raise OutputError(f"tir must name a file, it is {str(tir)!r}")
+    table = None if isinstance(understeer, bool) else Path(understeer)
+    files = [] if tir is None else [Path(tir).with_stem(f"{Path(tir).stem}_{a}") for a in AXLES]
+    files += [Path(one) for one in (ggv, table) if one is not None]
+    for path in files:
+        if not path.parent.is_dir() or (path.exists() and not path.is_file()):
+            raise OutputError(f"{path} cannot be a file: name one in a folder that is there")
+        require_free(path, force=overwrite)
+    paths = (*files, *([] if slipx is None else [Path(slipx)]))
+    if len({resolved(path) for path in paths}) < len(paths):
+        raise OutputError(f"two outputs have one name: {', '.join(map(str, paths))}")
+    rng, new = np.random.default_rng(0), [path for path in files if not path.exists()]
+    with ExitStack() as stack:
+        if slipx is not None:
+            folder = stack.enter_context(output_folder(Path(slipx), force=overwrite))
+            for name, text in slipx_files(model, rng, date.today()).items():
+                (folder / name).parent.mkdir(exist_ok=True)
+                write_file(folder / name, text)
+        texts = [] if tir is None else [tire_properties(model, axle) for axle in AXLES]
+        texts += [] if ggv is None else [ggv_text(model)]
+        found = understeer_gradient(model, rng) if understeer is not False else None
+        texts += [] if table is None or found is None else [found.csv]
+        try:
+            for path, text in zip(files, texts, strict=True):
+                write_atomically(path, text)
+        except BaseException:
+            for path in new:
+                path.unlink(missing_ok=True)
+            raise
+    return Emitted(paths, found)
