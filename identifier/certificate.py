@@ -15,7 +15,7 @@ _SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 class Property:
     """A property of a design, its limit, and what to do.
 
-    limit : what the value is compared with; None where it is a statement only.
+    limit : what the value is held against; None where it is a statement only.
     margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
     advice : one line; empty where there is nothing to say.
     """

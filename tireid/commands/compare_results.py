@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Trial, same_and_other
+from identifier.compare.course import Trial, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
@@ -205,7 +205,7 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
 
 
 ERROR_COLUMNS = (
-    *("method", "kind", "identified_on", "replayed_on", "front_N", "rear_N"),
+    *("method", "kind", "learnt_on", "replayed_on", "front_N", "rear_N"),
     *("front_percent", "rear_percent", "both_percent"),
 )
 

@@ -196,7 +196,7 @@ def _learn(options: argparse.Namespace) -> int:
     for log, why in list(left.items())[:SHOWN]:
         say(f"{log}: left out, {why}")
     telling = Telling(
-        log_map=given_map(options),
+        log_map=told_map(options),
         start=stored_model(options.weights),
         judging=options.judge,
         check=not options.no_check,

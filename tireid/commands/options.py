@@ -263,7 +263,9 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         help="read column COLUMN of the logs as NAME, for example r=yaw_rate; behind it a unit, "
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
-    add_options(parser, str, {"--dbc FILE": "DBC with the signals in the frames of a CAN log"})
+    add_options(
+        parser, str, {"--dbc FILE": "DBC that tells the signals in the frames of a CAN log"}
+    )
     add_options(
         parser, float, {"--rate HZ": "samples per second, where no column of the logs is a time"}
     )
@@ -348,7 +350,7 @@ _CONVENTIONS = (
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option and what belongs to it."""
-    group = parser.add_argument_group("your tire network", _CONVENTIONS)
+    group = parser.add_argument_group("a tire network of your own", _CONVENTIONS)
     add_options(group, Path, {"--network FILE.onnx": what})
     text = f"what its columns are, in order, of {', '.join(SIGNALS)}"
     group.add_argument("--network-inputs", nargs="+", metavar="SIGNAL", help=text)

@@ -45,8 +45,8 @@ def write_compare_report(
     blocks += drawings(figures, captions)
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
-        summary="Each method is identified on each recording, frozen at its end and replayed on "
-        "all.",
+        summary="Every method learns on each recording, is frozen at its end and asked about all "
+        "of them.",
         numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
         warnings=[
             *_compare_warnings(comparison),
