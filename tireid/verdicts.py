@@ -137,7 +137,7 @@ def verdicts_headline(
 
 
 def known_headline(model: TireModel) -> list[Headline]:
-    """Return the identified slip range of a model as a number of a report, if it has one."""
+    """Return up to which slip a model knows the tires, as a number of a report, if it can tell."""
     if model.known_slip is None:
         return []
     front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))

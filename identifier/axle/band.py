@@ -6,7 +6,7 @@ z: of the level.   v = h'P h, h = [t, 0, 0, φ'/v_x or φ']: variance that learn
 t = tanh(x/α_j) and of the zero of the slip.   m² = (0.04 φ)² + 0.01²: errors of the model, as
 learning is told of them.   s: mean speed of the drive that taught over v_x: an error of a lateral
 velocity is one of slip by 1/v_x.   f: factor of a range of slip times one of a range of speed, by
-which errors on segments that did not teach the model are larger or smaller than that.   ρ: v over
+which errors on stretches that did not teach the model are larger or smaller than that.   ρ: v over
 that from which on a slip is not known, at most 1; there nothing is narrowed.
 Learning takes errors to be correlated over a time that is told; where they are over a longer one,
 as many samples tell less by `color`, the ratio c of both: P' = (P₀⁻¹ + (P⁻¹ - P₀⁻¹)/c)⁻¹, which
@@ -43,7 +43,7 @@ TINY = 1e-30  # keeps quotients of variances finite at no slip
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BandCalibration:
-    """What segments that did not teach a model say of its errors.
+    """What stretches that did not teach a model say of its errors.
 
     Parameters
     ----------

@@ -205,7 +205,7 @@ def _refuse_gains(options: argparse.Namespace, name: str) -> None:
     for option in _OF_GAINS:
         if getattr(options, option) is not None:
             raise ValueError(
-                f"--{option.replace('_', '-')} asks about the gains of the paper's laws, which "
+                f"--{option.replace('_', '-')} is for the gains of the paper's laws, which "
                 f"{name} has not: add --paper, --method {'|'.join(VARIANTS)} or --design FILE"
             )
 

@@ -42,7 +42,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
         time = NOT_TOLD
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
-        pairs = same_and_other(trial.frozen or {})
+        pairs = where_learnt_and_elsewhere(trial.frozen or {})
         means = [_mean(comparison, some) for some in ([*trial.online.items()], *pairs)]
         if trial.diverged_at:
             means = ["diverged"] * 3

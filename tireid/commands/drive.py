@@ -18,12 +18,11 @@ from tireid.reports.drive import write_drive_report
 
 _NOT_COMPLETED = 1
 _EPILOG = (
-    "Without --weights or --network, frozen tires are learnt first: the same car drives on an "
-    f"open field for {DURATION:g} s, steered at random and ever harder until it slides, and what "
-    "the identifier knows at the end steers. linear is the tire of the vehicle file, oracle the "
-    "true tire of the plant, learning begins with what is frozen and goes on learning while it "
-    "drives. "
-    "Exit code 0 where the first of the cars reached the end of the path, else 1."
+    "Without --weights or --network, frozen tires are identified first: the same car drives on "
+    f"an open field for {DURATION:g} s, steered at random and ever harder until it slides, and "
+    "the tires at the end are used. linear is the tire of the vehicle file, oracle the true tire "
+    "of the plant, learning begins with the frozen tires and updates them while driving. Exit "
+    "code 0 where the first of the cars reached the end of the path, else 1."
 )
 
 
@@ -31,9 +30,9 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "drive",
         help=COMMANDS["drive"],
-        description="Learn the tires on one drive, freeze them, and let a model predictive tracker "
-        "that is told of them steer the car along a path; write report.html, summary.json, "
-        "every signal as CSV, figures and a film.",
+        description="Learn the tires on one drive, freeze them, and let a model predictive "
+        "tracker with them steer the car along a path; write report.html, summary.json, every "
+        "signal as CSV, figures and a film.",
         epilog=_EPILOG,
     )
     given = {
@@ -92,7 +91,7 @@ def add_parser(commands: Any) -> None:
         help="full: v_y is measured; imu: yaw rate and a_y of an inertial unit on the body (0.003 "
         "rad/s and 0.1 m/s² of noise, biases of 0.001 and 0.05), wheel speed (0.03 m/s), steering, "
         "position (2 cm) and heading (0.1 degrees) of a localization, and no v_y: an identifier "
-        "that learns while it drives tells it (%(default)s)",
+        "estimates it while driving (%(default)s)",
     )
     text = (
         f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "

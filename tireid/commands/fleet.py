@@ -18,9 +18,9 @@ from tireid.commands.options import (
     add_jobs,
     add_log_map,
     add_options,
-    given_map,
     jobs_of,
     stored_model,
+    told_map,
 )
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
@@ -54,11 +54,11 @@ def add_parser(commands: Any) -> None:
 def _add_learn(tasks: Any) -> None:
     parser = tasks.add_parser(
         "learn",
-        help="learn logs that the store does not hold yet",
-        description="Learn each log on its own and keep, per log, the frozen model, what it tells "
-        "of the tires as information matrix and vector, the verdict and how it was driven. A log "
-        "that cannot be used becomes a row with its error. Run it again after it was stopped, or "
-        "with more logs: only what is missing is learnt.",
+        help="identify logs that are not in the store yet",
+        description="Identify each log separately and store, per log, the frozen model, its "
+        "information matrix and vector of the tires, the verdict and how it was driven. A log "
+        "that cannot be used becomes a row with its error. Run it again after it was stopped, "
+        "or with more logs: only missing logs are identified.",
     )
     parser.add_argument(
         "logs", nargs="+", metavar="PATTERN", help="logs, quoted: 'logs/**/*.csv', s3://..."
@@ -112,8 +112,8 @@ def _add_merge(tasks: Any) -> None:
     parser = tasks.add_parser(
         "merge",
         help="one model of the logs of each group",
-        description="Add up what logs tell, group by group, and write a model of each, as "
-        "weights.json is, and a table.",
+        description="Add up the information of the logs, group by group; write a model of each "
+        "group, as weights.json, and a table.",
     )
     _add_question(parser, "vehicle,tires", "tireid-fleet-merge")
     parser.set_defaults(run=_merge)
@@ -122,9 +122,9 @@ def _add_merge(tasks: Any) -> None:
 def _add_prior(tasks: Any) -> None:
     parser = tasks.add_parser(
         "prior",
-        help="where the next car starts",
-        description="Learn from the cars of a store what they have in common and how they differ, "
-        "and write a model to begin with: tireid identify --weights FILE.",
+        help="prior for the next car",
+        description="Estimate the mean and the spread of a store's cars, and write a prior to "
+        "begin with: tireid identify --weights FILE.",
     )
     _add_question(parser, "vehicle,tires", "prior.json")
     car: dict[str, Any] = {"type": Path, "required": True, "metavar": "FILE"}
@@ -135,7 +135,7 @@ def _add_prior(tasks: Any) -> None:
 def _add_watch(tasks: Any) -> None:
     parser = tasks.add_parser(
         "watch",
-        help="whose tires changed, when, and to what it is likely due",
+        help="whose tires changed, when, and the likely cause",
         description="Compare each car's later logs with its first ones, its baseline, and tell of "
         "changes of stiffness and friction: wear, other tires, a wet road. Exit code 1 where one "
         "lasts. Logs are ordered by their date.",
@@ -164,7 +164,7 @@ def _watching(options: argparse.Namespace) -> Watching:
 def _add_report(tasks: Any) -> None:
     parser = tasks.add_parser(
         "report",
-        help="a page on what the store holds, with figures",
+        help="a report on the store, with figures",
         description="Write report.html: merged models, how stiffness went log by log, what "
         "changed, and which logs were left out.",
     )
@@ -228,18 +228,17 @@ def _learn(options: argparse.Namespace) -> int:
     if became.others:
         count, first = len(became.others), became.others[0].name
         say(
-            f"{first}: taken out of the store, as were {count - 1} others"
+            f"{first}: removed from the store, as were {count - 1} others"
             if options.replace
-            else f"{first} and {count - 1} others stand in the store with another car, other "
-            "options or another content: fleet learn --replace takes them out"
+            else f"{first} and {count - 1} others are in the store with another car, other "
+            "options or another content: fleet learn --replace removes them"
         )
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)
     tell(
-        f"{became.of} logs, {hours:.3g} h: {became.learnt} learnt now, "
-        f"{became.of - became.learnt} before; "
-        f"{refused} not valid, {len(errors)} could not be used"
-        + (f", the column error of {options.out} says why" if errors else "")
+        f"{became.of} logs, {hours:.3g} h: {became.learnt} identified now, "
+        f"{became.of - became.learnt} before; {refused} not valid, {len(errors)} could not be used"
+        + (f", see the column error of {options.out}" if errors else "")
     )
     say(f"wrote {options.out} in {clock.seconds:.0f} s")
     return FAILS if errors else DONE
@@ -263,7 +262,7 @@ class _Used:
         if not used:
             raise ValueError(
                 f"{self.options.store}: none of {of} logs can be used"
-                + ("" if self.options.all else "; --all takes those too that the verdict refuses")
+                + ("" if self.options.all else "; --all includes rejected ones")
             )
         if not self.told:
             say(f"{used} of {of} logs")
@@ -352,7 +351,7 @@ def _table(groups: list[Merged]) -> str:
 
 
 def _prior(options: argparse.Namespace) -> int:
-    """Write where the next car starts."""
+    """Write prior for the next car."""
     require_free(options.out, force=options.force)
     vehicle = Vehicle.from_toml(options.vehicle)
     prior = fleet_prior(_Used(options).groups)

@@ -53,7 +53,7 @@ def add_parser(commands: Any) -> None:
     several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     text = "freeze at these times [s] (the end)"
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
-    text = "validation drives to predict, each with a verdict"
+    text = "recordings to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
     text = (
         "state forces that are guaranteed where no force differs from the best curve by more "
@@ -61,7 +61,7 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
-    add_repair(parser, "learn on what repaired log, and write the repair to")
+    add_repair(parser, "identify the repaired log, and write the repair to")
     shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_network_arguments(parser, "judge this network instead")

@@ -270,9 +270,9 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         parser, float, {"--rate HZ": "samples per second, where no column of the logs is a time"}
     )
     flags = {
-        "--cut-holes": "drop samples without a value (NaN); else such logs are rejected",
-        "--mend-clock": "sort samples by time, drop repeated stamps, and treat a clock that "
-        "what follows where the clock starts again as a gap; else such logs are rejected",
+        "--cut-holes": "leave cells without a value (NaN) out of the logs, which are refused else",
+        "--mend-clock": "sort samples by time, leave out those that share a stamp, and learn on "
+        "what follows where the clock starts again as after a gap; refused else",
     }
     add_options(parser, bool, flags)
 
