@@ -1,4 +1,4 @@
-"""The pictures of README, docs/index.md and docs/driving.md: `python -m benchmarks.readme_picture`."""
+"""Pictures of README, docs/index.md and docs/driving.md: `python -m benchmarks.readme_picture`."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -16,9 +16,9 @@ project = "tireid"
 author = "The tireid developers"
 release = version = installed("tireid")
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon"]
-myst_enable_extensions = ["attrs_block", "dollarmath"]
 myst_heading_anchors = 3
-source_suffix = {".rst": "restructuredtext", ".md": "myst-nb", ".ipynb": "myst-nb"}  # stubs are .rst
+# Pages of names are made with the first of these.
+source_suffix = {".rst": "restructuredtext", ".md": "myst-nb", ".ipynb": "myst-nb"}
 templates_path = ["templates"]
 exclude_patterns = ["templates"]
 html_theme = "furo"

@@ -52,8 +52,8 @@ def test_controllers_on_a_learnt_tire_steer_and_its_c_passes_its_own_test(execut
     assert abs(executed["Y"][-1]) < 0.01
     assert executed["rms"]["identified"] < 0.5 * executed["rms"]["linear"]
     assert (executed["exported"].folder / "include").is_dir()
-    if "tested" in executed:
-        assert executed["tested"].returncode == 0 and "100% tests passed" in executed["tested"].stdout
+    if "test" in executed:
+        assert executed["test"].returncode == 0 and "100% tests passed" in executed["test"].stdout
     assert np.isfinite(executed["gains"]["identified"]).all()
 
 
