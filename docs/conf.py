@@ -4,13 +4,13 @@ import os
 import re
 import shutil
 import sys
+import tempfile
 from importlib.metadata import version as installed
 from pathlib import Path
 from typing import Any
 
 DOCS = Path(__file__).resolve().parent
 RECORDINGS = "TIREID_DATA"  # names their folder; beside the checkout it need not be named
-BESIDE = DOCS.parents[1] / "shared" / "data"
 
 project = "tireid"
 author = "The tireid developers"
@@ -22,7 +22,7 @@ source_suffix = {".rst": "restructuredtext", ".md": "myst-nb", ".ipynb": "myst-n
 templates_path = ["templates"]
 exclude_patterns = ["templates"]
 html_theme = "furo"
-html_title = "tireid"
+html_title = f"tireid {release}"
 html_copy_source = False
 html_show_copyright = False
 html_show_sourcelink = False
@@ -36,10 +36,15 @@ nb_execution_in_temp = True
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
+PROFILE = Path(tempfile.mkdtemp(prefix="ipython"), "profile_default")
+PROFILE.mkdir()
+(PROFILE / "ipython_kernel_config.py").write_text(
+    "c.IPKernelApp.log_level = 'ERROR'\nc.InlineBackend.figure_formats = {'retina'}\n"
+)
+os.environ["IPYTHONDIR"] = str(PROFILE.parent)
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # of tireid
-if BESIDE.is_dir():
-    os.environ.setdefault(RECORDINGS, str(BESIDE))
-if RECORDINGS not in os.environ:  # the page shows its code without outputs, and says so
+os.environ.setdefault(RECORDINGS, str(DOCS.parents[1] / "shared" / "data"))
+if not Path(os.environ[RECORDINGS], "ferrari.csv.gz").is_file():  # the page says so
     nb_execution_excludepatterns = ["notebooks/a_real_car*"]
 
 autosummary_generate = True
