@@ -91,7 +91,7 @@ def test_the_example_identifies_the_tire(tmp_path, monkeypatch, capsys):
     names: dict[str, object] = {"__name__": "__main__"}
     exec(compile(blocks[0], "README.md", "exec"), names)
     text = capsys.readouterr().out
-    printed = re.search(r"([\d.]+) / ([\d.]+) % of the force, front / rear>", text)
+    printed = re.search(r"<Prediction .*?([\d.]+) / ([\d.]+) %", text)
     assert printed
     assert all(0.0 < float(share) < 8.0 for share in printed.groups())
     tire, log = names["run"].tire, names["log"]
