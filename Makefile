@@ -145,4 +145,4 @@ wheel:
 	$(VENV)-wheel/bin/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:
-	rm -rf $(VENV) $(VENV)-* out build dist
+	rm -rf $(VENV) $(VENV)-* out build dist docs/generated

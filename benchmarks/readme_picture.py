@@ -1,26 +1,39 @@
-"""The pictures of README and docs/driving.md: `python -m benchmarks.readme_picture`."""
+"""Pictures of README, docs/index.md and docs/driving.md: `python -m benchmarks.readme_picture`."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from PIL import Image
+
+from tireid.cli import main as tireid
 from tireid.commands.demo_parts import LANE_CHANGE, drive_story
 from tireid.commands.demo_story import run_story
-from tireid.figures.forces import side_by_side_figure
-from tireid.figures.style import figure_png
 
-FILM = "drive.webp"
+FILM, CURVES = "drive.webp", "tires.webp"
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
+def draw_curves(target: Path) -> None:
+    """Save the first figure of the report that the README's commands write.
+
+    target : of the picture.
+    """
+    with TemporaryDirectory() as folder:
+        log, car, out = (str(Path(folder) / name) for name in ("log.csv", "car.toml", "out"))
+        tireid(["sample", log, "--car", car])
+        tireid(["identify", log, "--vehicle", car, "--out", out])
+        with Image.open(Path(out) / "slip.png") as figure:
+            figure.convert("RGB").save(target, quality=80, method=6)
+
+
 def main() -> None:
-    """Draw the demo's models on a step steer that they have not seen, and the film of its drive."""
+    """Draw the tires of the sample log, and the film of the demo's drive."""
+    draw_curves(DOCS / CURVES)
     story = run_story()
-    figure = side_by_side_figure(story.side_by_side("step_steer"))
-    (DOCS / "forces.png").write_bytes(figure_png(figure, resolution=130))
     with TemporaryDirectory() as folder:
         drive_story(story, Path(folder))
         (DOCS / FILM).write_bytes((Path(folder) / LANE_CHANGE / FILM).read_bytes())
-    print(f"wrote {DOCS}/forces.png and {FILM}")
+    print(f"wrote {DOCS}/{CURVES} and {FILM}")
 
 
 if __name__ == "__main__":

@@ -1,23 +1,53 @@
-"""How the documents become a site: `make docs`."""
+"""How the documents become a site: `make docs` executes the notebooks and keeps their outputs."""
 
-import json
+import os
 import re
+import shutil
+import sys
+import tempfile
 from importlib.metadata import version as installed
+from pathlib import Path
 from typing import Any
+
+DOCS = Path(__file__).resolve().parent
+RECORDINGS = "TIREID_DATA"  # names their folder; beside the checkout it need not be named
 
 project = "tireid"
 author = "The tireid developers"
 release = version = installed("tireid")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon"]
 myst_heading_anchors = 3
-source_suffix = {".md": "markdown", ".ipynb": "notebook"}
+# Pages of names are made with the first of these.
+source_suffix = {".rst": "restructuredtext", ".md": "myst-nb", ".ipynb": "myst-nb"}
+templates_path = ["templates"]
+exclude_patterns = ["templates"]
 html_theme = "furo"
-html_title = "tireid"
+html_title = f"tireid {release}"
 html_copy_source = False
 html_show_copyright = False
+html_show_sourcelink = False
+html_static_path = ["static"]
+html_css_files = ["tireid.css"]
 smartquotes = False
 default_role = "literal"  # in docstrings single back-ticks are code
 
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_timeout = 600
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+PROFILE = Path(tempfile.mkdtemp(prefix="ipython"), "profile_default")
+PROFILE.mkdir()
+(PROFILE / "ipython_kernel_config.py").write_text(
+    "c.IPKernelApp.log_level = 'ERROR'\nc.InlineBackend.figure_formats = {'retina'}\n"
+)
+os.environ["IPYTHONDIR"] = str(PROFILE.parent)
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # of tireid
+os.environ.setdefault(RECORDINGS, str(DOCS.parents[1] / "shared" / "data"))
+if not Path(os.environ[RECORDINGS], "ferrari.csv.gz").is_file():  # the page says so
+    nb_execution_excludepatterns = ["notebooks/a_real_car*"]
+
+autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 napoleon_google_docstring = False
@@ -46,27 +76,11 @@ def shorten(*event: Any) -> tuple[str | None, ...]:
     return tuple(text.replace(ARRAY, "Array") if text else None for text in event[-2:])
 
 
-def markdown_of(notebook: str) -> str:
-    """Return a notebook, without outputs, as Markdown."""
-    texts = []
-    for cell in json.loads(notebook)["cells"]:
-        text = "".join(cell["source"])
-        texts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
-    return "\n\n".join(texts) + "\n"
-
-
 def setup(app: Any) -> None:
-    """Rewrite docstrings before napoleon reads them, and signatures; read notebooks."""
-    from myst_parser.parsers.sphinx_ import MystParser
+    """Rewrite docstrings before napoleon reads them, and signatures; make pages of names anew."""
+    import tireid
 
-    class NotebookParser(MystParser):
-        """Reads a notebook as the Markdown that it holds."""
-
-        supported = ("notebook",)
-
-        def parse(self, inputstring: str, document: Any) -> None:
-            super().parse(markdown_of(inputstring), document)
-
-    app.add_source_parser(NotebookParser)
+    sys.modules["tireid.paths"] = tireid.paths  # is `mpc.path`, found by the name of the interface
+    shutil.rmtree(DOCS / "generated", ignore_errors=True)
     app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-process-docstring", describe, priority=400)

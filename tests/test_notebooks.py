@@ -1,13 +1,15 @@
 """Notebooks run from the first cell to the last, keep no outputs, and hold what they promise."""
 
 import ast
-import importlib.util
 import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from tireid.cli import build_parser
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -49,17 +51,30 @@ def test_what_was_learnt_from_a_log_predicts_another_drive(executed):
 
 @pytest.mark.parametrize("executed", ["from_a_tire_to_a_controller"], indirect=True)
 def test_controllers_on_a_learnt_tire_steer_and_its_c_passes_its_own_test(executed):
-    assert 0.0 < executed["furthest"]["learnt"] < 0.25 * executed["LANE"]
+    assert 0.0 < executed["furthest"]["identified"] < 0.25 * executed["LANE"]
     assert abs(executed["Y"][-1]) < 0.01
-    assert executed["rms"]["learnt"] < 0.5 * executed["rms"]["linear"]
+    assert executed["rms"]["identified"] < 0.5 * executed["rms"]["linear"]
     assert (executed["exported"].folder / "include").is_dir()
-    if "told" in executed:
-        assert executed["told"].returncode == 0 and "100% tests passed" in executed["told"].stdout
-    assert np.isfinite(executed["gains"]["learnt"]).all()
+    if "test" in executed:
+        assert executed["test"].returncode == 0 and "100% tests passed" in executed["test"].stdout
+    assert np.isfinite(executed["gains"]["identified"]).all()
+
+
+@pytest.fixture
+def recordings(shared_data, monkeypatch):
+    monkeypatch.setenv("TIREID_DATA", str(shared_data))
+
+
+@pytest.mark.parametrize("executed", ["a_real_car"], indirect=True)
+def test_tires_of_a_real_car_predict_the_rest_of_its_drive(recordings, executed):
+    assert executed["run"].verdict.valid and executed["prediction"].verdict.valid
+    error, size = executed["prediction"].against_truth, executed["prediction"].true_force
+    assert error.front < 0.12 * size.front and error.rear < 0.12 * size.rear
 
 
 def test_every_notebook_is_run_and_leads_through_one_import():
-    assert {path.stem for path in NOTEBOOKS} == {"learn_from_a_log", "from_a_tire_to_a_controller"}
+    run_above = {"learn_from_a_log", "from_a_tire_to_a_controller", "a_real_car"}
+    assert {path.stem for path in NOTEBOOKS} == run_above
     own = {"codegen", "models", "identifier", "mpc"}
     for path in NOTEBOOKS:
         nodes = [n for source in cells(path, "code") for n in ast.walk(ast.parse(source))]
@@ -80,11 +95,27 @@ def test_a_notebook_keeps_no_output_and_has_the_form_that_jupyter_reads(path):
         assert not cell.get("outputs") and cell.get("execution_count") is None
 
 
-def test_the_site_shows_a_notebook_as_its_text_with_code_in_blocks():
-    spec = importlib.util.spec_from_file_location("conf", ROOT / "docs" / "conf.py")
-    conf = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(conf)
-    shown = conf.markdown_of(NOTEBOOKS[0].read_text(encoding="utf-8"))
-    blocks = re.findall(r"^```python\n(.*?)\n```$", shown, re.M | re.S)
-    assert blocks == cells(NOTEBOOKS[0], "code")
-    assert all(text in shown for text in cells(NOTEBOOKS[0], "markdown"))
+def strangers(gallery: str) -> list[str]:
+    """Commands of the gallery that there are none, and figures from folders that none writes."""
+    wrong, written = [], set()
+    shell = "\n".join(re.findall(r"^%%sh\n(.*?)^```$", gallery, re.M | re.S))
+    for line in shell.splitlines():
+        words = shlex.split(line)[1:]
+        try:
+            options = build_parser(words).parse_args(words)
+        except SystemExit:
+            wrong.append(line)
+        else:
+            written.add(str(getattr(options, "out", "")))
+    figures = re.findall(r'^Image\("(.*)"\)$', gallery, re.M)
+    assert shell and figures
+    return wrong + [name for name in figures if name.partition("/")[0] not in written]
+
+
+def test_the_gallery_shows_figures_of_commands_that_there_are(capsys):
+    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert strangers(gallery) == []
+    planted = gallery.replace("tireid plan --vehicle", "tireid plan --wagon")
+    found = strangers(planted)
+    assert len(found) == 3 and found[0].startswith("tireid plan --wagon")
+    assert found[1:] == ["plan/area.png", "plan/band.png"]

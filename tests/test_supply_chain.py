@@ -43,6 +43,21 @@ def test_a_lock_holds_all_that_is_asked_for_with_hashes_and_no_address(lock):
     assert not re.search(r"https?:|file:|--index|--find-links|--extra", text)
 
 
+def releases(changelog, citation):
+    """Version and date of the newest release of the changelog, and those of the citation."""
+    newest = re.search(r"^## \[(\d[^]]*)\] - (\S+)$", changelog, re.M).groups()
+    fields = dict(re.findall(r"^(version|date-released): (\S+)$", citation, re.M))
+    return newest, (fields["version"], fields["date-released"])
+
+
+def test_project_changelog_and_citation_name_the_same_release():
+    changelog, citation = (ROOT / "CHANGELOG.md").read_text(), (ROOT / "CITATION.cff").read_text()
+    newest, cited = releases(changelog, citation)
+    assert newest == cited and cited[0] == PROJECT["version"]
+    stale = citation.replace(f"version: {cited[0]}", "version: 0.0.1")
+    assert releases(changelog, stale)[1] == ("0.0.1", cited[1])
+
+
 def test_every_package_that_is_imported_is_declared():
     imported = set()
     for package in ("codegen", "models", "identifier", "mpc", "tireid"):

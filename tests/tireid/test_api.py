@@ -204,6 +204,7 @@ def test_a_recording_is_sliced_by_time_and_made_a_frame(log):
 def test_a_recording_is_plotted(log):
     figure = ti.plot(log)
     assert len(figure.axes) >= 4 and figure.axes[-1].get_xlabel().startswith("t")
+    assert figure._repr_png_().startswith(b"\x89PNG")  # Jupyter displays it
 
 
 def test_a_recording_of_another_car_is_refused(log, car):

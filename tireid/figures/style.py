@@ -59,12 +59,19 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapper
 
 
+class _NotebookFigure(Figure):
+    """A figure that Jupyter displays without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        return figure_png(self, resolution=100)
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
     width : of the figure [in].   height : of the figure [in].
     """
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = _NotebookFigure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
