@@ -110,7 +110,7 @@ class Rests(NamedTuple):
 def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
     """Return n samples with rests before each segment but the first.
 
-    breaks : samples with which stretches begin, rising.
+    breaks : samples with which segments begin, rising.
     """
     begins = np.repeat(np.asarray(breaks, dtype=np.intp), rest)
     samples = np.arange(n)

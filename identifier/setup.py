@@ -82,7 +82,7 @@ class Setup(NamedTuple):
 
     @property
     def rest(self) -> int:
-        """Samples that the step is shown between stretches of a drive."""
+        """Samples that the step is shown between segments of a drive."""
         if not judges_samples(self.carry):
             return 1
         if self.ends_run is None:

@@ -220,7 +220,7 @@ def _of_axle(
     span = f"{axle} axle, slip up to {known:.3g} rad"
     noise = np.sqrt((g**2).sum(axis=0))
     part = [
-        ("told", "of that by errors as they are told", by_told, "static loads"),
+        ("told", "of that by the declared errors", by_told, "static loads"),
         ("begin", "of that by the beginning", by_begin, "static loads"),
         ("moved", "of that by bounds", by_bounds, "static loads"),
         ("error_gain", "force error per largest error of y", sizes.sum(axis=0), "-"),
@@ -236,7 +236,7 @@ def _of_axle(
             margin=facts.flattest,
             status="pass" if facts.flattest > 0.0 else "fail",
             unit="static loads/rad",
-            advice="the force does not push against its slip where the curve is called known",
+            advice="the force does not push against its slip within the identified range",
         ),
         statement(
             f"along/{axle}/steepest", f"{span}: steepest secant", facts.steepest, "static loads/rad"
@@ -244,13 +244,13 @@ def _of_axle(
         statement(f"along/{axle}/rises_until", f"{span}: rises until", facts.rises_until, "rad"),
         Property(
             name=f"along/{axle}/force_error",
-            title=f"{span}: largest force error, where y errs as told",
+            title=f"{span}: largest force error, with the declared errors of y",
             value=float(error[k]),
             limit=float(possible[k]),
             margin=float(possible[k] / error[k]),
             status=at_most(float(error[k]), good=float(possible[k]), bad=None),
             unit="static loads",
-            advice="the boxes alone hold the error: drive with more slip",
+            advice="only the limits bound the error: drive with more slip",
         ),
         *(
             statement(f"along/{axle}/{name}", f"{span}: {title}", float(value[k]), unit)
@@ -258,14 +258,14 @@ def _of_axle(
         ),
         Property(
             name=f"along/{axle}/left",
-            title=f"{span}: largest force error by what the learnt curve leaves of y",
+            title=f"{span}: largest force error, with the residuals of y",
             value=float(by_left[k]),
             limit=float(by_told[k]),
             margin=float(by_told[k] / max(float(by_left[k]), TINY)),
             status=at_most(float(by_left[k]), good=float(by_told[k]), bad=None),
             unit="static loads",
-            advice="y errs by more than is told, and so may the force: sensors, car or signs "
-            "differ from what is told",
+            advice="y errs by more than declared, and so may the force: check sensors, car and "
+            "signs",
         ),
     )
 

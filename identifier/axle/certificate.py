@@ -310,17 +310,17 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
         ),
         statement(
             "opposes_until",
-            "slip up to which every curve that may be learnt pushes against its slip",
+            "slip up to which every possible curve pushes against its slip",
             facts.opposes_until,
             "rad",
-            "of the curve that was learnt, on its own range: --along LOG",
+            "for the identified curve on its range: --along LOG",
         ),
         statement(
             "rises_until",
-            "slip up to which every curve that may be learnt rises",
+            "slip up to which every possible curve rises",
             facts.rises_until,
             "rad",
-            "of the curve that was learnt, on its own range: --along LOG",
+            "for the identified curve on its range: --along LOG",
         ),
         statement("steepest", "steepest secant of any curve", facts.steepest, "static loads/rad"),
         Property(
@@ -331,7 +331,7 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             margin=apart / jump,
             status=at_most(jump, good=apart, bad=None),
             unit="static loads",
-            advice="the boxes alone hold it: sample faster, or lower the rate",
+            advice="only the limits bound it: sample faster, or lower the rate",
         ),
         statement(
             "jump_back",
@@ -350,13 +350,13 @@ def _drop(design: Design, vehicle: Vehicle, driving: Driving) -> Property:
     by_memory = design.regression.memory * math.log(2.0)
     return Property(
         name="drop_time",
-        title="friction drops to half in a steady corner: both axles stay half wrong",
+        title="friction drops to half in a steady corner: time with half the error left",
         value=follows,
         limit=by_memory,
         margin=by_memory / follows,
         status=at_most(follows, good=by_memory, bad=None),
         unit="s",
-        advice="no alarm is proven to follow it: larger errors are told than the drop makes",
+        advice="no alarm is proven: the declared errors exceed those of the drop",
     )
 
 

@@ -52,13 +52,13 @@ class AxleIdentifier(Method):
 
     Parameters
     ----------
-    prior : what is believed before the first sample.
+    prior : before the first sample.
     sway : roll of the body.
-    bounds : limits of what is learnt.
-    plausibility : which samples are believed, and the lowest speeds.
+    bounds : limits of the estimates.
+    plausibility : which samples are accepted, and the lowest speeds.
     regression : filter, error model and memory.
     change : detector of a change of friction.
-    watch : when what is measured is not what was learnt, and how long to wait for it.
+    watch : when measured and identified forces differ, and how long to wait.
     road : what of an accelerometer's a_y tells of a road that is not level.
     ladder : slip scales of the units [rad], rising by powers of two.
     rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
@@ -227,7 +227,7 @@ class AxleIdentifier(Method):
 
         Parameters
         ----------
-        start : as of `setup`; without a calibration errors are taken to be as learning is told.
+        start : as of `setup`; without a calibration the declared errors are assumed.
         """
         setup = self.setup(vehicle, start)
         stored = None if start is None else self._resumed(start).calibration
@@ -302,9 +302,9 @@ class AxleIdentifier(Method):
         del vehicle
         b, W, own = self.bounds, state["W"], state["own"]
         grip, slope = W.sum(axis=1), (W / np.array(self.ladder)).sum(axis=1)
-        elsewhere = "a sensor is off by more than that, or sits elsewhere than is told"
+        elsewhere = "a sensor has a larger offset, or another place than declared"
         late = "a sensor is late, or the tires are very soft"
-        unexcited = "no such curve was seen, or mass, signs or units are wrong"
+        unexcited = "the drive has no such curve, or mass, signs or units are wrong"
         zero, bias = float(own[0, 2]), float(own[1, 2])
         listed = [
             (abs(zero) > NEAR * b.steering,

@@ -476,7 +476,7 @@ def _all_move(priors: Priors) -> Priors:
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
 
-    recording : as it was logged, of one drive or of several joined; of a long one lively stretches
+    recording : as it was logged, of one drive or of several joined; of a long one lively segments
         are looked at.
     vehicle : as it was told; its cornering stiffnesses are not looked at.
     """

@@ -58,7 +58,7 @@ def segments_of(
 ) -> tuple[Recording, ...]:
     """Return the recording, or of a long one the liveliest segment of each of its parts.
 
-    longest : that is looked at as a whole [s]; the stretches have it together.
+    longest : that is looked at as a whole [s]; the segments have it together.
     """
     n, dt = len(recording), recording.dt
     if recording.duration <= longest:

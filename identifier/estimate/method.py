@@ -121,7 +121,7 @@ class FitMethod(Method):
         """
         if not isinstance(start, FittedModel):
             raise ValueError(
-                "the method fit learns from whole logs: sample by sample it tells the forces of "
-                "the weights.json of a fit; the method axle learns"
+                "the method fit learns from whole logs: sample by sample it outputs the forces "
+                "of the weights.json of a fit; the method axle learns"
             )
         return (start if start.vehicle == vehicle else start.mounted_on(vehicle)).setup(self.dt)

@@ -460,7 +460,7 @@ class FittedModel(TireModel):
         front, rear = 100.0 * np.hypot(self.error_share, self.error_floor / TYPICAL)
         return (
             f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
-            f"at {TYPICAL:g} static loads, from what it misses of them and a mass known to "
+            f"at {TYPICAL:g} static loads, from its error on them and a mass known to "
             f"{100.0 * SURE_MASS:.0f} %"
         )
 

@@ -171,7 +171,7 @@ class CompiledPackage:
     def run(self, recording: Recording) -> ShippedRun:
         """Run a whole recording, from the state that the instance is in.
 
-        Between stretches of it samples are missing, as they are on a car.
+        Between segments of it samples are missing, as they are on a car.
         """
         if abs(recording.dt - self.dt) > 1e-6 * self.dt:
             raise ValueError(

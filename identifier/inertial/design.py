@@ -41,7 +41,7 @@ AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
     "bias": ("bias of a_y", "g", "the accelerometer is mounted askew, or not in its unit", True),
     "roll": ("roll of the body", "rad/g", "no body rolls so far: a_y has another scale", False),
     "gyro": ("bias of the yaw rate", "rad/s", "the gyro is off, or not in its unit", True),
-    "inertia": ("excess of 1/I_z", "-", "the told yaw inertia is far off", False),
+    "inertia": ("excess of 1/I_z", "-", "the declared yaw inertia is far off", False),
 }
 
 # What a search may vary of it, and what the number is multiplied and divided by.
@@ -137,7 +137,7 @@ class InertialIdentifier(Method):
     @property
     def remark(self) -> str:
         """Say what it does without."""
-        return "" if self.reads_v_y else "without v_y, which it tells"
+        return "" if self.reads_v_y else "without v_y, which it estimates"
 
     def resumes(self, model: TireModel) -> bool:
         """Return whether a run can begin with a stored model."""
@@ -310,7 +310,7 @@ class InertialIdentifier(Method):
         b, W, own = self.bounds, state["W"], np.ravel(state["own"])
         shown = dict(zip(SENSORS, map(float, np.ravel(state["sensors"])), strict=True))
         zero, bias = shown["steering"], shown["v_y_bias"]
-        unexcited = "no such curve was seen, or mass, signs or units are wrong"
+        unexcited = "the drive has no such curve, or mass, signs or units are wrong"
         late = "a sensor is late, or the tires are very soft"
         listed = [
             (abs(zero) > NEAR * b.steering,

@@ -43,7 +43,7 @@ class Windows:
     def of(cls, recording: Recording, min_speed: float) -> "Windows":
         """Return the windows of a recording.
 
-        min_speed : a window counts where the car is never slower [m/s], in one stretch.
+        min_speed : a window counts where the car is never slower [m/s], in one segment.
         """
         return cls.where(recording.v_x >= min_speed, recording, WINDOW)
 

@@ -185,7 +185,7 @@ class Judge:
         self._h = round(self.expected.stretch / dt)
         self._settle = round(self.expected.settle / dt)
         if self._h < 2:
-            raise ValueError(f"a stretch of {self.expected.stretch:g} s has no three samples")
+            raise ValueError(f"a segment of {self.expected.stretch:g} s has no three samples")
         centered = np.arange(self._h + 1) - 0.5 * self._h
         self._slope = centered / (dt * np.sum(centered**2))
         self._mean = np.full(self._h + 1, 1.0 / (self._h + 1))

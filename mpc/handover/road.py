@@ -44,7 +44,7 @@ def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     weights = tire.structure.at_friction(tire.weights, ratio)
     if weights is None:
         kind = type(tire.structure).__name__
-        raise ValueError(f"a {kind} cannot be told for another friction")
+        raise ValueError(f"a {kind} cannot be scaled to another friction")
     return tire._replace(weights=weights)
 
 
@@ -118,7 +118,7 @@ class Change(NamedTuple):
     @property
     def reason(self) -> str:
         return (
-            f"{self.road.ratio:.2f} of the friction learnt on: chi-square {self.before:.0f} -> "
+            f"{self.road.ratio:.2f} of the identified friction: chi-square {self.before:.0f} -> "
             f"{self.after:.0f}"
         )
 

@@ -53,7 +53,9 @@ class Excitation:
         """
         for axle, time in zip(("front", "rear"), self._time, strict=True):
             if not time >= self._least_time:
-                return f"the {axle} axle learnt for {time:.1f} s, not {self._least_time:g} s"
+                return (
+                    f"the {axle} axle was identified for {time:.1f} s, not {self._least_time:g} s"
+                )
         if model.known_slip is not None:
             driven = np.quantile(np.abs(slips(samples, self._vehicle)), 0.95, axis=0)
             for i, axle in enumerate(("front", "rear")):
@@ -131,7 +133,7 @@ class Supervisor:
         self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
         self._agreed, self._trusted_since = True, -math.inf
         self.decisions: list[Decision] = []
-        self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)
+        self.last = Decision(0.0, Verdict.KEEP, "no driving yet", 0.0, 0.0)
 
     def _require_fit_for_use(self, in_use: PredictionTire) -> None:
         complaint = law_complaint(self.identifier.method, self.identifier.vehicle)
@@ -140,7 +142,7 @@ class Supervisor:
         learnt = prediction_tire(self.identifier.model()).structure
         if learnt != in_use.structure:
             raise ValueError(
-                f"what is learnt ({learnt}) cannot replace what is steered with "
+                f"the identified tire ({learnt}) cannot replace the tracker's "
                 f"({in_use.structure}): begin with a tire of the identifier"
             )
 
@@ -267,7 +269,7 @@ class Supervisor:
         seconds = min(rules.seconds, self.t - self._road.changed_at)
         samples = self._window.last(judge.lookback(seconds))
         if seconds < rules.least_seconds or len(samples) * self._dt < rules.least_seconds:
-            return self._keep("too few seconds to judge what was learnt", now.total)
+            return self._keep("too few seconds to judge the identified tires", now.total)
         try:
             model = self.identifier.model()
         except (DivergedError, CannotFreezeError, ValueError) as error:

@@ -120,7 +120,7 @@ def drive(
             measured = told.in_place_of(shown)
         place = _located(measured, place, car.period)
         for channel in place.just_lost(car.period):
-            record.note(state.t, f"{channel} shows no number: dead reckoning")
+            record.note(state.t, f"{channel} is no number: dead reckoning")
         projected = path.project(place.X, place.Y, last_s)
         last_s = projected.s
         if learner is not None:

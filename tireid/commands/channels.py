@@ -14,14 +14,14 @@ from models.files import write_atomically
 from models.logs.clock import holes
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, told_by
-from models.logs.units import SI, is_told
+from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
+from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.options import add_force, add_log_map, require_toml, told_map
+from tireid.commands.options import add_force, add_log_map, given_map, require_toml
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
@@ -108,7 +108,7 @@ def _wheels(
             scales = wheel_scales(log, signals, told, run)
         except RecordingError as error:
             kept = replace(plain, signals={n: one for n, one in signals.items() if n not in WHEELS})
-            return f"of the wheels nothing is learnt: {error}", kept, True
+            return f"the wheels are not used: {error}", kept, True
         wheels, scaled = with_scales(told.wheels, signals, scales)
         return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
     try:

@@ -122,9 +122,8 @@ def add_parser(commands: Any) -> None:
     text = "find gains and write them, for --design FILE"
     shared.add_options(parser, Path, {"--tune FILE": text})
     text = (
-        "for --tune: what keeps the weights over hours, the paper's leakage (which forgets "
-        "them), a leakage with a dead zone, or a projection in its place "
-        f"({DEFAULT_KEEPING})"
+        "for --tune: bound of the weights over hours: the paper's leakage (which forgets them), "
+        f"a leakage with a dead zone, or a projection in its place ({DEFAULT_KEEPING})"
     )
     parser.add_argument("--keep", choices=KEEPINGS, help=text)
     shared.add_output(parser, None)
@@ -146,7 +145,7 @@ def run(options: argparse.Namespace) -> int:
     certificate = certify(method, vehicle, driving)
     history = None
     if options.along is not None:
-        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
+        drive = shared.read_log(options.along, vehicle, shared.given_map(options), dt=method.dt)
         history = identify(drive, vehicle, method)
     if options.tune is not None:
         require_free(options.tune, force=options.force)
@@ -236,7 +235,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         value = getattr(options, word)
         if options.along is None and value is not None and value is not False and value != []:
             option = f"--{word.replace('_', '-')}"
-            raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
+            raise ValueError(f"{option} is for a drive: give one by --along LOG")
     if options.tune is None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
@@ -263,7 +262,7 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
     said = f"conditions: {'as stored in the design' if stored else told}"
     if not changed or (stored and driving == design.driving):
         return said
-    return f"{said}, but for {changed}" + (": not the file's own verdict" if stored else "")
+    return f"{said}, but for {changed}" + (": not the verdict of the file" if stored else "")
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:

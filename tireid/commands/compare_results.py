@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Trial, where_learnt_and_elsewhere
+from identifier.compare.course import Trial, same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
@@ -42,7 +42,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
         time = NOT_TOLD
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
-        pairs = where_learnt_and_elsewhere(trial.frozen or {})
+        pairs = same_and_other(trial.frozen or {})
         means = [_mean(comparison, some) for some in ([*trial.online.items()], *pairs)]
         if trial.diverged_at:
             means = ["diverged"] * 3
@@ -205,7 +205,7 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
 
 
 ERROR_COLUMNS = (
-    *("method", "kind", "learnt_on", "replayed_on", "front_N", "rear_N"),
+    *("method", "kind", "identified_on", "replayed_on", "front_N", "rear_N"),
     *("front_percent", "rear_percent", "both_percent"),
 )
 

@@ -47,7 +47,7 @@ def add_parser(commands: Any) -> None:
         ),
     }
     shared.add_options(parser, str, given)
-    text = "friction from arc length S [m] on, known to nobody but oracle; may be repeated"
+    text = "friction from arc length S [m] on, known to oracle only; may be repeated"
     parser.add_argument("--mu-drop", action="append", default=[], metavar="S:MU", help=text)
     parser.add_argument(
         "--tires",
@@ -69,13 +69,13 @@ def add_parser(commands: Any) -> None:
         ),
         "--dither M": (
             0.0,
-            "weave by at most so much about the path, to learn from it; where the car goes on "
-            "learning the weave fades as the tires become known (%(default)g: off)",
+            "largest weave about the path, for excitation; with learning tires it fades as "
+            "their uncertainty falls (%(default)g: off)",
         ),
         "--caution SHARE": (
             0.0,
-            "of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
-            "plans with the least grip that its motion leaves possible (%(default)g)",
+            "share of the tires' uncertainty that the tracker plans for: 0 none, 1 the least "
+            "grip that the motion leaves possible (%(default)g)",
         ),
         "--laps N": (1.0, "of a closed path (%(default)g)"),
     }

@@ -14,7 +14,7 @@ from identifier.frozen import vehicle_numbers
 from identifier.tire_model import TireModel
 from models.files import digest
 from models.vehicle import Vehicle
-from mpc.loop.record import Drive, told_scores
+from mpc.loop.record import Drive, estimate_scores
 from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film

@@ -29,11 +29,11 @@ def add_parser(commands: Any) -> None:
         "--band": "half the width of the 90 %% band around each force is an output too",
         "--fmu": "also FMUs 2.0 and 3.0, Co-Simulation",
         "--onnx": "also the model, frozen, as ONNX",
-        "--mpc": "also a tracker that steers by what is learnt",
+        "--mpc": "also a tracker that steers by the identified tires",
     }
     shared.add_options(parser, bool, flags)
     text = (
-        "of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
+        "share of the tires' uncertainty that the tracker of --mpc plans for, from 0 to 1; a "
         "number of its parameters (%(default)g)"
     )
     shared.add_options(parser, float, {"--caution SHARE": (0.0, text)})

@@ -1,4 +1,4 @@
-"""Thousands of logs in one command: learn, merge, where the next car starts, watch."""
+"""Thousands of logs in one command: learn, merge, prior for the next car, watch."""
 
 import argparse
 from collections.abc import Iterator
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from identifier.tire_model import STIFFNESS
-from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
@@ -18,9 +17,9 @@ from tireid.commands.options import (
     add_jobs,
     add_log_map,
     add_options,
+    given_map,
     jobs_of,
     stored_model,
-    told_map,
 )
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
@@ -39,9 +38,9 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "fleet",
         help=str(__doc__)[:-1].lower(),
-        description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
-        "each log, and ask it: one model of many logs, where the next car starts, which car's "
-        f"tires changed. {needs('A store', 'libraries', 'fleet')}.",
+        description="Identify thousands of logs into a store, a Parquet dataset with a row for "
+        "each log. From it: one model of many logs, a prior for the next car, cars whose tires "
+        "changed. {needs('A store', 'libraries', 'fleet')}.",
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
     _add_learn(tasks)
@@ -65,12 +64,14 @@ def _add_learn(tasks: Any) -> None:
     )
     text = "car as TOML; {name} in it stands for a tag: cars/{vehicle}.toml"
     parser.add_argument("--vehicle", required=True, metavar="FILE", help=text)
-    parser.add_argument("--out", required=True, metavar="STORE", help="folder or address to keep")
+    parser.add_argument(
+        "--out", required=True, metavar="STORE", help="folder or address of the store"
+    )
     words: dict[str, Any] = {
         "--tags PATTERN": (
             "",
             "what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
-            "(2026-03-31) are known by name, the others stand in the column tags",
+            "(2026-03-31) are known by name, others are in the column tags",
         ),
         "--root DIR": (
             "",
@@ -79,15 +80,15 @@ def _add_learn(tasks: Any) -> None:
         "--scheduler ADDRESS": "work on the Dask cluster of this scheduler, as in tcp://host:8786",
     }
     add_options(parser, str, words)
-    add_options(parser, Path, {"--weights FILE": "fit or prior that is believed before"})
+    add_options(parser, Path, {"--weights FILE": "fit or prior to begin with"})
     judging: dict[str, Any] = {"choices": ("motion", "none"), "default": "motion"}
-    text = "verdict of each log: does the model give its motion back, or none (%(default)s)"
+    text = "verdict of each log: does the model reproduce its motion, or none (%(default)s)"
     parser.add_argument("--judge", help=text, **judging)
-    text = "longest piece of a log that is kept as one [s] (%(default)g)"
+    text = "longest piece of a log in one row [s] (%(default)g)"
     add_options(parser, float, {"--part S": (PART, text)})
     flags = {
-        "--again": "also learn logs whose row holds an error",
-        "--replace": "take out of the store what these logs were learnt with before: another car "
+        "--again": "also identify logs whose row has an error",
+        "--replace": "remove earlier rows of these logs from the store: another car "
         "or other options, or another content of the same file",
         "--no-check": "accept logs that contradict physics",
     }
@@ -98,11 +99,11 @@ def _add_learn(tasks: Any) -> None:
 
 
 def _add_question(parser: argparse.ArgumentParser, by: str, out: str) -> None:
-    parser.add_argument("store", metavar="STORE", help="that fleet learn keeps")
+    parser.add_argument("store", metavar="STORE", help="of fleet learn")
     where = "rows that count, by a condition on their columns: \"a_y_most > 4 and tires = 'x'\""
     text = f"what logs of a group have in common, of {', '.join(BY)} and tags (%(default)s)"
     add_options(parser, str, {"--where SQL": ("", where), "--by NAMES": (by, text)})
-    add_options(parser, bool, {"--all": "also logs whose answer the verdict refuses"})
+    add_options(parser, bool, {"--all": "also logs whose model the verdict rejects"})
     metavar = "FILE" if out.endswith(".json") else "DIR"
     add_options(parser, Path, {f"--out {metavar}": (Path(out), "(%(default)s)")})
     add_force(parser)
@@ -196,7 +197,7 @@ def _learn(options: argparse.Namespace) -> int:
     for log, why in list(left.items())[:SHOWN]:
         say(f"{log}: left out, {why}")
     telling = Telling(
-        log_map=told_map(options),
+        log_map=given_map(options),
         start=stored_model(options.weights),
         judging=options.judge,
         check=not options.no_check,

@@ -53,11 +53,11 @@ def add_parser(commands: Any) -> None:
     several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     text = "freeze at these times [s] (the end)"
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
-    text = "recordings to predict, each with a verdict"
+    text = "validation drives to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
     text = (
-        "state forces that are guaranteed where no force differs from the best curve by more "
-        "than E static axle loads, or, with a second number, is late by more [s] (estimated)"
+        "guaranteed forces, if no force differs from the best curve by more than E static axle "
+        "loads; a second number: lateness [s] (estimated)"
     )
     parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
@@ -66,10 +66,7 @@ def add_parser(commands: Any) -> None:
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_network_arguments(parser, "judge this network instead")
     shared.add_accept(parser)
-    text = (
-        "as what curves over time are written (csv); parquet is smaller, sooner written and "
-        "has all digits"
-    )
+    text = "format of curves over time (csv); parquet is smaller and faster, with all digits"
     parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
@@ -82,10 +79,12 @@ def run(options: argparse.Namespace) -> int:
     beside = options.network is not None  # of which something learns online
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
-        raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
+        raise ValueError("--freeze is for identified models: the network of --network is frozen")
     bound = None if options.bound is None else AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
-        raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
+        raise ValueError(
+            "--bound is for identified models: a network has no set of possible weights"
+        )
     start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")

@@ -48,7 +48,7 @@ from tireid.reports.identify import guaranteed_sentence
 NETWORK = "network"
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 TOLD = {  # columns of forces.csv by the outputs of methods that estimate v_y
-    "v_y_told_m_s": "v_y",
+    "v_y_estimated_m_s": "v_y",
     "v_y_sd_m_s": "v_y_sd",
     "side_slip_observable": "side_slip_observable",
 }
@@ -118,7 +118,7 @@ class Results:
         learnt, last, others = runs[0], times[-1], [*parts, *runs[1:]]
         tire = calibrated(learnt, last, verdict)
         if bound is not None:
-            tire = guaranteed(learnt, bound.told, last, tire)
+            tire = guaranteed(learnt, bound.given, last, tire)
         models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]} | {freeze_key(last): tire}
         frozen = {
             key: {learnt.recording.name: reproduce(learnt, t)} | _replays(model, others)
@@ -215,7 +215,7 @@ class Results:
             **design.numbers(),
             "certificate": None  # of a method that learns from whole logs: nothing learns in a car
             if certificate is None
-            else {"verdict": certificate.verdict, "held_by_construction": certificate.held},
+            else {"verdict": certificate.verdict, "limits": certificate.limits},
             "vehicle": vehicle_numbers(learnt.vehicle),
             "diverged_at_s": learnt.diverged_at,
             "version": __version__,

@@ -263,16 +263,14 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         help="read column COLUMN of the logs as NAME, for example r=yaw_rate; behind it a unit, "
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
-    add_options(
-        parser, str, {"--dbc FILE": "DBC that tells the signals in the frames of a CAN log"}
-    )
+    add_options(parser, str, {"--dbc FILE": "DBC with the signals in the frames of a CAN log"})
     add_options(
         parser, float, {"--rate HZ": "samples per second, where no column of the logs is a time"}
     )
     flags = {
-        "--cut-holes": "leave cells without a value (NaN) out of the logs, which are refused else",
-        "--mend-clock": "sort samples by time, leave out those that share a stamp, and learn on "
-        "what follows where the clock starts again as after a gap; refused else",
+        "--cut-holes": "drop samples without a value (NaN); else such logs are rejected",
+        "--mend-clock": "sort samples by time, drop repeated stamps, and treat a clock that "
+        "starts again as a gap; else such logs are rejected",
     }
     add_options(parser, bool, flags)
 
@@ -350,7 +348,7 @@ _CONVENTIONS = (
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option and what belongs to it."""
-    group = parser.add_argument_group("a tire network of your own", _CONVENTIONS)
+    group = parser.add_argument_group("your tire network", _CONVENTIONS)
     add_options(group, Path, {"--network FILE.onnx": what})
     text = f"what its columns are, in order, of {', '.join(SIGNALS)}"
     group.add_argument("--network-inputs", nargs="+", metavar="SIGNAL", help=text)

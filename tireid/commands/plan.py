@@ -40,11 +40,11 @@ def add_parser(commands: Any) -> None:
     shared.add_vehicle(parser, default="the sedan; with --after that of the model")
     needed = {"required": True}
     parser.add_argument("--area", metavar="LxW", help="length and width [m], as 40x40", **needed)
-    text = "held throughout: 15 or 15m/s, 54km/h"
+    text = "constant: 15 or 15m/s, 54km/h"
     parser.add_argument("--speed", metavar="V", help=text, **needed)
     of_steering = "of steering, over as many passes as the area takes (%(default)g)"
     lag = (
-        "time constant from the angle asked for to that of the front wheels, a guess within "
+        "time constant from the command to the front wheel angle, a guess within "
         f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)"
     )
     rate = math.degrees(planning.RATE)
@@ -59,13 +59,12 @@ def add_parser(commands: Any) -> None:
         "--steering-rate DEG/S": f"largest, of the front wheels ({rate:.0f} over sqrt(L/g))",
         "--steering-angle DEG": (30.0, "largest, of the front wheels (%(default)g)"),
         "--steering-lag S": lag,
-        "--steering-ratio RATIO": "hand wheel over front wheels: steering.csv tells the hand wheel "
-        "too",
+        "--steering-ratio RATIO": "hand wheel over front wheels: adds the hand wheel to steering.csv",
     }
     shared.add_options(parser, float, numbers)
     text = "weights.json, as identified: plan what is still unknown"
     shared.add_options(parser, Path, {"--after FILE": text})
-    text = "nobody holds the course, steering alone is played: takes more room"
+    text = "open loop: steering without course correction; takes more room"
     shared.add_options(parser, bool, {"--blind": text})
     shared.add_seed(parser, "the search")
     shared.add_output(parser, "plan")

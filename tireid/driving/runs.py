@@ -53,7 +53,7 @@ class Informer:
             return None
         self._mu = mu
         tracker.set_tire(self._setup.oracle(mu))
-        return f"told of friction {mu:g}"
+        return f"given friction {mu:g}"
 
 
 NOTED = 0.1  # change of the grip that is worth a note
@@ -316,13 +316,13 @@ def drive(
     seed: int = 0,
     caution: float = 0.0,
 ) -> Run:
-    """Drive a double-track car along a path; the tracker steers by the tires that it is told of.
+    """Drive a double-track car along a path; the tracker steers by the given tires.
 
     Parameters
     ----------
     path : to follow, of `tireid.paths`, or `tireid.paths.Path.from_csv`.
     vehicle : the car, with a chassis.
-    tire : what was learnt; None tells the tracker of the linear tire of the vehicle.
+    tire : the identified tires; None takes the linear tires of the vehicle.
     speed : constant speed [m/s]; None drives at a share of the grip.
     share : of the lateral acceleration that the tightest bend takes, over what the tires can give;
         a closed path brakes for bends.
@@ -334,11 +334,10 @@ def drive(
         position and heading, but no v_y, which an inertial identifier tells.
     laps : of a closed path.
     dither : deviation that a weave may make which teaches [m], at most 0.5; 0 keeps to the path.
-        Where the car goes on learning it fades as the tires become known.
+        With learning tires it fades as their uncertainty falls.
     seed : of the noise.
-    caution : share of what is not known of the tires that the tracker fears, from 0, which
-        believes in them, to 1, which plans with the least grip that its motion leaves
-        possible.
+    caution : share of the tires' uncertainty that the tracker plans for, from 0 to 1, the least
+        grip that the motion leaves possible.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from matplotlib.colors import Colormap, LogNorm
 from matplotlib.figure import Figure
 
 from codegen.escape import mathtext
-from identifier.compare.course import where_learnt_and_elsewhere
+from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import AxleRmse
 from tireid.figures import style
@@ -32,7 +32,7 @@ def method_label(name: str) -> str:
     return mathtext(name.replace("_", " "))
 
 
-ONLINE, OWN, OTHER = "online", "frozen, where learnt", "frozen, other recordings"
+ONLINE, OWN, OTHER = "online", "frozen, same drive", "frozen, other recordings"
 KINDS = {
     ONLINE: (style.BLUE, "o", -0.22),
     OWN: (style.GREEN, "D", 0.0),
@@ -73,7 +73,7 @@ def _method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     trial, course = comparison.trials[name], comparison.course
     sane = {rec: error for rec, error in trial.online.items() if rec not in trial.diverged_at}
     online = [course.share(rec, error) for rec, error in sane.items()]
-    frozen = zip((OWN, OTHER), where_learnt_and_elsewhere(trial.frozen or {}), strict=True)
+    frozen = zip((OWN, OTHER), same_and_other(trial.frozen or {}), strict=True)
     return {ONLINE: online} | {kind: [course.share(*one) for one in some] for kind, some in frozen}
 
 

@@ -254,6 +254,6 @@ def draw_diagnosis(
     for panel in panels[0]:
         panel.set_xlabel("slip angle [deg]")
         panel.axhline(0.0, color=style.GREY, linewidth=0.5)
-    panels[0, 0].set_ylabel("force that the motion shows [load]")
+    panels[0, 0].set_ylabel("force from the motion [load]")
     style.legend_above(figure)
     return figure

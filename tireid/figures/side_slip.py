@@ -40,7 +40,7 @@ def side_slip_figure(
     drawn = list(recordings)[:MOST]
     told = {name: by_name for name, by_name in told.items() if by_name}
     if not told:
-        raise ValueError("no method told a lateral velocity")
+        raise ValueError("no method estimated a lateral velocity")
     has_band = {n: any(one.v_y_sd is not None for one in told[n].values()) for n in told}
     first = max(told, key=lambda name: (name == FIRST, has_band[name]))
     known = [recording.logged_v_y is not None for recording in drawn]
@@ -110,7 +110,7 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     inertial = drive.estimates["inertial_v_y"]
     figure = style.new_figure(style.PAGE, 3.6)
     above, below = figure.subplots(2, 1, sharex=True)
-    shade: Mapping[str, Any] = {**_SHADE, "label": "told, two sigma"}
+    shade: Mapping[str, Any] = {**_SHADE, "label": "estimate, two sigma"}
     told_look: Mapping[str, Any] = {**style.ONLINE, "label": "told"}
     alone: Mapping[str, Any] = {"color": style.GREY, "label": "inertial identifier alone"}
     above.fill_between(drive.s, told - band, told + band, **shade)

@@ -28,7 +28,7 @@ def write_compare_report(
 
     verdicts : on what the default learns, by recording.
     """
-    course, learnt = comparison.course, "recordings on which what the default learnt is valid"
+    course, learnt = comparison.course, "recordings with a valid model of the default"
     captions = {
         "methods": "Errors of every method.",
         "matrix": "Identified on one recording, validated on another.",
@@ -45,8 +45,8 @@ def write_compare_report(
     blocks += drawings(figures, captions)
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
-        summary="Every method learns on each recording, is frozen at its end and asked about all "
-        "of them.",
+        summary="Each method is identified on each recording, frozen at its end and replayed on "
+        "all.",
         numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
         warnings=[
             *_compare_warnings(comparison),

@@ -137,8 +137,8 @@ def identify_headlines(
 
 
 def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
-    """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
-    meaning = "replayed drives, not learnt on, whose motion the model gives back"
+    """Return on how many validation drives a model is valid, and its error."""
+    meaning = "replayed validation drives with a valid prediction"
     numbers = verdicts.verdicts_headline(asked, meaning)
     shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
     if shares:
