@@ -24,6 +24,7 @@ from identifier.reproducibility import AxleRmse, Replay, Reproduction
 from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
+from tests.tireid.test_drive_figures import FIGURES as DRIVEN
 from tireid.figures.forces import (
     force_figure,
     inputs_figure,
@@ -130,7 +131,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     ),
     "prediction alone": lambda: prediction_figure(replayed(made_up(truth=False))),
 }
-every_figure = pytest.mark.parametrize("draw", FIGURES.values(), ids=FIGURES.keys())
+EVERY = FIGURES | DRIVEN
+every_figure = pytest.mark.parametrize("draw", EVERY.values(), ids=EVERY.keys())
 
 
 def clipped(figure: Figure) -> bool:
