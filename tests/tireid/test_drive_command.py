@@ -132,7 +132,7 @@ def test_learning_and_oracle_are_told_of_a_friction_that_drops(
     assert main([*words, "--mu-drop", "30:0.5", "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out
     assert "friction 1, 0.5 from 30 m on" in printed
-    assert "oracle at " in printed and "told of friction 0.5" in printed
+    assert "oracle at " in printed and "given friction 0.5" in printed
     drives = summary_of(tmp_path / "out")["drives"]
     assert drives["oracle"]["peak_e_y_m"] < drives["learning"]["peak_e_y_m"]
     reasons = " ".join(entry["note"] for entry in drives["learning"]["notes"])

@@ -59,7 +59,7 @@ def add_parser(commands: Any) -> None:
         "--steering-rate DEG/S": f"largest, of the front wheels ({rate:.0f} over sqrt(L/g))",
         "--steering-angle DEG": (30.0, "largest, of the front wheels (%(default)g)"),
         "--steering-lag S": lag,
-        "--steering-ratio RATIO": "hand over front wheels: adds the hand wheel to steering.csv",
+        "--steering-ratio RATIO": "hand wheel over front wheels: adds it to steering.csv",
     }
     shared.add_options(parser, float, numbers)
     text = "weights.json, as identified: plan what is still unknown"

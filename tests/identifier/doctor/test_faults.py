@@ -333,7 +333,7 @@ def test_what_is_negative_is_said_the_other_way_round(parameter, word):
 
 def test_a_yaw_inertia_that_the_file_leaves_out_was_estimated_and_not_told():
     suspect = next(one for one in SUSPECTS if one.code == "yaw_inertia")
-    assert suspect.words(1.35, 0.1, sedan()).startswith("the told yaw inertia is 1.35")
+    assert suspect.words(1.35, 0.1, sedan()).startswith("the declared yaw inertia is 1.35")
     left_out = replace(sedan(), estimated=("yaw_inertia",))
     assert suspect.words(1.35, 0.1, left_out).startswith("the estimated yaw inertia is 1.35")
 

@@ -138,7 +138,9 @@ def test_slips_are_those_of_the_paper(car, rng):
 
 def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):
     excitation, samples = Excitation(0.01, car, 1.0), np.tile([20.0, 0.0, 0.0, 0.0], (100, 1))
-    assert "the front axle learnt for 0.0 s, not 1 s" in excitation.complaint(learnt, samples)
+    assert "the front axle was identified for 0.0 s, not 1 s" in excitation.complaint(
+        learnt, samples
+    )
     recording = dry[1]
     for row in zip(recording.v_x, recording.v_y, recording.r, recording.delta_f, strict=True):
         excitation.add(*row)

@@ -118,7 +118,7 @@ def test_what_was_not_excited_is_not_handed_over(car, learnt):
     for row in straight:
         supervisor.observe(*row)
     assert supervisor.decisions == []
-    assert "axle learnt for" in supervisor.last.reason
+    assert "axle was identified for" in supervisor.last.reason
 
 
 def test_a_lost_sample_now_and_then_hides_no_drop(car, learnt, dropped):

@@ -248,7 +248,7 @@ def test_half_a_second_without_a_number_is_driven_through(channel, value, bump):
     assert all(abs(m.v_y) < 300.0 or math.isnan(m.v_y) for m in driver.seen)
     assert all(abs(m.r) < 10.0 or math.isnan(m.r) for m in driver.seen)
     lost = [channel] if channel != "all" else list(GUIDES)
-    noted = [(1.0, f"{one} shows no number: dead reckoning") for one in lost if one in GUIDES]
+    noted = [(1.0, f"{one} is no number: dead reckoning") for one in lost if one in GUIDES]
     assert [(round(t, 6), text) for t, text in run.notes] == noted
 
 
