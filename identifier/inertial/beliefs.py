@@ -8,10 +8,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
-import numpy as np
-
-from codegen.arrays import Array
-from identifier.inertial.motion import MOVING, places, size
 from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
@@ -67,8 +63,8 @@ class Beliefs:
     roll, sd_roll : of the body, outwards, as the accelerometer feels it [rad per g]; 0 and nearly 0
         for an acceleration in the plane of the road.
     steering : of the zero of the front steering [rad].
+    grip : of ln of the grip of an axle whose tires are held [-].
     gyro : bias of the yaw rate, in a car with a wheelbase of 2.7 m [rad/s].
-    inertia : of 1/I_z [-].
     """
 
     bias: float = 0.015
@@ -76,30 +72,10 @@ class Beliefs:
     sd_roll: float = 0.04
     steering: float = 0.005
     gyro: float = 0.002
-    inertia: float = 0.03
+    grip: float = 0.02
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
-
-    def covariance(self, n: int, scale: float) -> Array:
-        """Return the covariance of what is learnt, (2 n + 8, 2 n + 8); zero where it is of curves.
-
-        Parameters
-        ----------
-        n : number of units.
-        scale : root of the wheelbase over 2.7 m [-].
-        """
-        P = np.zeros((size(n) - MOVING, size(n) - MOVING))
-        at = {name: place - MOVING for name, place in places(n).items()}
-        for name, sd in (
-            ("bias", self.bias),
-            ("roll", self.sd_roll),
-            ("steering", self.steering),
-            ("gyro", self.gyro / scale),
-            ("inertia", self.inertia),
-        ):
-            P[at[name], at[name]] = sd**2
-        return P
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,17 +2,16 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, triangle, unpacked
-from identifier.axle.curve import EDGES, LADDER, doublings
+from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
@@ -22,10 +21,19 @@ from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
+from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import MOVING, SENSORS, Laws, of_axles, size
-from identifier.inertial.step import CARRY, OVER, PORTS, LearntLimits, build_step, heard_size
-from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
+from identifier.inertial.motion import CURVES, MOVING, SENSORS, Laws, Learnt
+from identifier.inertial.step import (
+    OUTPUTS,
+    OVER,
+    PORTS,
+    LearntLimits,
+    build_step,
+    carry_of,
+    heard_size,
+)
+from identifier.method import OTHER_STRUCTURE, CannotFreezeError, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel
 from models.rules import require_within
@@ -33,30 +41,34 @@ from models.vehicle import GRAVITY, Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
-MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # others are in `Bounds`
+MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1}  # others are in `Bounds`
 LATEST = 0.25  # s, by which a measured v_y may be late
+LEAST_SHARE = 1e-6  # of the sway, which a prior has to have
+REACH = 0.3  # rad, up to which directions of curves are those of a tire
 
 # Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
 AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
     "bias": ("bias of a_y", "g", "the accelerometer is mounted askew, or not in its unit", True),
     "roll": ("roll of the body", "rad/g", "no body rolls so far: a_y has another scale", False),
     "gyro": ("bias of the yaw rate", "rad/s", "the gyro is off, or not in its unit", True),
-    "inertia": ("excess of 1/I_z", "-", "the told yaw inertia is far off", False),
 }
-
-# What a search may vary of it, and what the number is multiplied and divided by.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InertialIdentifier(Method):
-    """Axle curves and lateral velocity by one Kalman filter, from r, a_y, v_x and steering alone.
+    """Lateral velocity and axle curves by one Kalman filter, from r, a_y, v_x and steering alone.
 
-    A v_y that is measured is one more measurement, believed as far as its noise and bias allow:
-    numbers that repeat or are missing are none. What is learnt freezes to the same kind of model as
-    that of the axle identifier.
+    A v_y that is measured is one more measurement where it is to be read, believed as far as its
+    noise and bias allow: numbers that repeat or are missing are none. What is learnt freezes to the
+    same kind of model as that of the axle identifier.
 
     Parameters
     ----------
+    held : whether tires, lag and steering stay those of the model that it begins with, but for
+        their grip; else stiffness, lag and steering are learnt, too.
+    doubt : standard deviation of the rear force for longer than noise: always [static axle loads],
+        and of the force [-].
+    a_y_late : by which a_y is later than the yaw rate [s].
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
     reads_v_y : whether a measured v_y is looked at, where there is one.
@@ -78,7 +90,10 @@ class InertialIdentifier(Method):
     roll_frequency: float = 6.0
     roll_damping: float = 0.3
     sensor_position: tuple[float, float] = (0.0, 0.0)
-    reads_v_y: bool = True
+    held: bool = False
+    doubt: tuple[float, float] = (0.0, 0.0)
+    a_y_late: float = 0.0
+    reads_v_y: bool = False
     v_y_delay: float = 0.0
     ladder: tuple[float, ...] = LADDER
     dt: float = 0.01
@@ -86,6 +101,7 @@ class InertialIdentifier(Method):
     def __post_init__(self) -> None:
         object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
         object.__setattr__(self, "sensor_position", tuple(self.sensor_position))
+        object.__setattr__(self, "doubt", tuple(self.doubt))
         doublings(self.ladder)
         if not 0.0 < self.dt < math.inf:
             raise ValueError(f"dt must be positive, it is {self.dt}")
@@ -119,6 +135,27 @@ class InertialIdentifier(Method):
             dt=dt,
         )
 
+    @classmethod
+    def holding(cls, model: FittedModel, *, dt: float = 0.01) -> "InertialIdentifier":
+        """Return the design for a car whose tires are known: it begins with the model.
+
+        Parameters
+        ----------
+        model : of the car's own logs.
+        dt : sampling interval [s].
+        """
+        usual, vehicle = cls.for_vehicle(model.vehicle, dt=dt), model.vehicle
+        sway = model.in_units(usual.ladder)
+        share = max(float(sway.own[:, 1].mean()), LEAST_SHARE)
+        return replace(
+            usual,
+            held=True,
+            prior=replace(usual.prior, sway_share=share),
+            roll_frequency=sway.sway.frequency * vehicle.froude_time,
+            doubt=(float(model.error_floor[1]), float(model.error_share[1])),
+            a_y_late=model.a_y_late,
+        )
+
     @property
     def min_speed(self) -> float:
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
@@ -149,8 +186,9 @@ class InertialIdentifier(Method):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force trust."""
-        return PORTS
+        """Outputs and state of its step, axle_force first."""
+        kept = (*OUTPUTS, *carry_of(self._delay))
+        return tuple(port for port in PORTS if port.name in kept)
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
         """Return what is proven of it: the boxes of what is learnt hold after every sample."""
@@ -167,7 +205,6 @@ class InertialIdentifier(Method):
                 "v_y_offset_m_s": [-b.v_y, b.v_y],
                 "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
                 "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
-                "inverse_yaw_inertia_over_told": [1.0 - MOST["inertia"], 1.0 + MOST["inertia"]],
             }
         )
 
@@ -195,18 +232,22 @@ class InertialIdentifier(Method):
             )
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
             sensors[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]] = own[:, 2]
-        size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
         trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time, self.prior.sd_v_y)
-        known = self.beliefs.covariance(n, size_ratio)
-        for one, rows in zip(P, of_axles(n), strict=True):
-            known[np.ix_(rows, rows)] = one[_learnt_of_axle(n)]
-        if self._delay is None:
-            known[-1, :-1] = known[:-1, -1] = 0.0
-        heard_v_y = np.zeros(heard_size(self._delay))
-        heard_v_y[2] = trust.v_y_noise
-        rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
+        curves, compliance = self._directions(W), own[:, 0]
+        known = self._known(vehicle, P, curves, compliance)
+        heard_v_y = {}
+        if self._delay is not None:
+            heard_v_y["heard_v_y"] = np.zeros(heard_size(self._delay))
+            heard_v_y["heard_v_y"][2] = trust.v_y_noise
+        q = len(self._learnt.names)
+        rest = len(triangle(MOVING + q)) - len(triangle(q))
         return Setup(
-            scan=_scan(doublings(self.ladder), self._delay, pressed=vehicle.has_downforce),
+            scan=_scan(
+                doublings(self.ladder),
+                self._delay,
+                tires=not self.held,
+                pressed=vehicle.has_downforce,
+            ),
             carry={
                 "motion": np.zeros(MOVING),
                 "W": W,
@@ -219,9 +260,9 @@ class InertialIdentifier(Method):
                 "heard": np.concatenate(
                     [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
-                "heard_v_y": heard_v_y,
                 "running": np.zeros(2),
                 "excitation": excitation,
+                **heard_v_y,
             },
             constants={
                 "dt": np.array(self.dt),
@@ -235,6 +276,9 @@ class InertialIdentifier(Method):
                 "bounds": np.array(self.bounds.of_ladder(self.ladder, RISING_UNTIL)),
                 "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 "rising": rising_shares(self.ladder, RISING_UNTIL),
+                "curves": curves,
+                "compliance": compliance,
+                "doubt": np.array(self.doubt),
                 **downforce_numbers(vehicle),
             },
             ends_run=self.plausibility.rest(self.dt),
@@ -259,6 +303,7 @@ class InertialIdentifier(Method):
             sway=self.prior.sway_share * omega**-2,
             ahead=ahead,
             aside=aside,
+            late=self.a_y_late,
         )
 
     def _sway(self, vehicle: Vehicle) -> Sway:
@@ -276,6 +321,64 @@ class InertialIdentifier(Method):
         of_sensors = {"steering": b.steering, "v_y_bias": b.v_y, **MOST}
         most = {"compliance": b.compliance, **of_sensors}
         return LearntLimits(**{name: inward(limit) for name, limit in most.items()})
+
+    @property
+    def _learnt(self) -> Learnt:
+        return Learnt(not self.held, self.reads_v_y)
+
+    def _directions(self, W: Array) -> Array:
+        """Return by how much weights change with ln grip, then with ln stiffness, (4, n).
+
+        A curve φ(x) of another stiffness and the same grip changes by x dφ/dx, one of another grip
+        and the same stiffness by φ - x dφ/dx, as near as units come to it.
+        """
+        slip = np.linspace(0.0, REACH, 121)[1:]
+        T = unit_matrix(slip, self.ladder)
+        stiffer = slip[:, None] * ((1.0 - T * T) / np.array(self.ladder)) @ W.T
+        n = len(self.ladder)
+        damped = np.vstack([T, 1e-3 * np.eye(n)])
+        wanted = np.hstack([T @ W.T - stiffer, stiffer])
+        found = np.linalg.lstsq(damped, np.vstack([wanted, np.zeros((n, 4))]), rcond=None)[0]
+        return np.asarray(found.T, np.float64)
+
+    def _into(self, curves: Array, compliance: Array) -> Array:
+        """Return what steps of what is learnt move of each axle's [W, own], (2, n + 3, k)."""
+        n, names = len(self.ladder), self._learnt.names
+        E = np.zeros((2, n + 3, len(names)))
+        for k, name in enumerate(names):
+            if name in CURVES:
+                i = CURVES.index(name)
+                E[i % 2, :n, k] = curves[i]
+            elif name == "compliance":
+                E[:, n, k] = compliance
+            elif name in ("steering", "v_y_bias"):
+                E[int(name == "v_y_bias"), n + 2, k] = 1.0
+        return E
+
+    def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
+        """Return the covariance of what is learnt of covariances of both axles' [W, own], (k, k).
+
+        The axles' doubts of their compliance are one.
+        """
+        names = self._learnt.names
+        size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
+        sensors = {
+            "bias": self.beliefs.bias,
+            "roll": self.beliefs.sd_roll,
+            "gyro": self.beliefs.gyro / size_ratio,
+        }
+        known = np.diag([sensors.get(name, 0.0) ** 2 for name in names])
+        if self.held:
+            known[:2, :2] = self.beliefs.grip**2 * np.eye(2)
+            return known
+        for E, one in zip(self._into(curves, compliance), P, strict=True):
+            back = np.linalg.pinv(E)
+            known += back @ one @ back.T
+        both = [k for k, name in enumerate(names) if name == "compliance"]
+        known[both] /= 2.0
+        known[:, both] /= 2.0
+        known[both, both] *= 2.0
+        return known
 
     def _prior_covariance(self, vehicle: Vehicle) -> Array:
         """Return the covariance of both axles before the first sample, (2, n + 3, n + 3)."""
@@ -354,17 +457,27 @@ class InertialIdentifier(Method):
         Parameters
         ----------
         state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
+
+        Raises
+        ------
+        CannotFreezeError
+            Where tires are held.
         """
-        n = len(self.ladder)
+        if self.held:
+            raise CannotFreezeError(
+                "the tires are held: they are those of the model that it began with"
+            )
         prior = self._prior_covariance(vehicle)
         zeros = np.ravel(state["sensors"])[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]]
         own = np.zeros((2, 3))
         own[:, 0], own[:, 2] = np.ravel(state["own"]), zeros
         own[:, 1] = self.prior.sway_share
-        (P,) = unpacked(state["UD"].reshape(1, -1), size(n) - MOVING)
-        after = prior.copy()
-        for one, rows in zip(after, of_axles(n), strict=True):
-            one[_learnt_of_axle(n)] = P[np.ix_(rows, rows)]
+        (P,) = unpacked(state["UD"].reshape(1, -1), len(self._learnt.names))
+        after = np.empty_like(prior)
+        into = self._into(self._directions(state["W"]), own[:, 0])
+        for one, E, before in zip(after, into, prior, strict=True):
+            beside = np.eye(len(E)) - E @ np.linalg.pinv(E)
+            one[:] = E @ P @ E.T + beside @ before @ beside.T
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
@@ -379,12 +492,7 @@ class InertialIdentifier(Method):
         )
 
 
-def _learnt_of_axle(n: int) -> tuple[NDArray[np.intp], ...]:
-    """Return where in the covariance of [W, own] of an axle stands what `of_axles` lists of it."""
-    places = [*range(n + 1), n + 2]
-    return np.ix_(places, places)
-
-
 @cache
-def _scan(steps: tuple[int, ...], delay: int | None, *, pressed: bool) -> Scan:
-    return Scan(build_step(steps, delay, pressed=pressed), carry=CARRY, over=OVER)
+def _scan(steps: tuple[int, ...], delay: int | None, *, tires: bool, pressed: bool) -> Scan:
+    step = build_step(steps, delay, tires=tires, pressed=pressed)
+    return Scan(step, carry=carry_of(delay), over=OVER)

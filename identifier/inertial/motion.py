@@ -1,16 +1,16 @@
 """The car between two samples, and what its sensors should show: all that the filter predicts.
 
-z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ, o]: what moves, then
-what is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static
-axle loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights
-of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad
-per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-], o bias
-of a sensor of v_y [m/s].
+z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, o]: what moves, then
+the tires and the sensors. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a
+force [static axle loads]; p sine of the bank, positive where it falls to the left, p' its rate
+[1/s]; w weights of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of
+the body [rad per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], o bias of a
+sensor of v_y [m/s]. What is learnt of these are a few steps along directions (`Learnt`).
 
 f = λ φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s λ C(x),   λ = 1 + κ v_x² where the car has
 downforce (its own κ, of `Vehicle`), else 1,
 α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
-dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
+dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (l_f F_f - l_r F_r)/I_z.
 Shown: r + b_r,  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²,  and  v_y + o  where that is
 measured: ä [m/s²] is what the body rolls by, driven by the same forces, x_s and y_s where the
 accelerometer sits. A bank is in the equation of v_y and not in a_y: an accelerometer feels what
@@ -30,7 +30,7 @@ from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY
 
 MOVING = 8  # entries of z before those that are learnt
-SENSORS = ("bias", "roll", "steering", "gyro", "inertia", "v_y_bias")  # the last of these
+SENSORS = ("bias", "roll", "steering", "gyro", "v_y_bias")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 
@@ -49,42 +49,61 @@ class Unknowns(NamedTuple):
     roll: Any
     steering: Any
     gyro: Any
-    inertia: Any
     v_y_bias: Any
 
 
 def size(n: int) -> int:
     """Return how many entries z has for n units."""
-    return MOVING + 2 * n + 8
+    return MOVING + 2 * n + 2 + len(SENSORS)
 
 
-def places(n: int) -> dict[str, int]:
-    """Return where in z each learnt number stands, by name; of W and compliance the first.
+class Learnt(NamedTuple):
+    """What is learnt of z beside what moves, in this order: steps along directions.
 
-    Parameters
-    ----------
-    n : number of units.
+    tires : along both directions of each curve, that of its stiffness and that of its grip, one
+        factor of both compliances, and the zero of the steering; else along that of the grip alone.
+    v_y : bias of a sensor of v_y, too.
     """
-    rest = MOVING + 2 * n
-    names = ("compliance", "compliance_rear", *SENSORS)
-    return {"W": MOVING, "W_rear": MOVING + n} | {name: rest + i for i, name in enumerate(names)}
+
+    tires: bool
+    v_y: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all of it."""
+        return (
+            *("grip_f", "grip_r"),
+            *(("stiffness_f", "stiffness_r", "compliance", "steering") if self.tires else ()),
+            *("bias", "roll", "gyro"),
+            *(("v_y_bias",) if self.v_y else ()),
+        )
+
+    def into(self, n: int, curves: Any, compliance: Any) -> Any:
+        """Return what a step of what moves and of each of these moves of z, sparse.
+
+        Parameters
+        ----------
+        n : number of units.
+        curves : change of the weights by one of ln grip and of ln stiffness, (4, n): front and rear
+            of the first, then of the second.
+        compliance : of both axles that one of its factor adds, (2,).
+        """
+        E = ca.SX(size(n), MOVING + len(self.names))
+        E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
+        rest = MOVING + 2 * n
+        for column, name in enumerate(self.names, start=MOVING):
+            if name in CURVES:
+                axle = CURVES.index(name) % 2
+                first = MOVING + axle * n
+                E[first : first + n, column] = curves[CURVES.index(name), :].T
+            elif name == "compliance":
+                E[rest : rest + 2, column] = compliance
+            else:
+                E[rest + 2 + SENSORS.index(name), column] = 1
+        return E
 
 
-def of_axles(n: int) -> tuple[list[int], list[int]]:
-    """Return where among what is learnt the numbers of each axle's model stand, front and rear.
-
-    Weights and compliance, then the zero of the steering in front and the bias of v_y at the rear.
-
-    Parameters
-    ----------
-    n : number of units.
-    """
-    at = {name: place - MOVING for name, place in places(n).items()}
-    front, rear = (list(range(at[W], at[W] + n)) for W in ("W", "W_rear"))
-    return (
-        [*front, at["compliance"], at["steering"]],
-        [*rear, at["compliance_rear"], at["v_y_bias"]],
-    )
+CURVES = ("grip_f", "grip_r", "stiffness_f", "stiffness_r")
 
 
 def unknowns(z: Any, n: int) -> Unknowns:
@@ -109,8 +128,7 @@ def unknowns(z: Any, n: int) -> Unknowns:
         roll=z[k + 3],
         steering=z[k + 4],
         gyro=z[k + 5],
-        inertia=z[k + 6],
-        v_y_bias=z[k + 7],
+        v_y_bias=z[k + 6],
     )
 
 
@@ -136,7 +154,7 @@ class Laws(NamedTuple):
     """What the motion obeys beside the car: decay of e over a step [-], stiffness and damping of
     the bank [1/s²], [1/s]; stiffness and damping of the roll [1/s²], [1/s]; share of its rate that
     moves the contact patches, over the stiffness [s²]; place of the accelerometer before and left
-    of the center of gravity [m].
+    of the center of gravity [m]; by how much a_y is late [s].
     """
 
     forgets: Any
@@ -147,6 +165,7 @@ class Laws(NamedTuple):
     sway: Any
     ahead: Any
     aside: Any
+    late: Any
 
 
 class Way:
@@ -288,7 +307,7 @@ def predicted(
     cos_delta = cosine(now.delta)
     slope = way.held(at.slope)
     force = way.by((at.force + slope * (slip - z.slip) / 2) * cos_delta + z.error)
-    arm, turn = car.arm, turning(car) * (1 + z.inertia)
+    arm, turn = car.arm, turning(car)
     push = GRAVITY * car.share
     pull = way.held(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))  # force per change of v_y
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
@@ -346,5 +365,5 @@ def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) 
     """
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
-    a_y += laws.ahead * (1 + z.inertia) * ca.dot(turning(car), force) - laws.aside * z.r**2
+    a_y += laws.ahead * ca.dot(turning(car), force) - laws.aside * z.r**2
     return Shown(z.r + z.gyro, a_y, force)

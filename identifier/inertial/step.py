@@ -2,11 +2,12 @@
 
 An extended Kalman filter of everything at once: what moves and what is learnt, whose errors are
 correlated, so that v_y is corrected by what the curves are found to be and the other way round.
+Its covariance is that of what moves and of steps along the directions of `motion.Learnt`.
 Carried: motion (8,), W (2, n), own (2,) the compliances, sensors (5,) and UD the factors of the
-covariance of what is learnt, motion_UD those of what moves, in the order of
-`identifier.inertial.motion`; gate as of the axle
-identifier; body (2,), heard (10,), running (2,), excitation (2, 9).
-Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
+covariance of what is learnt, motion_UD those of what moves; gate as of the axle identifier; body
+(2,), heard (10,), running (2,), excitation (2, 9).
+Sampled: x = [v_y, r], of which v_y is read where it is asked for; u, v_x, a_y, NaN where there is
+none.
 """
 
 from functools import partial
@@ -22,9 +23,11 @@ from identifier.axle.learning import BoundNumbers, bounded
 from identifier.inertial.beliefs import TrustNumbers
 from identifier.inertial.gaussian import as_factor, measured, propagated
 from identifier.inertial.motion import (
+    CURVES,
     MOVING,
     SENSORS,
     Laws,
+    Learnt,
     Load,
     Predicted,
     Sample,
@@ -33,7 +36,6 @@ from identifier.inertial.motion import (
     curve_by,
     predicted,
     shown,
-    size,
     slip_angle,
     static_load,
     turning,
@@ -44,8 +46,7 @@ from models.vehicle import GRAVITY, load_ratio
 
 OVER = ("x", "u", "v_x", "a_y")
 LEARNT = ("W", "own", "sensors")
-KEPT = ("UD", "motion_UD", "gate", "body", "heard", "heard_v_y", "running", "excitation")
-CARRY = ("motion", *LEARNT, *KEPT)
+KEPT = ("UD", "motion_UD", "gate", "body", "heard", "running", "excitation")
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
 LEFT, FIRST_CHANGE = 7, 8  # of what is carried of a measured v_y: innovation that waits, changes
@@ -74,15 +75,15 @@ PORTS = (
     Port("own", "m per load", "compliance, front and rear", learnt=True),
     Port(
         "sensors",
-        "g; rad per g; rad; rad/s; -; m/s",
-        "bias of a_y, roll of the body, zero of the steering, bias of r, excess of 1/I_z, bias of "
-        "a measured v_y",
+        "g; rad per g; rad; rad/s; m/s",
+        "bias of a_y, roll of the body, zero of the steering, bias of r, bias of a measured v_y",
         learnt=True,
     ),
     Port(
         "UD",
-        "of W, own, sensors",
-        "covariance U D U' of W, own and sensors: D, and U above it, by rows",
+        "-; -; -; g; rad per g; rad/s; m/s",
+        "covariance U D U' of ln grip and ln stiffness of both curves, a factor of both "
+        "compliances and sensors, where they are learnt: D, and U above it, by rows",
         learnt=True,
         rule=FACTORS,
     ),
@@ -122,9 +123,19 @@ PORTS = (
 )
 
 
+def carry_of(delay: int | None) -> tuple[str, ...]:
+    """Return the names of what a step carries.
+
+    Parameters
+    ----------
+    delay : of a measured v_y, as `build_step` takes it.
+    """
+    return ("motion", *LEARNT, *KEPT, *(() if delay is None else ("heard_v_y",)))
+
+
 class LearntLimits(NamedTuple):
-    """Of compliance [m], bias [g], roll [rad per g], steering [rad], gyro [rad/s], inertia [-] and
-    bias of v_y [m/s].
+    """Of compliance [m], bias [g], roll [rad per g], steering [rad], gyro [rad/s] and bias of v_y
+    [m/s].
     """
 
     compliance: Any
@@ -132,7 +143,6 @@ class LearntLimits(NamedTuple):
     roll: Any
     steering: Any
     gyro: Any
-    inertia: Any
     v_y_bias: Any
 
 
@@ -191,17 +201,21 @@ class Change(NamedTuple):
     gradient: Any
 
 
-def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = False) -> ca.Function:
+def build_step(
+    steps: tuple[int, ...], delay: int | None, *, tires: bool = True, pressed: bool = False
+) -> ca.Function:
     """Return the step; every number stays an input of it.
 
     Parameters
     ----------
     steps : doublings between the units.
     delay : samples by which a measured v_y is late; None does not look at it.
+    tires : whether it learns all of the tires, as of `motion.Learnt`.
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
-    q = size(n)
+    learnt = Learnt(tires, delay is not None)
+    q = MOVING + len(learnt.names)
     ports: dict[str, Any] = {
         "motion": ca.SX.sym("motion", MOVING),
         "W": ca.SX.sym("W", 2, n),
@@ -211,7 +225,9 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
         "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
     }
     ports["gate"], last = named_port(GateState, "gate")
-    sizes = {"body": 2, "heard": 10, "heard_v_y": heard_size(delay), "running": 2}
+    sizes = {"body": 2, "heard": 10, "running": 2}
+    if delay is not None:
+        sizes["heard_v_y"] = heard_size(delay)
     ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
@@ -226,6 +242,10 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
     ports["bounds"], bounds = named_port(BoundNumbers, "bounds")
     ports["rising"] = ca.SX.sym("rising", n)
     ports["metric"] = ca.SX.sym("metric", 2, len(triangle(n)))
+    ports["curves"] = ca.SX.sym("curves", len(CURVES), n)
+    ports["compliance"] = ca.SX.sym("compliance", 2)
+    ports["doubt"] = ca.SX.sym("doubt", 2)
+    into = learnt.into(n, ports["curves"], ports["compliance"])
     load: Load = static_load
     if pressed:
         ports["downforce"] = ca.SX.sym("downforce", 2)
@@ -252,36 +272,45 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
         steps,
         load,
     )
-    known = factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q)
-    if delay is None:  # nothing depends on the bias of a sensor that is not looked at
-        known.U.update({(i, q - 1): ca.SX(0) for i in range(q - 1)})
+    factors = factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q)
     way, moving = ahead.by_way
-    F = way.gradient(z, moving)
+    by_z = way.gradient(z, moving)
+    F = ca.horzcat(by_z[:, : z.numel()] @ into, by_z[:, z.numel() :])
     for i in (-MOVING - 4, -MOVING - 3, *range(2 - MOVING, 0)):  # v_y and r on the way, the others
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
-    factors = propagated(known, F, _process_noise(trust, ahead))
+    factors = propagated(factors, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    lateral, heard_v_y = None, ca.vertsplit(ports["heard_v_y"])
+    lateral, heard_v_y = None, []
     if delay is not None:
         difference = ahead.moving[0] - z[0]
-        change = Change(difference, ca.jacobian(difference, z))
+        change = Change(difference, ca.jacobian(difference, z) @ into)
         lateral, heard_v_y = _lateral(
             ports, (trust, possible), delay, ahead_z, gated, goes_on, change
         )
         factors = _unsure_of_v_y(factors, trust, ca.logic_and(goes_on, _is_good(gated)))
     noise = _noise(ports, trust, gated, goes_on, ca.SX(0) if lateral is None else lateral.counts)
-    corrected, factors, heard = _corrected(
-        (car, laws, trust), ahead, ahead_z, factors, (noise, lateral), now, scales, steps, load
+    step, factors, heard = _corrected(
+        (car, laws, trust),
+        ahead,
+        ahead_z,
+        into,
+        factors,
+        (noise, lateral),
+        now,
+        scales,
+        steps,
+        load,
     )
     if lateral is not None:
-        left = lateral.innovation - ca.dot(lateral.h.T, ca.vertcat(*corrected) - ahead_z)
+        left = lateral.innovation - ca.dot(lateral.h.T, step)
         heard_v_y.insert(LEFT, ca.if_else(lateral.counts, 0, left))
+    corrected = ca.vertsplit(ahead_z + into @ step)
     missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
     fast = ports["running"][1]
     fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
-    factors = _loosened(factors, corrected, alarm * trust.inflation, n)
-    corrected = _bounded(ports, corrected, bounds, limits, n)
+    factors = _loosened(factors, learnt, alarm * trust.inflation)
+    corrected = _bounded(ports, corrected, bounds, limits, learnt)
 
     sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
     begun, unsure = _afresh(ports, trust, car, gated, now, load)
@@ -300,6 +329,8 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
     curves = curve(told.slip, told.W, scales, steps).under(load(now.v_x))
     force = curves.force * cosine(now.delta) + told.error
     variance = larger(entry(factors, 0, 0), 0)
+    doubt = ports["doubt"][0] + ports["doubt"][1] * ca.fabs(curves.force[1])
+    variance = variance + (now.v_x * doubt / curves.carcass_slope[1]) ** 2
     size_of_slip = larger(ca.fabs(told.slip), ca.fabs(ahead.alpha))
     next_state = {
         "motion": ca.vertcat(*kept[:MOVING]),
@@ -311,7 +342,7 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
         "gate": gated.state,
         "body": tilt,
         "heard": heard,
-        "heard_v_y": ca.vertcat(*heard_v_y),
+        **({} if delay is None else {"heard_v_y": ca.vertcat(*heard_v_y)}),
         "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
         "excitation": excited(
             ports["excitation"],
@@ -321,18 +352,20 @@ def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = Fal
             learns=ca.logic_and(goes_on, gated.learns) * ca.SX.ones(2),
         ),
     }
+    name = ["inertial_step", *map(str, steps), *["held"] * (not tires), *["pressed"] * pressed]
+    carry = carry_of(delay)
     return ca.Function(
-        "_".join(["inertial_step", *map(str, steps), *["pressed"] * pressed]),
+        "_".join(name),
         list(ports.values()),
         [
-            *(ca.densify(next_state[name]) for name in CARRY),
+            *(ca.densify(next_state[name]) for name in carry),
             ca.if_else(gated.on, force * car.load, 0),
             ca.if_else(gated.on, told.v_y, 0),
             ca.sqrt(variance),
             ca.logic_and(runs, variance < trust.observable * now.v_x**2),
         ],
         list(ports),
-        [*(f"{name}_next" for name in CARRY), *OUTPUTS],
+        [*(f"{name}_next" for name in carry), *OUTPUTS],
         {"cse": True},
     )
 
@@ -390,14 +423,15 @@ def _corrected(
     told: tuple[Car, Laws, TrustNumbers],
     ahead: Predicted,
     z: Any,
+    into: Any,
     factors: Factors,
     heard: tuple[Noise, Reading | None],
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
     load: Load,
-) -> tuple[list[Any], Factors, Any]:
-    """Return z and its factors after v_y, r or a_y, and what is carried of the last two.
+) -> tuple[Any, Factors, Any]:
+    """Return by how much v_y, r or a_y corrects, the factors, and what is carried of the last two.
 
     Innovations of what waits are kept: its turn comes at a next sample, where its number may be a
     new one, or none.
@@ -412,8 +446,9 @@ def _corrected(
     y = ca.vertcat(expected.r, expected.a_y)
     numbers = way.valued([y, ca.jacobian(y, symbol), ca.dot(turning(car), at.force)])
     y, H, turn = ca.substitute(numbers, [symbol, tilt], [z, ahead.tilt])
+    H = H @ into
     late = (turn, GRAVITY * ca.dot(car.share, ahead.force_rate))
-    before = ca.vertsplit(z)
+    y[1] -= laws.late * late[1]
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
     nu = [
@@ -422,8 +457,7 @@ def _corrected(
     ]
     R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
     read = noise.reading(H, nu, R, lateral)
-    kept, factors = measured(
-        before,
+    step, factors = measured(
         factors,
         read.h,
         innovation=read.innovation,
@@ -431,17 +465,17 @@ def _corrected(
         clip=trust.clip,
         counts=read.counts,
     )
-    moved = ca.vertcat(*kept) - z
+    moved = ca.vertcat(*step)
     left = [
         ca.if_else(turn, 0, one - ca.dot(H[i, :].T, moved))
         for i, (turn, one) in enumerate(zip(noise.turns, nu, strict=True))
     ]
-    return kept, factors, ca.vertcat(noise.heard, *left)
+    return moved, factors, ca.vertcat(noise.heard, *left)
 
 
-def heard_size(delay: int | None) -> int:
+def heard_size(delay: int) -> int:
     """Return how many numbers are carried of a measured v_y."""
-    return FIRST_CHANGE + max((delay or 0) - 1, 0)
+    return FIRST_CHANGE + max(delay - 1, 0)
 
 
 def _is_good(gated: Gate) -> Any:
@@ -478,7 +512,7 @@ def _lateral(
     known = smaller(count + 2, 1 / trust.noise_gain)
     shows = smaller((innovation - newest) ** 2 / 2, MOST_NOISE * old + LEAST)
     variance = ca.if_else(fresh, old + (shows - old) / known, old)
-    h = -late * change.gradient if late else ca.SX(1, z.numel())
+    h = -late * change.gradient if late else ca.SX(1, change.gradient.numel())
     h[0] += 1
     h[-1] += 1
     R = (trust.v_y_error + variance) * share + (trust.lateness * change.v_y / ports["dt"]) ** 2
@@ -503,11 +537,11 @@ def _unsure_of_v_y(factors: Factors, trust: TrustNumbers, learns: Any) -> Factor
     return Factors(U, [*D[:-1], unsure])
 
 
-def _loosened(factors: Factors, z: list[Any], amount: Any, n: int) -> Factors:
-    """Return the factors where the road may be another one: each weight may change by its share."""
+def _loosened(factors: Factors, learnt: Learnt, amount: Any) -> Factors:
+    """Return the factors where the road may be another one: the grip of both curves may change."""
     U, D = factors
-    of_curves = range(MOVING, MOVING + 2 * n)
-    return Factors(U, [d + amount * z[i] ** 2 if i in of_curves else d for i, d in enumerate(D)])
+    grip = [MOVING + learnt.names.index(name) for name in ("grip_f", "grip_r")]
+    return Factors(U, [d + amount if i in grip else d for i, d in enumerate(D)])
 
 
 def _bounded(
@@ -515,20 +549,22 @@ def _bounded(
     z: list[Any],
     bounds: BoundNumbers,
     limits: LearntLimits,
-    n: int,
+    learnt: Learnt,
 ) -> list[Any]:
     """Return z with what is learnt within its bounds."""
-    kept = list(z)
+    kept, n = list(z), ports["W"].shape[1]
     slope = ca.vertsplit(ports["rising"])
     for axle, first in enumerate((MOVING, MOVING + n)):
         P = dict(zip(triangle(n), ca.horzsplit(ports["metric"][axle, :]), strict=True))
         theta = [*z[first : first + n], 0, 0, 0]
         kept[first : first + n] = bounded(bounds, theta, P, offset=0, slope=slope)[:n]
     at = MOVING + 2 * n
-    for i in (at, at + 1):
-        kept[i] = within(z[i], 0, limits.compliance)
+    if learnt.tires:
+        for i in (at, at + 1):
+            kept[i] = within(z[i], 0, limits.compliance)
     for i, (name, most) in enumerate(zip(SENSORS, limits[1:], strict=True), start=at + 2):
-        kept[i] = within(z[i], 0 if name == "roll" else -most, most)
+        if name in learnt.names:
+            kept[i] = within(z[i], 0 if name == "roll" else -most, most)
     return kept
 
 
