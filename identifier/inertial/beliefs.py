@@ -113,8 +113,8 @@ class Trust:
     error: float = 0.01
     relative_error: float = 0.08
     correlation_time: float = 0.06
-    bank: float = 0.04
-    bank_time: float = 3.0
+    bank: float = 0.05
+    bank_time: float = 20.0
     jerk: float = 0.03
     r_error: float = 0.009
     a_y_error: float = 0.2
@@ -157,8 +157,7 @@ class Trust:
             relative_error=self.relative_error,
             renewed=1.0 - kept**2,
             bank=self.bank**2,
-            bank_rate=(self.bank / self.bank_time) ** 2,
-            bank_walk=4.0 * self.bank**2 * dt / self.bank_time**3,
+            bank_walk=2.0 * self.bank**2 * dt / self.bank_time,
             r_walk=(self.jerk / froude_time**1.5) ** 2 * dt,
             r_error=(self.r_error / scale) ** 2,
             a_y_error=self.a_y_error**2,
@@ -181,8 +180,8 @@ class Trust:
 
 
 class TrustNumbers(NamedTuple):
-    """Variances of v_y, r, bank and its rate at a start; what curves miss and what it gains in a
-    step; variances that bank rate and r gain in one; of r and a_y beside their noise; gain of the
+    """Variances of v_y, r and bank at a start; what curves miss and what it gains in a
+    step; variances that bank and r gain in one; of r and a_y beside their noise; gain of the
     noise; lateness; clip; 1/alarm and its gain; what an alarm adds; surge; variance of side slip
     that is observed; variance of a measured v_y beside its noise, largest of its bias and
     what that gains in a step; variances of the noise of r, a_y and v_y at first.
@@ -194,7 +193,6 @@ class TrustNumbers(NamedTuple):
     relative_error: Any
     renewed: Any
     bank: Any
-    bank_rate: Any
     bank_walk: Any
     r_walk: Any
     r_error: Any

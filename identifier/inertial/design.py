@@ -23,7 +23,7 @@ from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import CURVES, MOVING, SENSORS, Laws, Learnt
+from identifier.inertial.motion import CURVES, MOVING, Along, SENSORS, Laws, Learnt
 from identifier.inertial.step import (
     OUTPUTS,
     OVER,
@@ -93,6 +93,7 @@ class InertialIdentifier(Method):
     held: bool = False
     doubt: tuple[float, float] = (0.0, 0.0)
     a_y_late: float = 0.0
+    along: tuple[float, ...] = (0.0,) * len(Along._fields)
     reads_v_y: bool = False
     v_y_delay: float = 0.0
     ladder: tuple[float, ...] = LADDER
@@ -154,6 +155,15 @@ class InertialIdentifier(Method):
             roll_frequency=sway.sway.frequency * vehicle.froude_time,
             doubt=(float(model.error_floor[1]), float(model.error_share[1])),
             a_y_late=model.a_y_late,
+            along=Along(
+                load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,
+                load_r=model["load_transfer"] * vehicle.wheelbase / vehicle.l_f,
+                brake_f=model["braking_f"],
+                brake_r=model["braking_r"],
+                drive_f=model["driving_f"],
+                drive_r=model["driving_r"],
+                drag=vehicle.drag,
+            ),
         )
 
     @property
@@ -222,7 +232,7 @@ class InertialIdentifier(Method):
         """
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
-        P = prior_P = self._prior_covariance(vehicle)
+        P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
         sensors = np.zeros(len(SENSORS))
         sensors[SENSORS.index("roll")] = self.beliefs.roll
@@ -260,7 +270,7 @@ class InertialIdentifier(Method):
                 "heard": np.concatenate(
                     [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
-                "running": np.zeros(2),
+                "running": np.zeros(3),
                 "excitation": excitation,
                 **heard_v_y,
             },
@@ -274,11 +284,11 @@ class InertialIdentifier(Method):
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": np.array(self._limits()),
                 "bounds": np.array(self.bounds.of_ladder(self.ladder, RISING_UNTIL)),
-                "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 "rising": rising_shares(self.ladder, RISING_UNTIL),
                 "curves": curves,
                 "compliance": compliance,
                 "doubt": np.array(self.doubt),
+                **({"along": np.array(self.along)} if self.held else {}),
                 **downforce_numbers(vehicle),
             },
             ends_run=self.plausibility.rest(self.dt),
@@ -292,12 +302,10 @@ class InertialIdentifier(Method):
 
     def _laws(self, vehicle: Vehicle) -> Laws:
         omega = self._sway(vehicle).frequency
-        time = self.trust.bank_time
         ahead, aside = self.sensor_position
         return Laws(
             forgets=math.exp(-self.dt / self.trust.correlation_time),
-            bank_stiffness=time**-2,
-            bank_damping=2.0 / time,
+            bank=math.exp(-self.dt / self.trust.bank_time),
             roll_stiffness=omega**2,
             roll_damping=2.0 * self.roll_damping * omega,
             sway=self.prior.sway_share * omega**-2,
@@ -346,7 +354,9 @@ class InertialIdentifier(Method):
         n, names = len(self.ladder), self._learnt.names
         E = np.zeros((2, n + 3, len(names)))
         for k, name in enumerate(names):
-            if name in CURVES:
+            if name == "grip":
+                E[:, :n, k] = curves[:2]
+            elif name in CURVES:
                 i = CURVES.index(name)
                 E[i % 2, :n, k] = curves[i]
             elif name == "compliance":
@@ -369,7 +379,7 @@ class InertialIdentifier(Method):
         }
         known = np.diag([sensors.get(name, 0.0) ** 2 for name in names])
         if self.held:
-            known[:2, :2] = self.beliefs.grip**2 * np.eye(2)
+            known[0, 0] = self.beliefs.grip**2
             return known
         for E, one in zip(self._into(curves, compliance), P, strict=True):
             back = np.linalg.pinv(E)

@@ -1,6 +1,6 @@
 """The car between two samples, and what its sensors should show: all that the filter predicts.
 
-z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, o]: what moves, then
+z = [v_y, r, x_f, x_r, e_f, e_r, p; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, o]: what moves, then
 the tires and the sensors. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a
 force [static axle loads]; p sine of the bank, positive where it falls to the left, p' its rate
 [1/s]; w weights of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of
@@ -27,9 +27,10 @@ import casadi as ca
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve, hidden_units, of_units
 from identifier.axle.slip import SHORTEST
-from models.vehicle import GRAVITY
+from identifier.motion.model import LEAST_GRIP
+from models.vehicle import GRAVITY, LIGHTEST
 
-MOVING = 8  # entries of z before those that are learnt
+MOVING = 7  # entries of z before those that are learnt
 SENSORS = ("bias", "roll", "steering", "gyro", "v_y_bias")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
@@ -42,7 +43,6 @@ class Unknowns(NamedTuple):
     slip: Any
     error: Any
     bank: Any
-    bank_rate: Any
     W: Any
     compliance: Any
     bias: Any
@@ -72,8 +72,7 @@ class Learnt(NamedTuple):
     def names(self) -> tuple[str, ...]:
         """Names of all of it."""
         return (
-            *("grip_f", "grip_r"),
-            *(("stiffness_f", "stiffness_r", "compliance", "steering") if self.tires else ()),
+            *((*CURVES, "compliance", "steering") if self.tires else ("grip",)),
             *("bias", "roll", "gyro"),
             *(("v_y_bias",) if self.v_y else ()),
         )
@@ -92,7 +91,11 @@ class Learnt(NamedTuple):
         E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
         rest = MOVING + 2 * n
         for column, name in enumerate(self.names, start=MOVING):
-            if name in CURVES:
+            if name == "grip":
+                for axle in range(2):
+                    first = MOVING + axle * n
+                    E[first : first + n, column] = curves[axle, :].T
+            elif name in CURVES:
                 axle = CURVES.index(name) % 2
                 first = MOVING + axle * n
                 E[first : first + n, column] = curves[CURVES.index(name), :].T
@@ -121,7 +124,6 @@ def unknowns(z: Any, n: int) -> Unknowns:
         slip=z[2:4],
         error=z[4:6],
         bank=z[6],
-        bank_rate=z[7],
         W=ca.vertcat(z[m : m + n].T, z[m + n : k].T),
         compliance=z[k : k + 2],
         bias=z[k + 2],
@@ -143,6 +145,35 @@ def static_load(v_x: Any) -> Any:
     return ca.SX.ones(2)
 
 
+class Along(NamedTuple):
+    """How a_x changes lateral forces: load that g moves to each axle [-]; what braking and power
+    take of the friction circle [1/g], each of both axles; drag over the mass [1/m].
+    """
+
+    load_f: Any
+    load_r: Any
+    brake_f: Any
+    brake_r: Any
+    drive_f: Any
+    drive_r: Any
+    drag: Any
+
+    def moved(self, load: Load, a_x: Any, v_x: Any) -> Any:
+        """Return what forces are multiplied with (2,) [-].
+
+        Parameters
+        ----------
+        load : without a_x.
+        a_x : [m/s²].
+        """
+        f = (a_x + self.drag * v_x**2) * (1 / GRAVITY)
+        drives = f > 0
+        pairs = ((self.brake_f, self.drive_f), (self.brake_r, self.drive_r))
+        use = ca.vertcat(*(f * ca.if_else(drives, drive, brake) for brake, drive in pairs))
+        left = ca.sqrt(ca.fmax(1 - use * use, LEAST_GRIP))
+        return ca.fmax(load(v_x) + f * ca.vertcat(self.load_f, self.load_r), LIGHTEST) * left
+
+
 class Sample(NamedTuple):
     """v_x [m/s] and δ (2,) [rad] at a sample."""
 
@@ -158,8 +189,7 @@ class Laws(NamedTuple):
     """
 
     forgets: Any
-    bank_stiffness: Any
-    bank_damping: Any
+    bank: Any
     roll_stiffness: Any
     roll_damping: Any
     sway: Any
@@ -319,12 +349,11 @@ def predicted(
     r = way.by(z.r + (m11 * b - m21 * a) * per)
     alpha = slip_angle(now, way.by(v_y + car.arm * r), z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
-    bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
     rolling, rate = tilt
     rate = (rate + dt * laws.roll_stiffness * (ca.dot(push, force) - rolling)) / (
         1 + dt * laws.roll_damping + dt**2 * laws.roll_stiffness
     )
-    moving = ca.vertcat(v_y, r, slip, laws.forgets * z.error, z.bank + dt * z.bank_rate, bank_rate)
+    moving = ca.vertcat(v_y, r, slip, laws.forgets * z.error, laws.bank * z.bank)
     force_rate = at.slope * (slip - z.slip) / dt
     numbers = [moving, alpha, rolling + dt * rate, rate, force_rate]
     moved, alpha, tilting, rate, force_rate = way.valued(numbers)

@@ -19,7 +19,7 @@ from identifier.axle.car import Car, axle_port, larger, named_port, smaller, wit
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
 from identifier.axle.curve import EDGES, curve, excited
 from identifier.axle.gate import Gate, GateNumbers, GateState, gate
-from identifier.axle.learning import BoundNumbers, bounded
+from identifier.axle.learning import BoundNumbers, towards_center
 from identifier.inertial.beliefs import TrustNumbers
 from identifier.inertial.gaussian import as_factor, measured, propagated
 from identifier.inertial.motion import (
@@ -27,6 +27,7 @@ from identifier.inertial.motion import (
     MOVING,
     SENSORS,
     Laws,
+    Along,
     Learnt,
     Load,
     Predicted,
@@ -59,6 +60,7 @@ MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
 MOST_MISSED = 25.0  # one outlier alone is no alarm
 STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
 DOUBTED = 0.7  # of the slip that a corner is begun with
+LAG_OF_A_X = 0.2  # s, of the washout that shows a_x
 LEAST = 1e-12  # variance that is divided by
 
 PORTS = (
@@ -68,8 +70,8 @@ PORTS = (
     Port("side_slip_observable", "-", "1 where side slip is known well enough now, else 0"),
     Port(
         "motion",
-        "m/s; rad/s; rad; static axle loads; -; 1/s",
-        "v_y, r, lagged slip and missed force front and rear, sine of the bank and its rate",
+        "m/s; rad/s; rad; static axle loads; -",
+        "v_y, r, lagged slip and missed force front and rear, sine of the bank",
     ),
     Port("W", LOAD, "weights of the units, rows front and rear", learnt=True),
     Port("own", "m per load", "compliance, front and rear", learnt=True),
@@ -225,7 +227,7 @@ def build_step(
         "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
     }
     ports["gate"], last = named_port(GateState, "gate")
-    sizes = {"body": 2, "heard": 10, "running": 2}
+    sizes = {"body": 2, "heard": 10, "running": 3}
     if delay is not None:
         sizes["heard_v_y"] = heard_size(delay)
     ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
@@ -241,7 +243,6 @@ def build_step(
     ports["limits"], limits = named_port(LearntLimits, "limits")
     ports["bounds"], bounds = named_port(BoundNumbers, "bounds")
     ports["rising"] = ca.SX.sym("rising", n)
-    ports["metric"] = ca.SX.sym("metric", 2, len(triangle(n)))
     ports["curves"] = ca.SX.sym("curves", len(CURVES), n)
     ports["compliance"] = ca.SX.sym("compliance", 2)
     ports["doubt"] = ca.SX.sym("doubt", 2)
@@ -250,11 +251,17 @@ def build_step(
     if pressed:
         ports["downforce"] = ca.SX.sym("downforce", 2)
         load = partial(load_ratio, ports["downforce"])
+    if not tires:
+        ports["along"], along = named_port(Along, "along")
 
     seen = ca.vertcat(0, ports["x"][1])  # a missing v_y speaks against no sample
     gated = gate(possible, dt, last, seen, ports["u"], ports["v_x"])
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
     goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
+    slow = ca.if_else(gated.first, gated.v_x, ports["running"][2])
+    a_x = (gated.v_x - slow) * (1 / LAG_OF_A_X) - ports["motion"][0] * gated.r
+    if not tires:
+        load = partial(along.moved, load, a_x)
     z = ca.vertcat(
         ports["motion"], ports["W"][0, :].T, ports["W"][1, :].T, ports["own"], ports["sensors"]
     )
@@ -314,6 +321,7 @@ def build_step(
 
     sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
     begun, unsure = _afresh(ports, trust, car, gated, now, load)
+    a_kept = smaller(dt * (1 / LAG_OF_A_X), 1)
     kept = [
         *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
         *corrected[MOVING:],  # which are not moved unless the filter goes on
@@ -343,7 +351,11 @@ def build_step(
         "body": tilt,
         "heard": heard,
         **({} if delay is None else {"heard_v_y": ca.vertcat(*heard_v_y)}),
-        "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
+        "running": ca.vertcat(
+            ca.logic_and(runs, sane),
+            ca.if_else(goes_on, fast, 0),
+            slow + a_kept * (gated.v_x - slow),
+        ),
         "excitation": excited(
             ports["excitation"],
             size_of_slip,
@@ -416,7 +428,7 @@ def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
 def _process_noise(trust: TrustNumbers, ahead: Predicted) -> list[Any]:
     """Return what a step adds to the variances of what moves, None where nothing."""
     e_f, e_r = ca.vertsplit(_missed(trust, ahead) ** 2 * trust.renewed)
-    return [None, trust.r_walk, None, None, e_f, e_r, None, trust.bank_walk]
+    return [None, trust.r_walk, None, None, e_f, e_r, trust.bank_walk]
 
 
 def _corrected(
@@ -540,7 +552,7 @@ def _unsure_of_v_y(factors: Factors, trust: TrustNumbers, learns: Any) -> Factor
 def _loosened(factors: Factors, learnt: Learnt, amount: Any) -> Factors:
     """Return the factors where the road may be another one: the grip of both curves may change."""
     U, D = factors
-    grip = [MOVING + learnt.names.index(name) for name in ("grip_f", "grip_r")]
+    grip = [i for i, name in enumerate(learnt.names, start=MOVING) if name.startswith("grip")]
     return Factors(U, [d + amount if i in grip else d for i, d in enumerate(D)])
 
 
@@ -554,10 +566,8 @@ def _bounded(
     """Return z with what is learnt within its bounds."""
     kept, n = list(z), ports["W"].shape[1]
     slope = ca.vertsplit(ports["rising"])
-    for axle, first in enumerate((MOVING, MOVING + n)):
-        P = dict(zip(triangle(n), ca.horzsplit(ports["metric"][axle, :]), strict=True))
-        theta = [*z[first : first + n], 0, 0, 0]
-        kept[first : first + n] = bounded(bounds, theta, P, offset=0, slope=slope)[:n]
+    for first in (MOVING, MOVING + n):
+        kept[first : first + n] = towards_center(bounds, z[first : first + n], slope)
     at = MOVING + 2 * n
     if learnt.tires:
         for i in (at, at + 1):
@@ -588,5 +598,5 @@ def _afresh(
     unsure = trust.v_y + (DOUBTED * gated.v_x * lean) ** 2
     slip = unsure / now.v_x**2
     missed = trust.error**2
-    D = [unsure, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
-    return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 4], D
+    D = [unsure, trust.r, slip, slip, missed, missed, trust.bank]
+    return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 3], D
