@@ -70,7 +70,7 @@ METHODS: Mapping[str, Factory] = {
 }
 
 
-# By kind of model, the method that goes on learning from one.
+# By kind of model, the method that goes on from one.
 LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
     AxleModel.kind: lambda model, vehicle, dt: (
         InertialIdentifier if model.tells_v_y else AxleIdentifier
@@ -129,18 +129,26 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     return method
 
 
-def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
-    """Return the method that goes on learning from a model.
+def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: bool = True) -> Method:
+    """Return the method that goes on from a model: it learns, or holds a fit and estimates v_y.
 
     Parameters
     ----------
     dt : sampling interval [s].
+    v_y : whether there is a lateral velocity.
 
     Raises
     ------
     ValueError
         Where no method goes on from such a model.
     """
+    if not v_y:
+        fitted = isinstance(model, FittedModel)
+        return (
+            InertialIdentifier.holding(model, vehicle, dt=dt)
+            if fitted
+            else InertialIdentifier.for_vehicle(vehicle, dt=dt)
+        )
     if model.kind not in LEARNERS:
         raise ValueError(f"no method can go on learning from a {type(model).__name__}")
     return LEARNERS[model.kind](model, vehicle, dt)

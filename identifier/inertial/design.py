@@ -23,7 +23,7 @@ from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import CURVES, MOVING, Along, SENSORS, Laws, Learnt
+from identifier.inertial.motion import CURVES, MOVING, SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
     OUTPUTS,
     OVER,
@@ -69,6 +69,7 @@ class InertialIdentifier(Method):
     doubt : standard deviation of the rear force for longer than noise: always [static axle loads],
         and of the force [-].
     a_y_late : by which a_y is later than the yaw rate [s].
+    along : how a_x changes lateral forces of tires that are held, as of `motion.Along`.
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
     reads_v_y : whether a measured v_y is looked at, where there is one.
@@ -137,22 +138,22 @@ class InertialIdentifier(Method):
         )
 
     @classmethod
-    def holding(cls, model: FittedModel, *, dt: float = 0.01) -> "InertialIdentifier":
+    def holding(
+        cls, model: FittedModel, vehicle: Vehicle, *, dt: float = 0.01
+    ) -> "InertialIdentifier":
         """Return the design for a car whose tires are known: it begins with the model.
 
         Parameters
         ----------
-        model : of the car's own logs.
         dt : sampling interval [s].
         """
-        usual, vehicle = cls.for_vehicle(model.vehicle, dt=dt), model.vehicle
-        sway = model.in_units(usual.ladder)
-        share = max(float(sway.own[:, 1].mean()), LEAST_SHARE)
+        usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
+        share = max(float(tires.own[:, 1].mean()), LEAST_SHARE)
         return replace(
             usual,
             held=True,
             prior=replace(usual.prior, sway_share=share),
-            roll_frequency=sway.sway.frequency * vehicle.froude_time,
+            roll_frequency=tires.sway.frequency * vehicle.froude_time,
             doubt=(float(model.error_floor[1]), float(model.error_share[1])),
             a_y_late=model.a_y_late,
             along=Along(
@@ -230,7 +231,6 @@ class InertialIdentifier(Method):
         ValueError
             Where stored weights are those of another structure.
         """
-        n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
         P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
@@ -385,9 +385,7 @@ class InertialIdentifier(Method):
             back = np.linalg.pinv(E)
             known += back @ one @ back.T
         both = [k for k, name in enumerate(names) if name == "compliance"]
-        known[both] /= 2.0
-        known[:, both] /= 2.0
-        known[both, both] *= 2.0
+        known[both, both] /= 2.0
         return known
 
     def _prior_covariance(self, vehicle: Vehicle) -> Array:
@@ -486,8 +484,9 @@ class InertialIdentifier(Method):
         after = np.empty_like(prior)
         into = self._into(self._directions(state["W"]), own[:, 0])
         for one, E, before in zip(after, into, prior, strict=True):
-            beside = np.eye(len(E)) - E @ np.linalg.pinv(E)
-            one[:] = E @ P @ E.T + beside @ before @ beside.T
+            back = np.linalg.pinv(E)  # what weights tell of what is learnt
+            gain = before @ back.T @ np.linalg.pinv(back @ before @ back.T)
+            one[:] = before + gain @ (P - back @ before @ back.T) @ gain.T
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,

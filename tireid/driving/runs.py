@@ -8,7 +8,7 @@ import numpy as np
 
 from codegen import find_compiler
 from identifier.inertial import InertialIdentifier
-from identifier.method import CannotFreezeError
+from identifier.method import CannotFreezeError, Method
 from identifier.methods import continuing
 from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
@@ -91,8 +91,12 @@ def friction_now(friction: Friction, measured: Measured) -> float:
 
 
 def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
-    """Return what tells v_y where no sensor shows it, and learns the tires for it."""
-    method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
+    """Return what estimates v_y where no sensor shows it, on the tires of a fit or while it learns
+    them.
+    """
+    method: Method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
+    if learnt is not None:
+        method = continuing(learnt, vehicle, PERIOD, v_y=False)
     start = learnt if learnt is not None and method.resumes(learnt) else None
     return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
 

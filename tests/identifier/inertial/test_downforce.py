@@ -9,12 +9,12 @@ import pytest
 from identifier.export.compiled import CompiledPackage, samples_of
 from identifier.export.package import build_package, run_in_virtual_machine
 from identifier.inertial import InertialIdentifier
-from identifier.inertial.motion import Sample, places, predicted, static_load, unknowns
+from identifier.inertial.motion import Sample, predicted, static_load, unknowns
 from identifier.run import identify
 from models.recordings import Recording
 from models.vehicle import load_ratio
 from tests.identifier.axle.test_downforce import RACER, SLIPS, UNTOLD, missed, race, static
-from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, state
+from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, places, state
 
 METHOD = InertialIdentifier.for_vehicle(RACER)
 
@@ -56,7 +56,7 @@ def stepped(z, load):
 
 def test_at_one_speed_a_load_is_a_scale_of_the_weights():
     more = np.array([1.7, 0.6])
-    kappa, at, z = (more - 1.0) / V_X**2, places(N), state()
+    kappa, at, z = (more - 1.0) / V_X**2, places(), state()
     scaled = z.copy()
     scaled[at["W"] : at["W"] + N] *= more[0]
     scaled[at["W_rear"] : at["W_rear"] + N] *= more[1]

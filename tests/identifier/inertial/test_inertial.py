@@ -55,7 +55,7 @@ def history(banked):
 
 
 def errors(history, run):
-    runs = history.state["running"].reshape(-1, 2)[1:, 0] > 0.5
+    runs = history.state["running"].reshape(-1, 3)[1:, 0] > 0.5
     error = history.outputs["v_y"].ravel() - run.v_y
     return error[runs], history.outputs["v_y_sd"].ravel()[runs], runs
 
@@ -74,7 +74,7 @@ def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, ba
 
 def test_the_bank_of_the_road_and_the_roll_of_the_body_are_told_apart(history, banked):
     late = slice(1500, None)
-    bank = history.state["motion"].reshape(-1, 8)[1:, 6]
+    bank = history.state["motion"].reshape(-1, 7)[1:, 6]
     truth = np.radians(4.0) * np.sin(2 * np.pi * banked.t / 25.0)
     assert np.std((bank - truth)[late]) < 0.3 * np.std(truth[late])
     gradient = np.polyfit(banked.a_y, GRAVITY * banked.roll, 1)[0]
@@ -190,7 +190,7 @@ def test_a_number_that_settles_in_two_steps_counts_once(banked):
 
 
 def alarms(history):
-    fast = history.state["running"].reshape(-1, 2)[1:, 1]
+    fast = history.state["running"].reshape(-1, 3)[1:, 1]
     return fast > METHOD.trust.alarm
 
 
@@ -241,11 +241,10 @@ def test_numbers_at_their_bounds_are_told(history):
         ("roll_rad_per_g", 1, False),
         ("steering_offset_rad", 2, True),
         ("yaw_rate_offset_rad_s", 3, True),
-        ("inverse_yaw_inertia_over_told", 4, False),
-        ("v_y_offset_m_s", 5, False),
+        ("v_y_offset_m_s", 4, False),
     ):
         sensors = state["sensors"].ravel().copy()
-        sensors[most] = held[name][1] - (most == 4)
+        sensors[most] = held[name][1]
         (one,) = METHOD.reached(CAR, {**state, "sensors": sensors})
         assert one.refuses is refuses
         assert one.axle == ("front" if most == 2 else None)
@@ -284,15 +283,14 @@ def test_bounds_hold_whatever_is_measured(banked):
     assert grip.max() <= b.most_grip
     assert b.least_stiffness <= slope.min()
     assert slope.max() <= b.most_stiffness
-    held, sensors = METHOD.certify(CAR).held, state["sensors"].reshape(-1, 6).T
+    held, sensors = METHOD.certify(CAR).held, state["sensors"].reshape(-1, 5).T
     for name, values in (
         ("compliance_m", state["own"]),
         ("a_y_offset_g", sensors[0]),
         ("roll_rad_per_g", sensors[1]),
         ("steering_offset_rad", sensors[2]),
         ("yaw_rate_offset_rad_s", sensors[3]),
-        ("inverse_yaw_inertia_over_told", 1 + sensors[4]),
-        ("v_y_offset_m_s", sensors[5]),
+        ("v_y_offset_m_s", sensors[4]),
     ):
         assert held[name][0] <= values.min()
         assert values.max() <= held[name][1]

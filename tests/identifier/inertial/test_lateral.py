@@ -15,7 +15,7 @@ from models.vehicle import GRAVITY, sedan
 from tests.kept import Kept
 
 CAR = sedan()
-METHOD = InertialIdentifier.for_vehicle(CAR)
+METHOD = replace(InertialIdentifier.for_vehicle(CAR), reads_v_y=True)
 NOISE = Sensors(
     v_x=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4), v_y=Sensor(noise=0.0)
 )
