@@ -30,7 +30,6 @@ from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
-from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 
@@ -38,7 +37,6 @@ Factory = Callable[[Vehicle, int], Method]
 DEFAULT = "fit"  # on logs
 LIVE = "axle"  # the default in a car, sample by sample
 WITHOUT_V_Y = "inertial"  # the default in a car without a lateral velocity
-LONGEST_BLIND = 3600.0  # [s] of a log without v_y, beyond which the recursive default tells it
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
 
@@ -157,12 +155,6 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: boo
 def methods() -> tuple[str, ...]:
     """Return the names of all methods, the default first, those of other distributions last."""
     return (*METHODS, *_installed())
-
-
-def usual(recording: Recording) -> str:
-    """Return the name of the default method of a log."""
-    blind = recording.logged_v_y is None and recording.duration > LONGEST_BLIND
-    return WITHOUT_V_Y if blind else DEFAULT
 
 
 def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:

@@ -33,7 +33,7 @@ from identifier.inertial.step import (
     carry_of,
     heard_size,
 )
-from identifier.method import OTHER_STRUCTURE, CannotFreezeError, Method, Track, fits, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel
 from models.rules import require_within
@@ -460,21 +460,12 @@ class InertialIdentifier(Method):
         return beside
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
-        """Return the model with the carried weights.
+        """Return the model with the carried weights: where tires are held, as sure as typical ones.
 
         Parameters
         ----------
         state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
-
-        Raises
-        ------
-        CannotFreezeError
-            Where tires are held.
         """
-        if self.held:
-            raise CannotFreezeError(
-                "the tires are held: they are those of the model that it began with"
-            )
         prior = self._prior_covariance(vehicle)
         zeros = np.ravel(state["sensors"])[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]]
         own = np.zeros((2, 3))

@@ -4,7 +4,7 @@ import argparse
 from typing import Any
 
 from identifier.method import Method
-from identifier.methods import LIVE, continuing
+from identifier.methods import LIVE, WITHOUT_V_Y, continuing
 from identifier.tire_model import TireModel, load_model
 from models.rules import require_within
 from models.vehicle import Vehicle
@@ -92,6 +92,7 @@ def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
 
 def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     """Return the method that is asked for; else the one that goes on from the model."""
-    if start is None or shared.method_is_given(options):
+    v_y = options.method != WITHOUT_V_Y
+    if start is None or (v_y and shared.method_is_given(options)):
         return shared.chosen_method(options, vehicle, online=True).method
-    return continuing(start, vehicle)
+    return continuing(start, vehicle, v_y=v_y)

@@ -10,7 +10,6 @@ from codegen.escape import visible
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
-from identifier.methods import DEFAULT, usual
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -126,7 +125,6 @@ def run(options: argparse.Namespace) -> int:
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        beside = beside or usual(recording) != DEFAULT
         law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True, online=beside)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):

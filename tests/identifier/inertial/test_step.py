@@ -253,7 +253,10 @@ class ByHand:
         return self.z[0], np.sqrt(self.P[0, 0])
 
 
-@pytest.fixture(scope="module", params=[(None, True), (None, False), (0, False), (12, False)])
+SENSING = {"held": (None, True), "None": (None, False), "0": (0, False), "12": (12, False)}
+
+
+@pytest.fixture(scope="module", params=SENSING.values(), ids=SENSING)
 def runs(request):
     """Without v_y, tires held and learnt; with one in time, and one late that repeats numbers."""
     late, held = request.param
