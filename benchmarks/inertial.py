@@ -202,7 +202,7 @@ def side_slip(
     """
     design = history.design
     assert isinstance(design, InertialIdentifier)
-    runs = history.state["running"].reshape(-1, 2)[1:, 0] > 0.5
+    runs = history.state["running"].reshape(-1, 3)[1:, 0] > 0.5
     on = runs if where is None else runs & where
     v_x = np.maximum(exact.v_x, slowest)[on]
     error = (history.outputs["v_y"].ravel() - exact.needed("v_y"))[on]
@@ -233,7 +233,7 @@ def without_v_y(
     roll : whether the accelerometer rolls with the body; else a_y is in the plane of the road.
     """
     design = InertialIdentifier.for_vehicle(vehicle, dt=recording.dt)
-    design = replace(design, sensor_position=position, reads_v_y=False)
+    design = replace(design, sensor_position=position)
     if not roll:
         design = replace(design, beliefs=replace(design.beliefs, roll=1e-6, sd_roll=0.002))
     return identify(replace(recording, v_y=np.zeros(len(recording))), vehicle, design)
@@ -249,7 +249,7 @@ def with_v_y(drive: Drive, v_y: Array, delay: float) -> History:
     delay : by which it is late, as told [s].
     """
     design = InertialIdentifier.for_vehicle(drive.told, dt=drive.shown.dt)
-    design = replace(design, sensor_position=drive.position, v_y_delay=delay)
+    design = replace(design, sensor_position=drive.position, reads_v_y=True, v_y_delay=delay)
     return identify(replace(drive.shown, v_y=v_y), drive.told, design)
 
 
@@ -495,7 +495,7 @@ def handed_on(
     runs : what own sensors and Vicon show, by run.
     learnt : models by way of learning, `WAYS`, the first without v_y, and by run.
     """
-    design = replace(InertialIdentifier.for_vehicle(DART), reads_v_y=False)
+    design = InertialIdentifier.for_vehicle(DART)
     for name, (own, vicon) in runs.items():
         fast, rms = vicon.v_x > BRISK, {}
         for way, models in learnt.items():

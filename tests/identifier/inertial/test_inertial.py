@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
+from identifier.estimate.fit import fit
 from identifier.inertial import InertialIdentifier
-from identifier.methods import make_method
+from identifier.methods import continuing, make_method
 from identifier.run import OnlineIdentifier, identify, learn
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
@@ -54,6 +55,12 @@ def history(banked):
     return identify(as_shown(banked), CAR, METHOD)
 
 
+@pytest.fixture(scope="module")
+def estimate():
+    """What a flat drive of the car taught, with v_y."""
+    return fit([drive_of(seed=5, duration=30.0).recording()], CAR).model
+
+
 def errors(history, run):
     runs = history.state["running"].reshape(-1, 3)[1:, 0] > 0.5
     error = history.outputs["v_y"].ravel() - run.v_y
@@ -70,6 +77,42 @@ def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, ba
     assert degrees(error) < 0.2 * degrees(banked.v_y) + 0.05
     assert np.mean(np.abs(error) < 2 * sd) > 0.9
     assert degrees(sd) < 4 * degrees(error)  # and not honest by knowing nothing
+
+
+def test_on_tires_of_an_estimate_side_slip_is_known_better_and_they_stay(
+    estimate, history, banked
+):
+    method = continuing(estimate, CAR, v_y=False)
+    held = identify(as_shown(banked), CAR, method, start=estimate)
+    error, sd, _ = errors(held, banked)
+    assert degrees(error) < 0.85 * degrees(errors(history, banked)[0])
+    assert np.mean(np.abs(error) < 2 * sd) > 0.9
+    W, ladder = held.state["W"], np.array(method.ladder)
+    slope, level = (W / ladder).sum(axis=2), W.sum(axis=2)
+    assert np.abs(slope / slope[0] - 1.0).max() < 0.03
+    assert np.abs(level / level[0] - 1.0).max() < 0.15  # but for their grip
+    assert (held.state["own"] == held.state["own"][0]).all()
+
+
+def test_the_error_of_an_estimate_widens_what_is_known_of_side_slip(estimate, banked):
+    method, shown = continuing(estimate, CAR, v_y=False), as_shown(banked)
+    sure, unsure = (
+        identify(shown, CAR, replace(method, doubt=doubt), start=estimate)
+        for doubt in ((0.0, 0.0), (0.02, 0.1))
+    )
+    sds = [np.median(one.outputs["v_y_sd"]) for one in (sure, unsure)]
+    assert sds[1] > 1.2 * sds[0]
+    np.testing.assert_array_equal(sure.outputs["v_y"], unsure.outputs["v_y"])
+
+
+def test_an_accelerometer_that_is_late_by_what_is_said_is_read_in_time(estimate, banked):
+    method, shown = continuing(estimate, CAR, v_y=False), as_shown(banked)
+    late = replace(shown, a_y=np.roll(shown.a_y, 6))
+    found = [
+        degrees(errors(identify(late, CAR, one, start=estimate), banked)[0][100:])
+        for one in (method, replace(method, a_y_late=0.06))
+    ]
+    assert found[1] < 0.8 * found[0]
 
 
 def test_the_bank_of_the_road_and_the_roll_of_the_body_are_told_apart(history, banked):
@@ -194,10 +237,14 @@ def alarms(history):
     return fast > METHOD.trust.alarm
 
 
-def test_half_the_grip_is_noticed_within_half_a_second_of_sliding_and_learnt():
+@pytest.mark.parametrize("tires", ["typical", "held"])
+def test_half_the_grip_is_noticed_within_half_a_second_of_sliding_and_learnt(tires, estimate):
+    method, start = METHOD, None
+    if tires == "held":
+        method, start = continuing(estimate, CAR, v_y=False), estimate
     change = FrictionChange(scale=0.5, at_time=20.0)
     run = drive_of(friction=Friction(changes=(change,)), duration=45.0)
-    history = identify(as_shown(run), CAR, METHOD)
+    history = identify(as_shown(run), CAR, method, start=start)
     after = run.t > 20.0
     slides = run.t[after & (np.abs(run.a_y) > 0.95 * np.abs(run.a_y[after]).max())][0]
     assert run.t[alarms(history)][0] < slides + 0.5
