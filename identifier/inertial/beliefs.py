@@ -94,9 +94,6 @@ class Trust:
     r_error, a_y_error : what no noise explains of the yaw rate [rad/s] and of a_y [m/s²].
     a_y_share : of a_y, what no noise explains of it beside that [-].
     r_noise, a_y_noise : first guess of the noise [rad/s], [m/s²], which is learnt from the signals.
-    v_y_noise : first guess of the noise of a measured v_y, learnt likewise [sqrt(g L)].
-    v_y_error : what no noise explains of it beside its bias [sqrt(g L)].
-    v_y_time : in which that bias may change by its deviation before the first sample [s].
     noise_samples : over which noise is learnt [samples].
     lateness : by which the channels may differ in time [s].
     clip : standard deviations from which an innovation counts no more.
@@ -121,9 +118,6 @@ class Trust:
     a_y_share: float = 0.05
     r_noise: float = 0.03
     a_y_noise: float = 2.0
-    v_y_noise: float = 0.02
-    v_y_error: float = 0.01
-    v_y_time: float = 60.0
     noise_samples: float = 100.0
     lateness: float = 0.015
     clip: float = 4.0
@@ -137,7 +131,7 @@ class Trust:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def at(self, dt: float, wheelbase: float, froude_time: float, sd_v_y: float) -> "TrustNumbers":
+    def at(self, dt: float, wheelbase: float, froude_time: float) -> "TrustNumbers":
         """Return the numbers of a step.
 
         Parameters
@@ -145,7 +139,6 @@ class Trust:
         dt : sampling interval [s].
         wheelbase : L [m].
         froude_time : sqrt(L/g) [s].
-        sd_v_y : of the bias of a measured v_y before the first sample [m/s].
         """
         scale = math.sqrt(wheelbase / 2.7)
         speed = wheelbase / froude_time
@@ -170,12 +163,8 @@ class Trust:
             inflation=dt * self.step**2 / self.step_time,
             surge=self.surge,
             observable=self.observable**2,
-            v_y_error=(self.v_y_error * speed) ** 2,
-            v_y_bias=sd_v_y**2,
-            v_y_walk=sd_v_y**2 * dt / self.v_y_time,
             r_noise=(self.r_noise / scale) ** 2,
             a_y_noise=self.a_y_noise**2,
-            v_y_noise=(self.v_y_noise * speed) ** 2,
         )
 
 
@@ -183,8 +172,7 @@ class TrustNumbers(NamedTuple):
     """Variances of v_y, r and bank at a start; what curves miss and what it gains in a
     step; variances that bank and r gain in one; of r and a_y beside their noise; gain of the
     noise; lateness; clip; 1/alarm and its gain; what an alarm adds; surge; variance of side slip
-    that is observed; variance of a measured v_y beside its noise, largest of its bias and
-    what that gains in a step; variances of the noise of r, a_y and v_y at first.
+    that is observed; variances of the noise of r and a_y at first.
     """
 
     v_y: Any
@@ -206,9 +194,5 @@ class TrustNumbers(NamedTuple):
     inflation: Any
     surge: Any
     observable: Any
-    v_y_error: Any
-    v_y_bias: Any
-    v_y_walk: Any
     r_noise: Any
     a_y_noise: Any
-    v_y_noise: Any

@@ -25,42 +25,29 @@ from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
 from identifier.inertial.motion import CURVES, MOVING, SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
-    OUTPUTS,
+    CARRY,
     OVER,
     PORTS,
     LearntLimits,
     build_step,
-    carry_of,
-    heard_size,
 )
 from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import AXLES, Reached, TireModel
+from identifier.tire_model import TireModel
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
-NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
 MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1}  # others are in `Bounds`
-LATEST = 0.25  # s, by which a measured v_y may be late
 LEAST_SHARE = 1e-6  # of the sway, which a prior has to have
 REACH = 0.3  # rad, up to which directions of curves are those of a tire
-
-# Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
-AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
-    "bias": ("bias of a_y", "g", "the accelerometer is mounted askew, or not in its unit", True),
-    "roll": ("roll of the body", "rad/g", "no body rolls so far: a_y has another scale", False),
-    "gyro": ("bias of the yaw rate", "rad/s", "the gyro is off, or not in its unit", True),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InertialIdentifier(Method):
     """Lateral velocity and axle curves by one Kalman filter, from r, a_y, v_x and steering alone.
 
-    A v_y that is measured is one more measurement where it is to be read, believed as far as its
-    noise and bias allow: numbers that repeat or are missing are none. What is learnt freezes to the
-    same kind of model as that of the axle identifier.
+    What is learnt freezes to the same kind of model as that of the axle identifier.
 
     Parameters
     ----------
@@ -72,8 +59,6 @@ class InertialIdentifier(Method):
     along : how a_x changes lateral forces of tires that are held, as of `motion.Along`.
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
-    reads_v_y : whether a measured v_y is looked at, where there is one.
-    v_y_delay : by which it is late [s], 0 to 0.25.
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
 
@@ -95,8 +80,6 @@ class InertialIdentifier(Method):
     doubt: tuple[float, float] = (0.0, 0.0)
     a_y_late: float = 0.0
     along: tuple[float, ...] = (0.0,) * len(Along._fields)
-    reads_v_y: bool = False
-    v_y_delay: float = 0.0
     ladder: tuple[float, ...] = LADDER
     dt: float = 0.01
 
@@ -111,7 +94,6 @@ class InertialIdentifier(Method):
         require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
         ahead, aside = self.sensor_position
         require_within(ValueError, -20.0, 20.0, ahead=ahead, aside=aside)
-        require_within(ValueError, 0.0, LATEST, v_y_delay=self.v_y_delay)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "InertialIdentifier":
@@ -182,11 +164,6 @@ class InertialIdentifier(Method):
         """Whether it learns nothing from a recording without an accelerometer: so it is."""
         return True
 
-    @property
-    def remark(self) -> str:
-        """Say what it does without."""
-        return "" if self.reads_v_y else "without v_y, which it tells"
-
     def resumes(self, model: TireModel) -> bool:
         """Return whether a run can begin with a stored model."""
         return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
@@ -198,8 +175,7 @@ class InertialIdentifier(Method):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
-        kept = (*OUTPUTS, *carry_of(self._delay))
-        return tuple(port for port in PORTS if port.name in kept)
+        return PORTS
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
         """Return what is proven of it: the boxes of what is learnt hold after every sample."""
@@ -213,7 +189,6 @@ class InertialIdentifier(Method):
                 "compliance_m": [0.0, b.compliance],
                 "roll_rad_per_g": [0.0, MOST["roll"]],
                 "steering_offset_rad": [-b.steering, b.steering],
-                "v_y_offset_m_s": [-b.v_y, b.v_y],
                 "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
                 "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
             }
@@ -241,20 +216,15 @@ class InertialIdentifier(Method):
                 start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
             )
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
-            sensors[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]] = own[:, 2]
-        trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time, self.prior.sd_v_y)
+            sensors[SENSORS.index("steering")] = own[0, 2]
+        trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
         curves, compliance = self._directions(W), own[:, 0]
         known = self._known(vehicle, P, curves, compliance)
-        heard_v_y = {}
-        if self._delay is not None:
-            heard_v_y["heard_v_y"] = np.zeros(heard_size(self._delay))
-            heard_v_y["heard_v_y"][2] = trust.v_y_noise
         q = len(self._learnt.names)
         rest = len(triangle(MOVING + q)) - len(triangle(q))
         return Setup(
             scan=_scan(
                 doublings(self.ladder),
-                self._delay,
                 tires=not self.held,
                 pressed=vehicle.has_downforce,
             ),
@@ -272,7 +242,6 @@ class InertialIdentifier(Method):
                 ),
                 "running": np.zeros(3),
                 "excitation": excitation,
-                **heard_v_y,
             },
             constants={
                 "dt": np.array(self.dt),
@@ -319,20 +288,15 @@ class InertialIdentifier(Method):
         omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
         return Sway(frequency=omega, damping=self.roll_damping)
 
-    @property
-    def _delay(self) -> int | None:
-        """Samples by which a measured v_y is late; None where it is not looked at."""
-        return round(self.v_y_delay / self.dt) if self.reads_v_y else None
-
     def _limits(self) -> LearntLimits:
         b = self.bounds
-        of_sensors = {"steering": b.steering, "v_y_bias": b.v_y, **MOST}
+        of_sensors = {"steering": b.steering, **MOST}
         most = {"compliance": b.compliance, **of_sensors}
         return LearntLimits(**{name: inward(limit) for name, limit in most.items()})
 
     @property
     def _learnt(self) -> Learnt:
-        return Learnt(not self.held, self.reads_v_y)
+        return Learnt(not self.held)
 
     def _directions(self, W: Array) -> Array:
         """Return by how much weights change with ln grip, then with ln stiffness, (4, n).
@@ -361,8 +325,8 @@ class InertialIdentifier(Method):
                 E[i % 2, :n, k] = curves[i]
             elif name == "compliance":
                 E[:, n, k] = compliance
-            elif name in ("steering", "v_y_bias"):
-                E[int(name == "v_y_bias"), n + 2, k] = 1.0
+            elif name == "steering":
+                E[0, n + 2, k] = 1.0
         return E
 
     def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
@@ -410,42 +374,6 @@ class InertialIdentifier(Method):
             Track("force at saturation", "static load", W.sum(axis=2)),
         )
 
-    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return what rests at its bounds, to a hundredth: of curves, lags, sensors and inertia.
-
-        Parameters
-        ----------
-        state : W (2, n), own (2,) and sensors (5,).
-        """
-        del vehicle
-        b, W, own = self.bounds, state["W"], np.ravel(state["own"])
-        shown = dict(zip(SENSORS, map(float, np.ravel(state["sensors"])), strict=True))
-        zero, bias = shown["steering"], shown["v_y_bias"]
-        unseen = "no such curve was seen, or mass, signs or units are wrong"
-        late = "a sensor is late, or the tires are very soft"
-        listed = [
-            (abs(zero) > NEAR * b.steering,
-             Reached("front", "zero of the steering", zero, "rad", "a sensor is off", True)),
-            (abs(bias) > NEAR * b.v_y,
-             Reached(None, "bias of v_y", bias, "m/s", "its sensor is off", False)),
-        ]  # fmt: skip
-        for name, (title, unit, meaning, refuses) in AT_MOST.items():
-            value = shown[name]  # no roll at all is an acceleration in the plane of the road
-            rests = abs(value) > NEAR * MOST[name]
-            listed.append((rests, Reached(None, title, value, unit, meaning, refuses)))
-        slope = (W / np.array(self.ladder)).sum(axis=1)
-        for axle, soft, level, steep in zip(AXLES, own, W.sum(axis=1), slope, strict=True):
-            listed += [
-                (bool(soft > NEAR * b.compliance),  # none at all is a stiff tire
-                 Reached(axle, "compliance", float(soft), "m per load", late, False)),
-                (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
-                 Reached(axle, "grip", float(level), "static loads", unseen, False)),
-                (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
-                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unseen,
-                         True)),
-            ]  # fmt: skip
-        return tuple(one for rests, one in listed if rests)
-
     def beside_force(self, state: Mapping[str, Array]) -> Array:
         """Return bias and roll in what the accelerometer showed, (n,) [weights].
 
@@ -467,9 +395,9 @@ class InertialIdentifier(Method):
         state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
         """
         prior = self._prior_covariance(vehicle)
-        zeros = np.ravel(state["sensors"])[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]]
         own = np.zeros((2, 3))
-        own[:, 0], own[:, 2] = np.ravel(state["own"]), zeros
+        own[:, 0] = np.ravel(state["own"])
+        own[0, 2] = np.ravel(state["sensors"])[SENSORS.index("steering")]
         own[:, 1] = self.prior.sway_share
         (P,) = unpacked(state["UD"].reshape(1, -1), len(self._learnt.names))
         after = np.empty_like(prior)
@@ -493,6 +421,5 @@ class InertialIdentifier(Method):
 
 
 @cache
-def _scan(steps: tuple[int, ...], delay: int | None, *, tires: bool, pressed: bool) -> Scan:
-    step = build_step(steps, delay, tires=tires, pressed=pressed)
-    return Scan(step, carry=carry_of(delay), over=OVER)
+def _scan(steps: tuple[int, ...], *, tires: bool, pressed: bool) -> Scan:
+    return Scan(build_step(steps, tires=tires, pressed=pressed), carry=CARRY, over=OVER)

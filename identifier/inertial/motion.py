@@ -1,20 +1,19 @@
 """The car between two samples, and what its sensors should show: all that the filter predicts.
 
-z = [v_y, r, x_f, x_r, e_f, e_r, p; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, o]: what moves, then
-the tires and the sensors. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a
-force [static axle loads]; p sine of the bank, positive where it falls to the left, p' its rate
-[1/s]; w weights of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of
-the body [rad per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], o bias of a
-sensor of v_y [m/s]. What is learnt of these are a few steps along directions (`Learnt`).
+z = [v_y, r, x_f, x_r, e_f, e_r, p; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r]: what moves, then the tires
+and the sensors. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force
+[static axle loads]; p sine of the bank, positive where it falls to the left; w weights of the
+units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad per g],
+δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s]. What is learnt of these are steps along
+a few directions (`Learnt`).
 
 f = λ φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s λ C(x),   λ = 1 + κ v_x² where the car has
 downforce (its own κ, of `Vehicle`), else 1,
 α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
 dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (l_f F_f - l_r F_r)/I_z.
-Shown: r + b_r,  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²,  and  v_y + o  where that is
-measured: ä [m/s²] is what the body rolls by, driven by the same forces, x_s and y_s where the
-accelerometer sits. A bank is in the equation of v_y and not in a_y: an accelerometer feels what
-tires push.
+Shown: r + b_r  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
+rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
+equation of v_y and not in a_y: an accelerometer feels what tires push.
 Everything is taken at the middle of the step: where forces and v_x r are half a sample apart, their
 difference is no v_y.
 """
@@ -31,7 +30,7 @@ from identifier.motion.model import LEAST_GRIP
 from models.vehicle import GRAVITY, LIGHTEST
 
 MOVING = 7  # entries of z before those that are learnt
-SENSORS = ("bias", "roll", "steering", "gyro", "v_y_bias")  # the last of these
+SENSORS = ("bias", "roll", "steering", "gyro")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 
@@ -49,7 +48,6 @@ class Unknowns(NamedTuple):
     roll: Any
     steering: Any
     gyro: Any
-    v_y_bias: Any
 
 
 def size(n: int) -> int:
@@ -62,11 +60,9 @@ class Learnt(NamedTuple):
 
     tires : along both directions of each curve, that of its stiffness and that of its grip, one
         factor of both compliances, and the zero of the steering; else along that of the grip alone.
-    v_y : bias of a sensor of v_y, too.
     """
 
     tires: bool
-    v_y: bool
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -74,7 +70,6 @@ class Learnt(NamedTuple):
         return (
             *((*CURVES, "compliance", "steering") if self.tires else ("grip",)),
             *("bias", "roll", "gyro"),
-            *(("v_y_bias",) if self.v_y else ()),
         )
 
     def into(self, n: int, curves: Any, compliance: Any) -> Any:
@@ -130,7 +125,6 @@ def unknowns(z: Any, n: int) -> Unknowns:
         roll=z[k + 3],
         steering=z[k + 4],
         gyro=z[k + 5],
-        v_y_bias=z[k + 6],
     )
 
 

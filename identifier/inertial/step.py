@@ -6,8 +6,7 @@ Its covariance is that of what moves and of steps along the directions of `motio
 Carried: motion (8,), W (2, n), own (2,) the compliances, sensors (5,) and UD the factors of the
 covariance of what is learnt, motion_UD those of what moves; gate as of the axle identifier; body
 (2,), heard (10,), running (2,), excitation (2, 9).
-Sampled: x = [v_y, r], of which v_y is read where it is asked for; u, v_x, a_y, NaN where there is
-none.
+Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
 """
 
 from functools import partial
@@ -48,13 +47,11 @@ from models.vehicle import GRAVITY, load_ratio
 OVER = ("x", "u", "v_x", "a_y")
 LEARNT = ("W", "own", "sensors")
 KEPT = ("UD", "motion_UD", "gate", "body", "heard", "running", "excitation")
+CARRY = ("motion", *LEARNT, *KEPT)
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
-LEFT, FIRST_CHANGE = 7, 8  # of what is carried of a measured v_y: innovation that waits, changes
 SAME = 0.01  # of the square of a change, up to which the next one is none: a number that settles
 MOST_WAITING = 4  # numbers of a channel that wait for its turn
-MOST_COUNTED = 1000  # samples
-TAKEN = 0.5  # of a flag, above which it is set
 MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
 MOST_MISSED = 25.0  # one outlier alone is no alarm
@@ -77,13 +74,13 @@ PORTS = (
     Port("own", "m per load", "compliance, front and rear", learnt=True),
     Port(
         "sensors",
-        "g; rad per g; rad; rad/s; m/s",
-        "bias of a_y, roll of the body, zero of the steering, bias of r, bias of a measured v_y",
+        "g; rad per g; rad; rad/s",
+        "bias of a_y, roll of the body, zero of the steering, bias of r",
         learnt=True,
     ),
     Port(
         "UD",
-        "-; -; -; g; rad per g; rad/s; m/s",
+        "-; -; -; rad; g; rad per g; rad/s",
         "covariance U D U' of ln grip and ln stiffness of both curves, a factor of both "
         "compliances and sensors, where they are learnt: D, and U above it, by rows",
         learnt=True,
@@ -104,13 +101,6 @@ PORTS = (
         "and the innovation of those",
     ),
     Port(
-        "heard_v_y",
-        "m/s; (m/s)^2; -; m/s",
-        "newest measured v_y and its innovation, variance of its noise, samples since the filter "
-        "began and numbers that were new, 1 where the last sample took one, changes of v_y in the "
-        "last samples, newest first",
-    ),
-    Port(
         "running",
         "-",
         "1 while the filter runs; mean square of the missed force over its deviation",
@@ -125,27 +115,14 @@ PORTS = (
 )
 
 
-def carry_of(delay: int | None) -> tuple[str, ...]:
-    """Return the names of what a step carries.
-
-    Parameters
-    ----------
-    delay : of a measured v_y, as `build_step` takes it.
-    """
-    return ("motion", *LEARNT, *KEPT, *(() if delay is None else ("heard_v_y",)))
-
-
 class LearntLimits(NamedTuple):
-    """Of compliance [m], bias [g], roll [rad per g], steering [rad], gyro [rad/s] and bias of v_y
-    [m/s].
-    """
+    """Of compliance [m], bias [g], roll [rad per g], steering [rad] and gyro [rad/s]."""
 
     compliance: Any
     bias: Any
     roll: Any
     steering: Any
     gyro: Any
-    v_y_bias: Any
 
 
 class Noise(NamedTuple):
@@ -167,56 +144,18 @@ class Noise(NamedTuple):
     variance: list[Any]
     heard: Any
 
-    def reading(
-        self, h: Any, innovation: list[Any], R: list[Any], lateral: "Reading | None"
-    ) -> "Reading":
-        """Return that of v_y where it counts, else that of the channel that comes first.
 
-        Parameters
-        ----------
-        lateral : of v_y, None where there is none.
-        """
-        of_r, of_a_y = zip(innovation, R, [self.counts] * 2, strict=True)
-        rest = [ca.if_else(self.first, a, b) for a, b in zip(of_r, of_a_y, strict=True)]
-        row = sum(as_factor(turn) * h[i, :] for i, turn in enumerate(self.turns))
-        if lateral is None:
-            return Reading(row, *rest)
-        rest = [ca.if_else(lateral.counts, a, b) for a, b in zip(lateral[1:], rest, strict=True)]
-        return Reading(row + as_factor(lateral.counts) * lateral.h, *rest)
-
-
-class Reading(NamedTuple):
-    """One number that is measured: its gradient h (1, q), innovation, variance of its error, and 1
-    where there is one.
-    """
-
-    h: Any
-    innovation: Any
-    R: Any
-    counts: Any
-
-
-class Change(NamedTuple):
-    """Of v_y in the step [m/s], and its gradient in z (1, q)."""
-
-    v_y: Any
-    gradient: Any
-
-
-def build_step(
-    steps: tuple[int, ...], delay: int | None, *, tires: bool = True, pressed: bool = False
-) -> ca.Function:
+def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = False) -> ca.Function:
     """Return the step; every number stays an input of it.
 
     Parameters
     ----------
     steps : doublings between the units.
-    delay : samples by which a measured v_y is late; None does not look at it.
     tires : whether it learns all of the tires, as of `motion.Learnt`.
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
-    learnt = Learnt(tires, delay is not None)
+    learnt = Learnt(tires)
     q = MOVING + len(learnt.names)
     ports: dict[str, Any] = {
         "motion": ca.SX.sym("motion", MOVING),
@@ -228,8 +167,6 @@ def build_step(
     }
     ports["gate"], last = named_port(GateState, "gate")
     sizes = {"body": 2, "heard": 10, "running": 3}
-    if delay is not None:
-        sizes["heard_v_y"] = heard_size(delay)
     ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
@@ -287,30 +224,19 @@ def build_step(
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(factors, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    lateral, heard_v_y = None, []
-    if delay is not None:
-        difference = ahead.moving[0] - z[0]
-        change = Change(difference, ca.jacobian(difference, z) @ into)
-        lateral, heard_v_y = _lateral(
-            ports, (trust, possible), delay, ahead_z, gated, goes_on, change
-        )
-        factors = _unsure_of_v_y(factors, trust, ca.logic_and(goes_on, _is_good(gated)))
-    noise = _noise(ports, trust, gated, goes_on, ca.SX(0) if lateral is None else lateral.counts)
+    noise = _noise(ports, trust, gated, goes_on)
     step, factors, heard = _corrected(
         (car, laws, trust),
         ahead,
         ahead_z,
         into,
         factors,
-        (noise, lateral),
+        noise,
         now,
         scales,
         steps,
         load,
     )
-    if lateral is not None:
-        left = lateral.innovation - ca.dot(lateral.h.T, step)
-        heard_v_y.insert(LEFT, ca.if_else(lateral.counts, 0, left))
     corrected = ca.vertsplit(ahead_z + into @ step)
     missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
     fast = ports["running"][1]
@@ -350,7 +276,6 @@ def build_step(
         "gate": gated.state,
         "body": tilt,
         "heard": heard,
-        **({} if delay is None else {"heard_v_y": ca.vertcat(*heard_v_y)}),
         "running": ca.vertcat(
             ca.logic_and(runs, sane),
             ca.if_else(goes_on, fast, 0),
@@ -365,33 +290,30 @@ def build_step(
         ),
     }
     name = ["inertial_step", *map(str, steps), *["held"] * (not tires), *["pressed"] * pressed]
-    carry = carry_of(delay)
     return ca.Function(
         "_".join(name),
         list(ports.values()),
         [
-            *(ca.densify(next_state[name]) for name in carry),
+            *(ca.densify(next_state[name]) for name in CARRY),
             ca.if_else(gated.on, force * car.load, 0),
             ca.if_else(gated.on, told.v_y, 0),
             ca.sqrt(variance),
             ca.logic_and(runs, variance < trust.observable * now.v_x**2),
         ],
         list(ports),
-        [*(f"{name}_next" for name in carry), *OUTPUTS],
+        [*(f"{name}_next" for name in CARRY), *OUTPUTS],
         {"cse": True},
     )
 
 
-def _noise(
-    ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any, taken: Any
-) -> Noise:
+def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any) -> Noise:
     """Return what is new of r and a_y, and how noisy they are.
 
     A sensor that is slower than the log repeats its number, or settles to it in two steps where a
     filter stands between: that is no news. Second differences of news show noise and next to
     nothing of a car: their mean square is six variances.
     One channel is taken at a sample, that of which more numbers wait: a second update would cost as
-    much as the first and tell what the next sample does. Both wait where v_y is `taken`.
+    much as the first and tell what the next sample does.
     """
     heard, a_y = ports["heard"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
@@ -411,8 +333,8 @@ def _noise(
         state.append((ca.if_else(holds, heard[i], y), ca.if_else(goes_on, before, y)))
     now, before = zip(*state, strict=True)
     of_r, of_a_y = waiting
-    first, free = of_r >= of_a_y, ca.logic_not(taken)
-    turns = [ca.logic_and(free, first), ca.logic_and(free, ca.logic_not(first))]
+    first = of_r >= of_a_y
+    turns = [first, ca.logic_not(first)]
     left = [ca.if_else(turn, 0, one) for turn, one in zip(turns, waiting, strict=True)]
     share = [1 / larger(one, 1) for one in waiting]
     counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
@@ -437,18 +359,18 @@ def _corrected(
     z: Any,
     into: Any,
     factors: Factors,
-    heard: tuple[Noise, Reading | None],
+    noise: Noise,
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
     load: Load,
 ) -> tuple[Any, Factors, Any]:
-    """Return by how much v_y, r or a_y corrects, the factors, and what is carried of the last two.
+    """Return by how much r or a_y corrects, the factors, and what is carried of both.
 
     Innovations of what waits are kept: its turn comes at a next sample, where its number may be a
     new one, or none.
     """
-    (car, laws, trust), (noise, lateral) = told, heard
+    car, laws, trust = told
     n = len(steps) + 1
     symbol = ca.SX.sym("z", z.numel())
     tilt = ca.SX.sym("tilt")
@@ -468,14 +390,10 @@ def _corrected(
         for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
     ]
     R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
-    read = noise.reading(H, nu, R, lateral)
+    nu_now, R_now = (ca.if_else(noise.first, *pair) for pair in (nu, R))
+    h = sum(as_factor(turn) * H[i, :] for i, turn in enumerate(noise.turns))
     step, factors = measured(
-        factors,
-        read.h,
-        innovation=read.innovation,
-        R=read.R,
-        clip=trust.clip,
-        counts=read.counts,
+        factors, h, innovation=nu_now, R=R_now, clip=trust.clip, counts=noise.counts
     )
     moved = ca.vertcat(*step)
     left = [
@@ -485,68 +403,9 @@ def _corrected(
     return moved, factors, ca.vertcat(noise.heard, *left)
 
 
-def heard_size(delay: int) -> int:
-    """Return how many numbers are carried of a measured v_y."""
-    return FIRST_CHANGE + max(delay - 1, 0)
-
-
 def _is_good(gated: Gate) -> Any:
     """Return whether the gate goes on with this sample, and not with one before."""
     return gated.state[GateState._fields.index("bad")] == 0
-
-
-def _lateral(
-    ports: dict[str, Any],
-    told: tuple[TrustNumbers, GateNumbers],
-    late: int,
-    z: Any,
-    gated: Gate,
-    goes_on: Any,
-    change: Change,
-) -> tuple[Reading, list[Any]]:
-    """Return a measured v_y as a reading, and what is carried of it.
-
-    Where it is late, it shows v_y of now less its changes since, as they were predicted: what is
-    unsure of them is taken for as large as that of the newest one. Differences of innovations
-    show the noise, from one number to the next. One that follows another at once is not taken: it
-    is the turn of r and a_y.
-    """
-    trust, possible = told
-    last, newest, old, age, count, took, waits, left, *changes = ca.vertsplit(ports["heard_v_y"])
-    changes = [ca.if_else(goes_on, change.v_y, 0), *changes]
-    y, learns = ports["x"][0], ca.logic_and(goes_on, _is_good(gated))
-    y = ca.if_else(ca.logic_and(_is_good(gated), possible.possible_v_y(gated.v_x, y)), y, last)
-    fresh = ca.logic_and(learns, ca.logic_and(y != last, age + 1 >= late))
-    waiting = goes_on * ca.logic_or(fresh, waits > TAKEN)
-    taken = ca.logic_and(ca.logic_and(learns, waiting), took < TAKEN)
-    innovation = y - (z[0] - sum(changes[:late])) - z[-1]
-    share = ca.if_else(ca.logic_and(fresh, waits > TAKEN), 0.5, 1)
-    known = smaller(count + 2, 1 / trust.noise_gain)
-    shows = smaller((innovation - newest) ** 2 / 2, MOST_NOISE * old + LEAST)
-    variance = ca.if_else(fresh, old + (shows - old) / known, old)
-    h = -late * change.gradient if late else ca.SX(1, change.gradient.numel())
-    h[0] += 1
-    h[-1] += 1
-    R = (trust.v_y_error + variance) * share + (trust.lateness * change.v_y / ports["dt"]) ** 2
-    heard = [
-        y,
-        ca.if_else(fresh, innovation, newest),
-        variance,
-        goes_on * smaller(age + 1, MOST_COUNTED),
-        smaller(count + fresh, MOST_COUNTED),
-        taken,
-        ca.logic_and(waiting, ca.logic_not(taken)),
-        *changes[: max(late - 1, 0)],
-    ]
-    mean = ca.if_else(fresh, left + share * (innovation - left), left)
-    return Reading(h, mean, R, taken), heard
-
-
-def _unsure_of_v_y(factors: Factors, trust: TrustNumbers, learns: Any) -> Factors:
-    """Return the factors where the bias of a measured v_y may have changed in the step."""
-    U, D = factors
-    unsure = smaller(D[-1] + learns * trust.v_y_walk, larger(D[-1], trust.v_y_bias))
-    return Factors(U, [*D[:-1], unsure])
 
 
 def _loosened(factors: Factors, learnt: Learnt, amount: Any) -> Factors:
