@@ -37,6 +37,7 @@ TO_RECORD = {
     "export_cost",
     "fault_table",
     "guaranteed",
+    "inertial",
     "learn_and_extrapolate",
     "long_logs",
     "mpc_caution",
