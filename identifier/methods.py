@@ -141,12 +141,7 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: boo
         Where no method goes on from such a model.
     """
     if not v_y:
-        fitted = isinstance(model, FittedModel)
-        return (
-            InertialIdentifier.holding(model, vehicle, dt=dt)
-            if fitted
-            else InertialIdentifier.for_vehicle(vehicle, dt=dt)
-        )
+        return InertialIdentifier.beginning_with(model, vehicle, dt=dt)[0]
     if model.kind not in LEARNERS:
         raise ValueError(f"no method can go on learning from a {type(model).__name__}")
     return LEARNERS[model.kind](model, vehicle, dt)

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from identifier.doctor import diagnose
 from identifier.estimate.method import FitMethod
+from identifier.inertial import InertialIdentifier
 from identifier.method import Method
-from identifier.methods import continuing, make_method
+from identifier.methods import make_method
 from identifier.prediction import Prediction, predict
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import DivergedError
@@ -128,6 +129,5 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     found = tire.estimated_v_y(recording)
     if found is not None:
         return replace(recording, v_y=found.v_y, estimated=("v_y",))
-    design = continuing(tire, tire.vehicle, recording.dt, v_y=False)
-    start = tire if design.resumes(tire) else None
+    design, start = InertialIdentifier.beginning_with(tire, tire.vehicle, dt=recording.dt)
     return run_over(recording, tire.vehicle, design, start).recording

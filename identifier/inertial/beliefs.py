@@ -63,8 +63,8 @@ class Beliefs:
     roll, sd_roll : of the body, outwards, as the accelerometer feels it [rad per g]; 0 and nearly 0
         for an acceleration in the plane of the road.
     steering : of the zero of the front steering [rad].
-    grip : of ln of the grip of an axle whose tires are held [-].
     gyro : bias of the yaw rate, in a car with a wheelbase of 2.7 m [rad/s].
+    grip : of ln of the grip of tires that are held [-].
     """
 
     bias: float = 0.015

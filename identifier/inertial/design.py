@@ -51,14 +51,14 @@ class InertialIdentifier(Method):
 
     Parameters
     ----------
+    roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
+    sensor_position : of the accelerometer, before and left of the center of gravity [m].
     held : whether tires, lag and steering stay those of the model that it begins with, but for
         their grip; else stiffness, lag and steering are learnt, too.
     doubt : standard deviation of the rear force for longer than noise: always [static axle loads],
         and of the force [-].
     a_y_late : by which a_y is later than the yaw rate [s].
     along : how a_x changes lateral forces of tires that are held, as of `motion.Along`.
-    roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
-    sensor_position : of the accelerometer, before and left of the center of gravity [m].
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
 
@@ -148,6 +148,22 @@ class InertialIdentifier(Method):
                 drag=vehicle.drag,
             ),
         )
+
+    @classmethod
+    def beginning_with(
+        cls, model: TireModel | None, vehicle: Vehicle, *, dt: float = 0.01
+    ) -> "tuple[InertialIdentifier, TireModel | None]":
+        """Return the design for a car with these tires, and what its run begins with.
+
+        Parameters
+        ----------
+        model : a fit is held, what an axle identifier learnt is gone on from; others help nothing.
+        dt : sampling interval [s].
+        """
+        if isinstance(model, FittedModel):
+            return cls.holding(model, vehicle, dt=dt), model
+        usual = cls.for_vehicle(vehicle, dt=dt)
+        return usual, model if model is not None and usual.resumes(model) else None
 
     @property
     def min_speed(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from codegen import find_compiler
 from identifier.inertial import InertialIdentifier
-from identifier.method import CannotFreezeError, Method
+from identifier.method import CannotFreezeError
 from identifier.methods import continuing
 from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
@@ -94,10 +94,7 @@ def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> Later
     """Return what estimates v_y where no sensor shows it, on the tires of a fit or while it learns
     them.
     """
-    method: Method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
-    if learnt is not None:
-        method = continuing(learnt, vehicle, PERIOD, v_y=False)
-    start = learnt if learnt is not None and method.resumes(learnt) else None
+    method, start = InertialIdentifier.beginning_with(learnt, vehicle, dt=PERIOD)
     return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
 
 
