@@ -19,7 +19,7 @@ METHODS = {
 SMALL = "Cortex-M4F"
 LIMITS = {  # in float on the small processor
     REFERENCE: {"instructions": 2000, "flash_B": 7168, "stack_B": 800, "ram_B": 400},
-    WITHOUT_V_Y: {"instructions": 12_000},
+    WITHOUT_V_Y: {"instructions": 8000},
 }
 
 

@@ -30,23 +30,21 @@ from identifier.method import Method
 from identifier.paper.design import VARIANTS, PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
-from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 
-_Factory = Callable[[Vehicle, int], Method]
+Factory = Callable[[Vehicle, int], Method]
 DEFAULT = "fit"  # on logs
 LIVE = "axle"  # the default in a car, sample by sample
 WITHOUT_V_Y = "inertial"  # the default in a car without a lateral velocity
-_LONGEST_BLIND = 3600.0  # [s] of a log without v_y, beyond which the recursive default tells it
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
 
-def _paper(law: str) -> _Factory:
+def _paper(law: str) -> Factory:
     return lambda vehicle, seed: PaperIdentifier.for_vehicle(vehicle, law=law, seed=seed)
 
 
-def _seedless(factory: Callable[[Vehicle], Method]) -> _Factory:
+def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
     def unseeded(vehicle: Vehicle, seed: int) -> Method:
         del seed
         return factory(vehicle)
@@ -54,7 +52,7 @@ def _seedless(factory: Callable[[Vehicle], Method]) -> _Factory:
     return unseeded
 
 
-METHODS: Mapping[str, _Factory] = {
+METHODS: Mapping[str, Factory] = {
     DEFAULT: _seedless(FitMethod.for_vehicle),
     LIVE: _seedless(AxleIdentifier.for_vehicle),
     WITHOUT_V_Y: _seedless(InertialIdentifier.for_vehicle),
@@ -70,7 +68,7 @@ METHODS: Mapping[str, _Factory] = {
 }
 
 
-# By kind of model, the method that goes on learning from one.
+# By kind of model, the method that goes on from one.
 LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
     AxleModel.kind: lambda model, vehicle, dt: (
         InertialIdentifier if model.tells_v_y else AxleIdentifier
@@ -94,6 +92,8 @@ def _installed() -> dict[str, EntryPoint]:
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
 
+    Parameters
+    ----------
     name : one of `methods`.
     """
     return name in VARIANTS
@@ -127,25 +127,29 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     return method
 
 
-def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
-    """Return the method that goes on learning from a model.
+def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: bool = True) -> Method:
+    """Return the method that goes on from a model: it learns, or holds a fit and estimates v_y.
 
+    Parameters
+    ----------
     dt : sampling interval [s].
+    v_y : whether there is a lateral velocity.
+
+    Raises
+    ------
+    ValueError
+        Where no method goes on from such a model.
     """
+    if not v_y:
+        return InertialIdentifier.beginning_with(model, vehicle, dt=dt)[0]
     if model.kind not in LEARNERS:
-        raise ValueError(f"no method can continue a {type(model).__name__}")
+        raise ValueError(f"no method can go on learning from a {type(model).__name__}")
     return LEARNERS[model.kind](model, vehicle, dt)
 
 
 def methods() -> tuple[str, ...]:
     """Return the names of all methods, the default first, those of other distributions last."""
     return (*METHODS, *_installed())
-
-
-def usual(recording: Recording) -> str:
-    """Return the name of the default method of a log."""
-    blind = recording.logged_v_y is None and recording.duration > _LONGEST_BLIND
-    return WITHOUT_V_Y if blind else DEFAULT
 
 
 def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:

@@ -55,7 +55,7 @@ class Exported:
         step = self.package.specialized
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
-        reads += ", and v_y where it is measured; v_y is an output" if step.tells_v_y else ""
+        reads += "; v_y is an output" if step.tells_v_y else ""
         told = [UNCALIBRATED] if step.tells_band and step.band is None else []
         return "\n".join([*lines, *self.notes, reads, *told, wrote])
 

@@ -8,7 +8,7 @@ from identifier.doctor import diagnose
 from identifier.estimate.method import FitMethod
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
-from identifier.methods import DEFAULT, make_method, usual
+from identifier.methods import make_method
 from identifier.prediction import Prediction, predict
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import DivergedError
@@ -48,8 +48,7 @@ def identify(
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
     method : the identifier, or its name as of `methods`; None takes `FitMethod.for_vehicle` at the
-        recording's interval, which estimates v_y where the recording has none, and of more than an
-        hour without a v_y `InertialIdentifier.for_vehicle`.
+        recording's interval, which estimates v_y where the recording has none.
     start : model to go on learning from; None begins afresh.
     check : whether what this vehicle cannot have driven is refused, and the doctor asked.
     progress : called now and then with the share that is done, 0 to 1.
@@ -74,9 +73,7 @@ def identify(
     if method is not None:
         require_kind(Method, METHOD, method=method)
     if method is None:
-        fitted = usual(recording) == DEFAULT
-        identifier = FitMethod if fitted else InertialIdentifier
-        method = identifier.for_vehicle(vehicle, dt=recording.dt)
+        method = FitMethod.for_vehicle(vehicle, dt=recording.dt)
     design = method
     if check:
         check_against_vehicle(recording, vehicle)
@@ -132,6 +129,5 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     found = tire.estimated_v_y(recording)
     if found is not None:
         return replace(recording, v_y=found.v_y, estimated=("v_y",))
-    design = InertialIdentifier.for_vehicle(tire.vehicle, dt=recording.dt)
-    start = tire if design.resumes(tire) else None
+    design, start = InertialIdentifier.beginning_with(tire, tire.vehicle, dt=recording.dt)
     return run_over(recording, tire.vehicle, design, start).recording

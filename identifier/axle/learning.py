@@ -493,7 +493,7 @@ def bounded(
     w, (s, k, o) = theta[:n], theta[n:]
     w = _gripping(numbers, w, P) if slope is None else _rising(numbers, w, P, slope)
     return [
-        *_towards_center(numbers, w, slope),
+        *towards_center(numbers, w, slope),
         within(s, 0, numbers.compliance),
         within(k, 0, 1),
         within(o, -offset, offset),
@@ -544,7 +544,7 @@ def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any])
     return [a + b * to_grip + c * to_slope for a, b, c in zip(w, by_grip, by_slope, strict=True)]
 
 
-def _towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None) -> list[Any]:
+def towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None) -> list[Any]:
     """Move w towards the center of the set until every bound holds."""
     away = [one - numbers.center for one in w]
     over = larger(ca.fabs(sum(away)) * numbers.per_grip, 1)

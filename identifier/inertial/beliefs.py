@@ -8,10 +8,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
-import numpy as np
-
-from codegen.arrays import Array
-from identifier.inertial.motion import MOVING, places, size
 from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
@@ -68,7 +64,7 @@ class Beliefs:
         for an acceleration in the plane of the road.
     steering : of the zero of the front steering [rad].
     gyro : bias of the yaw rate, in a car with a wheelbase of 2.7 m [rad/s].
-    inertia : of 1/I_z [-].
+    grip : of ln of the grip of tires that are held [-].
     """
 
     bias: float = 0.015
@@ -76,30 +72,10 @@ class Beliefs:
     sd_roll: float = 0.04
     steering: float = 0.005
     gyro: float = 0.002
-    inertia: float = 0.03
+    grip: float = 0.02
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
-
-    def covariance(self, n: int, scale: float) -> Array:
-        """Return the covariance of what is learnt, (2 n + 8, 2 n + 8); zero where it is of curves.
-
-        Parameters
-        ----------
-        n : number of units.
-        scale : root of the wheelbase over 2.7 m [-].
-        """
-        P = np.zeros((size(n) - MOVING, size(n) - MOVING))
-        at = {name: place - MOVING for name, place in places(n).items()}
-        for name, sd in (
-            ("bias", self.bias),
-            ("roll", self.sd_roll),
-            ("steering", self.steering),
-            ("gyro", self.gyro / scale),
-            ("inertia", self.inertia),
-        ):
-            P[at[name], at[name]] = sd**2
-        return P
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,9 +94,6 @@ class Trust:
     r_error, a_y_error : what no noise explains of the yaw rate [rad/s] and of a_y [m/s²].
     a_y_share : of a_y, what no noise explains of it beside that [-].
     r_noise, a_y_noise : first guess of the noise [rad/s], [m/s²], which is learnt from the signals.
-    v_y_noise : first guess of the noise of a measured v_y, learnt likewise [sqrt(g L)].
-    v_y_error : what no noise explains of it beside its bias [sqrt(g L)].
-    v_y_time : in which that bias may change by its deviation before the first sample [s].
     noise_samples : over which noise is learnt [samples].
     lateness : by which the channels may differ in time [s].
     clip : standard deviations from which an innovation counts no more.
@@ -137,17 +110,14 @@ class Trust:
     error: float = 0.01
     relative_error: float = 0.08
     correlation_time: float = 0.06
-    bank: float = 0.04
-    bank_time: float = 3.0
+    bank: float = 0.05
+    bank_time: float = 20.0
     jerk: float = 0.03
     r_error: float = 0.009
     a_y_error: float = 0.2
     a_y_share: float = 0.05
     r_noise: float = 0.03
     a_y_noise: float = 2.0
-    v_y_noise: float = 0.02
-    v_y_error: float = 0.01
-    v_y_time: float = 60.0
     noise_samples: float = 100.0
     lateness: float = 0.015
     clip: float = 4.0
@@ -161,7 +131,7 @@ class Trust:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def at(self, dt: float, wheelbase: float, froude_time: float, sd_v_y: float) -> "TrustNumbers":
+    def at(self, dt: float, wheelbase: float, froude_time: float) -> "TrustNumbers":
         """Return the numbers of a step.
 
         Parameters
@@ -169,7 +139,6 @@ class Trust:
         dt : sampling interval [s].
         wheelbase : L [m].
         froude_time : sqrt(L/g) [s].
-        sd_v_y : of the bias of a measured v_y before the first sample [m/s].
         """
         scale = math.sqrt(wheelbase / 2.7)
         speed = wheelbase / froude_time
@@ -181,8 +150,7 @@ class Trust:
             relative_error=self.relative_error,
             renewed=1.0 - kept**2,
             bank=self.bank**2,
-            bank_rate=(self.bank / self.bank_time) ** 2,
-            bank_walk=4.0 * self.bank**2 * dt / self.bank_time**3,
+            bank_walk=2.0 * self.bank**2 * dt / self.bank_time,
             r_walk=(self.jerk / froude_time**1.5) ** 2 * dt,
             r_error=(self.r_error / scale) ** 2,
             a_y_error=self.a_y_error**2,
@@ -195,21 +163,16 @@ class Trust:
             inflation=dt * self.step**2 / self.step_time,
             surge=self.surge,
             observable=self.observable**2,
-            v_y_error=(self.v_y_error * speed) ** 2,
-            v_y_bias=sd_v_y**2,
-            v_y_walk=sd_v_y**2 * dt / self.v_y_time,
             r_noise=(self.r_noise / scale) ** 2,
             a_y_noise=self.a_y_noise**2,
-            v_y_noise=(self.v_y_noise * speed) ** 2,
         )
 
 
 class TrustNumbers(NamedTuple):
-    """Variances of v_y, r, bank and its rate at a start; what curves miss and what it gains in a
-    step; variances that bank rate and r gain in one; of r and a_y beside their noise; gain of the
+    """Variances of v_y, r and bank at a start; what curves miss and what it gains in a
+    step; variances that bank and r gain in one; of r and a_y beside their noise; gain of the
     noise; lateness; clip; 1/alarm and its gain; what an alarm adds; surge; variance of side slip
-    that is observed; variance of a measured v_y beside its noise, largest of its bias and
-    what that gains in a step; variances of the noise of r, a_y and v_y at first.
+    that is observed; variances of the noise of r and a_y at first.
     """
 
     v_y: Any
@@ -218,7 +181,6 @@ class TrustNumbers(NamedTuple):
     relative_error: Any
     renewed: Any
     bank: Any
-    bank_rate: Any
     bank_walk: Any
     r_walk: Any
     r_error: Any
@@ -232,9 +194,5 @@ class TrustNumbers(NamedTuple):
     inflation: Any
     surge: Any
     observable: Any
-    v_y_error: Any
-    v_y_bias: Any
-    v_y_walk: Any
     r_noise: Any
     a_y_noise: Any
-    v_y_noise: Any

@@ -2,17 +2,16 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, triangle, unpacked
-from identifier.axle.curve import EDGES, LADDER, doublings
+from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
@@ -22,45 +21,44 @@ from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
+from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import MOVING, SENSORS, Laws, of_axles, size
-from identifier.inertial.step import CARRY, OVER, PORTS, LearntLimits, build_step, heard_size
+from identifier.inertial.motion import CURVES, MOVING, SENSORS, Along, Laws, Learnt
+from identifier.inertial.step import (
+    CARRY,
+    OVER,
+    PORTS,
+    LearntLimits,
+    build_step,
+)
 from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
 from identifier.setup import Port, Setup
-from identifier.tire_model import AXLES, Reached, TireModel
+from identifier.tire_model import TireModel
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
-NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
-MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # others are in `Bounds`
-LATEST = 0.25  # s, by which a measured v_y may be late
-
-# Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
-AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
-    "bias": ("bias of a_y", "g", "the accelerometer is mounted askew, or not in its unit", True),
-    "roll": ("roll of the body", "rad/g", "no body rolls so far: a_y has another scale", False),
-    "gyro": ("bias of the yaw rate", "rad/s", "the gyro is off, or not in its unit", True),
-    "inertia": ("excess of 1/I_z", "-", "the declared yaw inertia is far off", False),
-}
-
-# What a search may vary of it, and what the number is multiplied and divided by.
+MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1}  # others are in `Bounds`
+LEAST_SHARE = 1e-6  # of the sway, which a prior has to have
+REACH = 0.3  # rad, up to which directions of curves are those of a tire
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InertialIdentifier(Method):
-    """Axle curves and lateral velocity by one Kalman filter, from r, a_y, v_x and steering alone.
+    """Lateral velocity and axle curves by one Kalman filter, from r, a_y, v_x and steering alone.
 
-    A v_y that is measured is one more measurement, believed as far as its noise and bias allow:
-    numbers that repeat or are missing are none. What is learnt freezes to the same kind of model as
-    that of the axle identifier.
+    What is learnt freezes to the same kind of model as that of the axle identifier.
 
     Parameters
     ----------
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
-    reads_v_y : whether a measured v_y is looked at, where there is one.
-    v_y_delay : by which it is late [s], 0 to 0.25.
+    held : whether tires, lag and steering stay those of the model that it begins with, but for
+        their grip; else stiffness, lag and steering are learnt, too.
+    doubt : standard deviation of the rear force for longer than noise: always [static axle loads],
+        and of the force [-].
+    a_y_late : by which a_y is later than the yaw rate [s].
+    along : how a_x changes lateral forces of tires that are held, as of `motion.Along`.
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
 
@@ -78,14 +76,17 @@ class InertialIdentifier(Method):
     roll_frequency: float = 6.0
     roll_damping: float = 0.3
     sensor_position: tuple[float, float] = (0.0, 0.0)
-    reads_v_y: bool = True
-    v_y_delay: float = 0.0
+    held: bool = False
+    doubt: tuple[float, float] = (0.0, 0.0)
+    a_y_late: float = 0.0
+    along: tuple[float, ...] = (0.0,) * len(Along._fields)
     ladder: tuple[float, ...] = LADDER
     dt: float = 0.01
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
         object.__setattr__(self, "sensor_position", tuple(self.sensor_position))
+        object.__setattr__(self, "doubt", tuple(self.doubt))
         doublings(self.ladder)
         if not 0.0 < self.dt < math.inf:
             raise ValueError(f"dt must be positive, it is {self.dt}")
@@ -93,7 +94,6 @@ class InertialIdentifier(Method):
         require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
         ahead, aside = self.sensor_position
         require_within(ValueError, -20.0, 20.0, ahead=ahead, aside=aside)
-        require_within(ValueError, 0.0, LATEST, v_y_delay=self.v_y_delay)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "InertialIdentifier":
@@ -119,6 +119,52 @@ class InertialIdentifier(Method):
             dt=dt,
         )
 
+    @classmethod
+    def holding(
+        cls, model: FittedModel, vehicle: Vehicle, *, dt: float = 0.01
+    ) -> "InertialIdentifier":
+        """Return the design for a car whose tires are known: it begins with the model.
+
+        Parameters
+        ----------
+        dt : sampling interval [s].
+        """
+        usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
+        share = max(float(tires.own[:, 1].mean()), LEAST_SHARE)
+        return replace(
+            usual,
+            held=True,
+            prior=replace(usual.prior, sway_share=share),
+            roll_frequency=tires.sway.frequency * vehicle.froude_time,
+            doubt=(float(model.error_floor[1]), float(model.error_share[1])),
+            a_y_late=model.a_y_late,
+            along=Along(
+                load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,
+                load_r=model["load_transfer"] * vehicle.wheelbase / vehicle.l_f,
+                brake_f=model["braking_f"],
+                brake_r=model["braking_r"],
+                drive_f=model["driving_f"],
+                drive_r=model["driving_r"],
+                drag=vehicle.drag,
+            ),
+        )
+
+    @classmethod
+    def beginning_with(
+        cls, model: TireModel | None, vehicle: Vehicle, *, dt: float = 0.01
+    ) -> "tuple[InertialIdentifier, TireModel | None]":
+        """Return the design for a car with these tires, and what its run begins with.
+
+        Parameters
+        ----------
+        model : a fit is held, what an axle identifier learnt is gone on from; others help nothing.
+        dt : sampling interval [s].
+        """
+        if isinstance(model, FittedModel):
+            return cls.holding(model, vehicle, dt=dt), model
+        usual = cls.for_vehicle(vehicle, dt=dt)
+        return usual, model if model is not None and usual.resumes(model) else None
+
     @property
     def min_speed(self) -> float:
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
@@ -134,11 +180,6 @@ class InertialIdentifier(Method):
         """Whether it learns nothing from a recording without an accelerometer: so it is."""
         return True
 
-    @property
-    def remark(self) -> str:
-        """Say what it does without."""
-        return "" if self.reads_v_y else "without v_y, which it estimates"
-
     def resumes(self, model: TireModel) -> bool:
         """Return whether a run can begin with a stored model."""
         return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
@@ -149,7 +190,7 @@ class InertialIdentifier(Method):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force trust."""
+        """Outputs and state of its step, axle_force first."""
         return PORTS
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
@@ -157,17 +198,15 @@ class InertialIdentifier(Method):
         del vehicle, driving
         b = self.bounds
         return Certificate(
-            limits={
+            held={
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
                 "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],
                 "compliance_m": [0.0, b.compliance],
                 "roll_rad_per_g": [0.0, MOST["roll"]],
                 "steering_offset_rad": [-b.steering, b.steering],
-                "v_y_offset_m_s": [-b.v_y, b.v_y],
                 "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
                 "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
-                "inverse_yaw_inertia_over_declared": [1.0 - MOST["inertia"], 1.0 + MOST["inertia"]],
             }
         )
 
@@ -183,9 +222,8 @@ class InertialIdentifier(Method):
         ValueError
             Where stored weights are those of another structure.
         """
-        n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
-        P = prior_P = self._prior_covariance(vehicle)
+        P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
         sensors = np.zeros(len(SENSORS))
         sensors[SENSORS.index("roll")] = self.beliefs.roll
@@ -194,19 +232,18 @@ class InertialIdentifier(Method):
                 start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
             )
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
-            sensors[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]] = own[:, 2]
-        size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
-        trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time, self.prior.sd_v_y)
-        known = self.beliefs.covariance(n, size_ratio)
-        for one, rows in zip(P, of_axles(n), strict=True):
-            known[np.ix_(rows, rows)] = one[_learnt_of_axle(n)]
-        if self._delay is None:
-            known[-1, :-1] = known[:-1, -1] = 0.0
-        heard_v_y = np.zeros(heard_size(self._delay))
-        heard_v_y[2] = trust.v_y_noise
-        rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
+            sensors[SENSORS.index("steering")] = own[0, 2]
+        trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
+        curves, compliance = self._directions(W), own[:, 0]
+        known = self._known(vehicle, P, curves, compliance)
+        q = len(self._learnt.names)
+        rest = len(triangle(MOVING + q)) - len(triangle(q))
         return Setup(
-            scan=_scan(doublings(self.ladder), self._delay, pressed=vehicle.has_downforce),
+            scan=_scan(
+                doublings(self.ladder),
+                tires=not self.held,
+                pressed=vehicle.has_downforce,
+            ),
             carry={
                 "motion": np.zeros(MOVING),
                 "W": W,
@@ -219,8 +256,7 @@ class InertialIdentifier(Method):
                 "heard": np.concatenate(
                     [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
-                "heard_v_y": heard_v_y,
-                "running": np.zeros(2),
+                "running": np.zeros(3),
                 "excitation": excitation,
             },
             constants={
@@ -233,14 +269,17 @@ class InertialIdentifier(Method):
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": np.array(self._limits()),
                 "bounds": np.array(self.bounds.of_ladder(self.ladder, RISING_UNTIL)),
-                "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 "rising": rising_shares(self.ladder, RISING_UNTIL),
+                "curves": curves,
+                "compliance": compliance,
+                "doubt": np.array(self.doubt),
+                **({"along": np.array(self.along)} if self.held else {}),
                 **downforce_numbers(vehicle),
             },
             ends_run=self.plausibility.rest(self.dt),
         )
 
-    def body_prior(self, vehicle: Vehicle) -> Body:
+    def believed_body(self, vehicle: Vehicle) -> Body:
         """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
         frequency = self.roll_frequency / vehicle.froude_time
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
@@ -248,17 +287,16 @@ class InertialIdentifier(Method):
 
     def _laws(self, vehicle: Vehicle) -> Laws:
         omega = self._sway(vehicle).frequency
-        time = self.trust.bank_time
         ahead, aside = self.sensor_position
         return Laws(
             forgets=math.exp(-self.dt / self.trust.correlation_time),
-            bank_stiffness=time**-2,
-            bank_damping=2.0 / time,
+            bank=math.exp(-self.dt / self.trust.bank_time),
             roll_stiffness=omega**2,
             roll_damping=2.0 * self.roll_damping * omega,
             sway=self.prior.sway_share * omega**-2,
             ahead=ahead,
             aside=aside,
+            late=self.a_y_late,
         )
 
     def _sway(self, vehicle: Vehicle) -> Sway:
@@ -266,16 +304,69 @@ class InertialIdentifier(Method):
         omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
         return Sway(frequency=omega, damping=self.roll_damping)
 
-    @property
-    def _delay(self) -> int | None:
-        """Samples by which a measured v_y is late; None where it is not looked at."""
-        return round(self.v_y_delay / self.dt) if self.reads_v_y else None
-
     def _limits(self) -> LearntLimits:
         b = self.bounds
-        of_sensors = {"steering": b.steering, "v_y_bias": b.v_y, **MOST}
+        of_sensors = {"steering": b.steering, **MOST}
         most = {"compliance": b.compliance, **of_sensors}
         return LearntLimits(**{name: inward(limit) for name, limit in most.items()})
+
+    @property
+    def _learnt(self) -> Learnt:
+        return Learnt(not self.held)
+
+    def _directions(self, W: Array) -> Array:
+        """Return by how much weights change with ln grip, then with ln stiffness, (4, n).
+
+        A curve φ(x) of another stiffness and the same grip changes by x dφ/dx, one of another grip
+        and the same stiffness by φ - x dφ/dx, as near as units come to it.
+        """
+        slip = np.linspace(0.0, REACH, 121)[1:]
+        T = unit_matrix(slip, self.ladder)
+        stiffer = slip[:, None] * ((1.0 - T * T) / np.array(self.ladder)) @ W.T
+        n = len(self.ladder)
+        damped = np.vstack([T, 1e-3 * np.eye(n)])
+        wanted = np.hstack([T @ W.T - stiffer, stiffer])
+        found = np.linalg.lstsq(damped, np.vstack([wanted, np.zeros((n, 4))]), rcond=None)[0]
+        return np.asarray(found.T, np.float64)
+
+    def _into(self, curves: Array, compliance: Array) -> Array:
+        """Return what steps of what is learnt move of each axle's [W, own], (2, n + 3, k)."""
+        n, names = len(self.ladder), self._learnt.names
+        E = np.zeros((2, n + 3, len(names)))
+        for k, name in enumerate(names):
+            if name == "grip":
+                E[:, :n, k] = curves[:2]
+            elif name in CURVES:
+                i = CURVES.index(name)
+                E[i % 2, :n, k] = curves[i]
+            elif name == "compliance":
+                E[:, n, k] = compliance
+            elif name == "steering":
+                E[0, n + 2, k] = 1.0
+        return E
+
+    def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
+        """Return the covariance of what is learnt of covariances of both axles' [W, own], (k, k).
+
+        The axles' doubts of their compliance are one.
+        """
+        names = self._learnt.names
+        size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
+        sensors = {
+            "bias": self.beliefs.bias,
+            "roll": self.beliefs.sd_roll,
+            "gyro": self.beliefs.gyro / size_ratio,
+        }
+        known = np.diag([sensors.get(name, 0.0) ** 2 for name in names])
+        if self.held:
+            known[0, 0] = self.beliefs.grip**2
+            return known
+        for E, one in zip(self._into(curves, compliance), P, strict=True):
+            back = np.linalg.pinv(E)
+            known += back @ one @ back.T
+        both = [k for k, name in enumerate(names) if name == "compliance"]
+        known[both, both] /= 2.0
+        return known
 
     def _prior_covariance(self, vehicle: Vehicle) -> Array:
         """Return the covariance of both axles before the first sample, (2, n + 3, n + 3)."""
@@ -299,42 +390,6 @@ class InertialIdentifier(Method):
             Track("force at saturation", "static load", W.sum(axis=2)),
         )
 
-    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return what rests at its bounds, to a hundredth: of curves, lags, sensors and inertia.
-
-        Parameters
-        ----------
-        state : W (2, n), own (2,) and sensors (5,).
-        """
-        del vehicle
-        b, W, own = self.bounds, state["W"], np.ravel(state["own"])
-        shown = dict(zip(SENSORS, map(float, np.ravel(state["sensors"])), strict=True))
-        zero, bias = shown["steering"], shown["v_y_bias"]
-        unexcited = "the drive has no such curve, or mass, signs or units are wrong"
-        late = "a sensor is late, or the tires are very soft"
-        listed = [
-            (abs(zero) > NEAR * b.steering,
-             Reached("front", "zero of the steering", zero, "rad", "a sensor is off", True)),
-            (abs(bias) > NEAR * b.v_y,
-             Reached(None, "bias of v_y", bias, "m/s", "its sensor is off", False)),
-        ]  # fmt: skip
-        for name, (title, unit, meaning, refuses) in AT_MOST.items():
-            value = shown[name]  # no roll at all is an acceleration in the plane of the road
-            rests = abs(value) > NEAR * MOST[name]
-            listed.append((rests, Reached(None, title, value, unit, meaning, refuses)))
-        slope = (W / np.array(self.ladder)).sum(axis=1)
-        for axle, soft, level, steep in zip(AXLES, own, W.sum(axis=1), slope, strict=True):
-            listed += [
-                (bool(soft > NEAR * b.compliance),  # none at all is a stiff tire
-                 Reached(axle, "compliance", float(soft), "m per load", late, False)),
-                (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
-                 Reached(axle, "grip", float(level), "static loads", unexcited, False)),
-                (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
-                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unexcited,
-                         True)),
-            ]  # fmt: skip
-        return tuple(one for rests, one in listed if rests)
-
     def beside_force(self, state: Mapping[str, Array]) -> Array:
         """Return bias and roll in what the accelerometer showed, (n,) [weights].
 
@@ -349,22 +404,24 @@ class InertialIdentifier(Method):
         return beside
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
-        """Return the model with the carried weights.
+        """Return the model with the carried weights: where tires are held, as sure as typical ones.
 
         Parameters
         ----------
         state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
         """
-        n = len(self.ladder)
         prior = self._prior_covariance(vehicle)
-        zeros = np.ravel(state["sensors"])[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]]
         own = np.zeros((2, 3))
-        own[:, 0], own[:, 2] = np.ravel(state["own"]), zeros
+        own[:, 0] = np.ravel(state["own"])
+        own[0, 2] = np.ravel(state["sensors"])[SENSORS.index("steering")]
         own[:, 1] = self.prior.sway_share
-        (P,) = unpacked(state["UD"].reshape(1, -1), size(n) - MOVING)
-        after = prior.copy()
-        for one, rows in zip(after, of_axles(n), strict=True):
-            one[_learnt_of_axle(n)] = P[np.ix_(rows, rows)]
+        (P,) = unpacked(state["UD"].reshape(1, -1), len(self._learnt.names))
+        after = np.empty_like(prior)
+        into = self._into(self._directions(state["W"]), own[:, 0])
+        for one, E, before in zip(after, into, prior, strict=True):
+            back = np.linalg.pinv(E)  # what weights tell of what is learnt
+            gain = before @ back.T @ np.linalg.pinv(back @ before @ back.T)
+            one[:] = before + gain @ (P - back @ before @ back.T) @ gain.T
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
@@ -379,12 +436,6 @@ class InertialIdentifier(Method):
         )
 
 
-def _learnt_of_axle(n: int) -> tuple[NDArray[np.intp], ...]:
-    """Return where in the covariance of [W, own] of an axle stands what `of_axles` lists of it."""
-    places = [*range(n + 1), n + 2]
-    return np.ix_(places, places)
-
-
 @cache
-def _scan(steps: tuple[int, ...], delay: int | None, *, pressed: bool) -> Scan:
-    return Scan(build_step(steps, delay, pressed=pressed), carry=CARRY, over=OVER)
+def _scan(steps: tuple[int, ...], *, tires: bool, pressed: bool) -> Scan:
+    return Scan(build_step(steps, tires=tires, pressed=pressed), carry=CARRY, over=OVER)

@@ -82,7 +82,6 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
 
 
 def measured(
-    z: list[Any],
     factors: Factors,
     h: Any,
     *,
@@ -91,22 +90,21 @@ def measured(
     clip: Any,
     counts: Any,
 ) -> tuple[list[Any], Factors]:
-    """Return z and its factors after one number is measured.
+    """Return what one number that is measured corrects of z, and the factors after it.
 
     Parameters
     ----------
-    z : before, q entries.
     h : gradient of what is measured, (1, q), sparse.
     innovation : ν, measured less expected.
     R : variance of the measurement, positive.
     clip : standard deviations from which an innovation counts no more than at them.
     counts : 1 where there is a measurement, else 0.
     """
-    row = [h[0, j] if h.has_nz(0, j) else ca.SX(0) for j in range(len(z))]
+    row = [h[0, j] if h.has_nz(0, j) else ca.SX(0) for j in range(len(factors.D))]
     direction = excited(factors, row, 0)
     per_S = 1 / (direction.a + R)
     surprise = innovation**2 * per_S
     share = clip / ca.sqrt(larger(surprise, clip**2))  # sqrt(clip²) is clip, to the last bit
     gain = counts * share * innovation * per_S
-    moved = [one + along * gain for one, along in zip(z, direction.v, strict=True)]
+    moved = [along * gain for along in direction.v]
     return moved, updated(factors, direction, counts * (1 / R))

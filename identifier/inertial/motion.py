@@ -1,20 +1,19 @@
 """The car between two samples, and what its sensors should show: all that the filter predicts.
 
-z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ, o]: what moves, then
-what is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static
-axle loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights
-of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad
-per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-], o bias
-of a sensor of v_y [m/s].
+z = [v_y, r, x_f, x_r, e_f, e_r, p; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r]: what moves, then the tires
+and the sensors. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force
+[static axle loads]; p sine of the bank, positive where it falls to the left; w weights of the
+units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad per g],
+δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s]. What is learnt of these are steps along
+a few directions (`Learnt`).
 
 f = λ φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s λ C(x),   λ = 1 + κ v_x² where the car has
 downforce (its own κ, of `Vehicle`), else 1,
 α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
-dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
-Shown: r + b_r,  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²,  and  v_y + o  where that is
-measured: ä [m/s²] is what the body rolls by, driven by the same forces, x_s and y_s where the
-accelerometer sits. A bank is in the equation of v_y and not in a_y: an accelerometer feels what
-tires push.
+dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (l_f F_f - l_r F_r)/I_z.
+Shown: r + b_r  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
+rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
+equation of v_y and not in a_y: an accelerometer feels what tires push.
 Everything is taken at the middle of the step: where forces and v_x r are half a sample apart, their
 difference is no v_y.
 """
@@ -27,10 +26,11 @@ import casadi as ca
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve, hidden_units, of_units
 from identifier.axle.slip import SHORTEST
-from models.vehicle import GRAVITY
+from identifier.motion.model import LEAST_GRIP
+from models.vehicle import GRAVITY, LIGHTEST
 
-MOVING = 8  # entries of z before those that are learnt
-SENSORS = ("bias", "roll", "steering", "gyro", "inertia", "v_y_bias")  # the last of these
+MOVING = 7  # entries of z before those that are learnt
+SENSORS = ("bias", "roll", "steering", "gyro")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 
@@ -42,49 +42,66 @@ class Unknowns(NamedTuple):
     slip: Any
     error: Any
     bank: Any
-    bank_rate: Any
     W: Any
     compliance: Any
     bias: Any
     roll: Any
     steering: Any
     gyro: Any
-    inertia: Any
-    v_y_bias: Any
 
 
 def size(n: int) -> int:
     """Return how many entries z has for n units."""
-    return MOVING + 2 * n + 8
+    return MOVING + 2 * n + 2 + len(SENSORS)
 
 
-def places(n: int) -> dict[str, int]:
-    """Return where in z each learnt number stands, by name; of W and compliance the first.
+class Learnt(NamedTuple):
+    """What is learnt of z beside what moves, in this order: steps along directions.
 
-    Parameters
-    ----------
-    n : number of units.
+    tires : along both directions of each curve, that of its stiffness and that of its grip, one
+        factor of both compliances, and the zero of the steering; else along that of the grip alone.
     """
-    rest = MOVING + 2 * n
-    names = ("compliance", "compliance_rear", *SENSORS)
-    return {"W": MOVING, "W_rear": MOVING + n} | {name: rest + i for i, name in enumerate(names)}
+
+    tires: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all of it."""
+        return (
+            *((*CURVES, "compliance", "steering") if self.tires else ("grip",)),
+            *("bias", "roll", "gyro"),
+        )
+
+    def into(self, n: int, curves: Any, compliance: Any) -> Any:
+        """Return what a step of what moves and of each of these moves of z, sparse.
+
+        Parameters
+        ----------
+        n : number of units.
+        curves : change of the weights by one of ln grip and of ln stiffness, (4, n): front and rear
+            of the first, then of the second.
+        compliance : of both axles that one of its factor adds, (2,).
+        """
+        E = ca.SX(size(n), MOVING + len(self.names))
+        E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
+        rest = MOVING + 2 * n
+        for column, name in enumerate(self.names, start=MOVING):
+            if name == "grip":
+                for axle in range(2):
+                    first = MOVING + axle * n
+                    E[first : first + n, column] = curves[axle, :].T
+            elif name in CURVES:
+                axle = CURVES.index(name) % 2
+                first = MOVING + axle * n
+                E[first : first + n, column] = curves[CURVES.index(name), :].T
+            elif name == "compliance":
+                E[rest : rest + 2, column] = compliance
+            else:
+                E[rest + 2 + SENSORS.index(name), column] = 1
+        return E
 
 
-def of_axles(n: int) -> tuple[list[int], list[int]]:
-    """Return where among what is learnt the numbers of each axle's model stand, front and rear.
-
-    Weights and compliance, then the zero of the steering in front and the bias of v_y at the rear.
-
-    Parameters
-    ----------
-    n : number of units.
-    """
-    at = {name: place - MOVING for name, place in places(n).items()}
-    front, rear = (list(range(at[W], at[W] + n)) for W in ("W", "W_rear"))
-    return (
-        [*front, at["compliance"], at["steering"]],
-        [*rear, at["compliance_rear"], at["v_y_bias"]],
-    )
+CURVES = ("grip_f", "grip_r", "stiffness_f", "stiffness_r")
 
 
 def unknowns(z: Any, n: int) -> Unknowns:
@@ -102,15 +119,12 @@ def unknowns(z: Any, n: int) -> Unknowns:
         slip=z[2:4],
         error=z[4:6],
         bank=z[6],
-        bank_rate=z[7],
         W=ca.vertcat(z[m : m + n].T, z[m + n : k].T),
         compliance=z[k : k + 2],
         bias=z[k + 2],
         roll=z[k + 3],
         steering=z[k + 4],
         gyro=z[k + 5],
-        inertia=z[k + 6],
-        v_y_bias=z[k + 7],
     )
 
 
@@ -125,6 +139,35 @@ def static_load(v_x: Any) -> Any:
     return ca.SX.ones(2)
 
 
+class Along(NamedTuple):
+    """How a_x changes lateral forces: load that g moves to each axle [-]; what braking and power
+    take of the friction circle [1/g], each of both axles; drag over the mass [1/m].
+    """
+
+    load_f: Any
+    load_r: Any
+    brake_f: Any
+    brake_r: Any
+    drive_f: Any
+    drive_r: Any
+    drag: Any
+
+    def moved(self, load: Load, a_x: Any, v_x: Any) -> Any:
+        """Return what forces are multiplied with (2,) [-].
+
+        Parameters
+        ----------
+        load : without a_x.
+        a_x : [m/s²].
+        """
+        f = (a_x + self.drag * v_x**2) * (1 / GRAVITY)
+        drives = f > 0
+        pairs = ((self.brake_f, self.drive_f), (self.brake_r, self.drive_r))
+        use = ca.vertcat(*(f * ca.if_else(drives, drive, brake) for brake, drive in pairs))
+        left = ca.sqrt(ca.fmax(1 - use * use, LEAST_GRIP))
+        return ca.fmax(load(v_x) + f * ca.vertcat(self.load_f, self.load_r), LIGHTEST) * left
+
+
 class Sample(NamedTuple):
     """v_x [m/s] and δ (2,) [rad] at a sample."""
 
@@ -136,17 +179,17 @@ class Laws(NamedTuple):
     """What the motion obeys beside the car: decay of e over a step [-], stiffness and damping of
     the bank [1/s²], [1/s]; stiffness and damping of the roll [1/s²], [1/s]; share of its rate that
     moves the contact patches, over the stiffness [s²]; place of the accelerometer before and left
-    of the center of gravity [m].
+    of the center of gravity [m]; by how much a_y is late [s].
     """
 
     forgets: Any
-    bank_stiffness: Any
-    bank_damping: Any
+    bank: Any
     roll_stiffness: Any
     roll_damping: Any
     sway: Any
     ahead: Any
     aside: Any
+    late: Any
 
 
 class Way:
@@ -288,7 +331,7 @@ def predicted(
     cos_delta = cosine(now.delta)
     slope = way.held(at.slope)
     force = way.by((at.force + slope * (slip - z.slip) / 2) * cos_delta + z.error)
-    arm, turn = car.arm, turning(car) * (1 + z.inertia)
+    arm, turn = car.arm, turning(car)
     push = GRAVITY * car.share
     pull = way.held(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))  # force per change of v_y
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
@@ -300,12 +343,11 @@ def predicted(
     r = way.by(z.r + (m11 * b - m21 * a) * per)
     alpha = slip_angle(now, way.by(v_y + car.arm * r), z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
-    bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
     rolling, rate = tilt
     rate = (rate + dt * laws.roll_stiffness * (ca.dot(push, force) - rolling)) / (
         1 + dt * laws.roll_damping + dt**2 * laws.roll_stiffness
     )
-    moving = ca.vertcat(v_y, r, slip, laws.forgets * z.error, z.bank + dt * z.bank_rate, bank_rate)
+    moving = ca.vertcat(v_y, r, slip, laws.forgets * z.error, laws.bank * z.bank)
     force_rate = at.slope * (slip - z.slip) / dt
     numbers = [moving, alpha, rolling + dt * rate, rate, force_rate]
     moved, alpha, tilting, rate, force_rate = way.valued(numbers)
@@ -346,5 +388,5 @@ def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) 
     """
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
-    a_y += laws.ahead * (1 + z.inertia) * ca.dot(turning(car), force) - laws.aside * z.r**2
+    a_y += laws.ahead * ca.dot(turning(car), force) - laws.aside * z.r**2
     return Shown(z.r + z.gyro, a_y, force)

@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from identifier.methods import LIVE, continuing
+from identifier.methods import LIVE, WITHOUT_V_Y, continuing
 from models.rules import require_within
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
@@ -47,10 +47,11 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
     start = shared.stored_model(options.weights)
     vehicle = shared.car_of(options, start, options.weights)
-    if start is None or shared.method_is_given(options):
+    v_y = options.method != WITHOUT_V_Y
+    if start is None or (v_y and shared.method_is_given(options)):
         method = shared.chosen_method(options, vehicle, online=True).method
     else:  # the one that goes on from the model
-        method = continuing(start, vehicle)
+        method = continuing(start, vehicle, v_y=v_y)
     exported = export(
         method,
         options.out,

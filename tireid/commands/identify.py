@@ -9,7 +9,6 @@ import numpy as np
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
-from identifier.methods import DEFAULT, usual
 from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
@@ -97,7 +96,6 @@ def run(options: argparse.Namespace) -> int:
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
     if without_v_y:
-        beside = beside or usual(recording) != DEFAULT
         law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True, online=beside)
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     for one in (*logs, *others):

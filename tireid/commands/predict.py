@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     prediction = replay(recording, model)
     recording = prediction.recording
     if recording.estimated:
-        say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
+        say(f"{recording.name}: vy is estimated, beginning with the tires of the model")
     verdict = prediction.verdict
     facts, friction = Facts.of(prediction), verdict.friction
     with output.output_folder(options.out, force=options.force) as folder:

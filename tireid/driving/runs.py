@@ -91,9 +91,10 @@ def friction_now(friction: Friction, measured: Measured) -> float:
 
 
 def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
-    """Return what tells v_y where no sensor shows it, and learns the tires for it."""
-    method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
-    start = learnt if learnt is not None and method.resumes(learnt) else None
+    """Return what estimates v_y where no sensor shows it, on the tires of a fit or while it learns
+    them.
+    """
+    method, start = InertialIdentifier.beginning_with(learnt, vehicle, dt=PERIOD)
     return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
 
 

@@ -19,7 +19,6 @@ from identifier.estimate.latent import (
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import Priors
-from identifier.methods import usual
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
 from models.maneuvers import RandomSteer
@@ -227,7 +226,7 @@ def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused
     assert ("side_slip_unknown" in codes) == refused
 
 
-def test_of_a_long_log_the_hardest_part_teaches_and_of_hours_the_recursion_tells():
+def test_of_a_long_log_the_hardest_part_teaches():
     n = 40_000
     t = 0.1 * np.arange(n)
     r = np.where((t > 1000.0) & (t < 1300.0), 0.3, 0.01) * np.sin(0.5 * t)
@@ -238,5 +237,3 @@ def test_of_a_long_log_the_hardest_part_teaches_and_of_hours_the_recursion_tells
     part = hardest(log, 300.0)
     assert part.stop - part.start == 3000 and abs(t[part.start] - 1000.0) < 10.0
     assert hardest(log.between(0.0, 100.0), 300.0) == slice(0, len(log.between(0.0, 100.0)))
-    assert usual(log) == "inertial" and usual(log.between(0.0, 3500.0)) == "fit"
-    assert usual(replace(log, v_y=0.1 * r)) == "fit"

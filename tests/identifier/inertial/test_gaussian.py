@@ -78,11 +78,10 @@ def test_what_is_learnt_keeps_the_bits_of_its_factors_over_a_step(P, rng):
 
 
 def corrected(P, h, *, innovation=0.7, R=0.3, clip=100.0, counts=1):
-    """z and P after a measurement that begins at z = 0."""
+    """By what a measurement corrects z, and P after it."""
 
     def after(symbols):
         z, factors = measured(
-            [ca.SX(0)] * Q,
             factors_of(symbols, Q),
             ca.sparsify(ca.SX(ca.DM(h[None]))),
             innovation=innovation,
@@ -130,7 +129,7 @@ def test_nothing_is_divided_by_zero_where_nothing_surprises():
     """The slope of z over the innovation is the gain, also at none and up to the clip."""
     innovation, h = ca.SX.sym("nu"), ca.sparsify(ca.SX(ca.DM([[1.0] + [0.0] * (Q - 1)])))
     factors = factors_of(ca.vertsplit(ca.SX(ca.DM(packed(np.eye(Q)[None])[0]))), Q)
-    z, _ = measured([ca.SX(0)] * Q, factors, h, innovation=innovation, R=1.0, clip=3.0, counts=1)
+    z, _ = measured(factors, h, innovation=innovation, R=1.0, clip=3.0, counts=1)
     slope = ca.Function("slope", [innovation], [ca.jacobian(z[0], innovation)])
     assert [float(slope(nu)) for nu in (0.0, 1.0, -4.2)] == pytest.approx([0.5] * 3)
     assert float(slope(4.3)) == pytest.approx(0.0, abs=1e-12)
