@@ -198,7 +198,7 @@ class InertialIdentifier(Method):
         del vehicle, driving
         b = self.bounds
         return Certificate(
-            held={
+            limits={
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
                 "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],

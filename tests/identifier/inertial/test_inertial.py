@@ -307,7 +307,7 @@ def test_bounds_hold_whatever_is_measured(banked):
     assert grip.max() <= b.most_grip
     assert b.least_stiffness <= slope.min()
     assert slope.max() <= b.most_stiffness
-    held, sensors = METHOD.certify(CAR).held, state["sensors"].reshape(-1, 4).T
+    held, sensors = METHOD.certify(CAR).limits, state["sensors"].reshape(-1, 4).T
     for name, values in (
         ("compliance_m", state["own"]),
         ("a_y_offset_g", sensors[0]),
