@@ -63,7 +63,7 @@ def prose(path: Path) -> str:
         cells = json.loads(page)["cells"]
         page = "\n\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "markdown")
     if path.suffix == ".toml":
-        page = re.sub(r"^(# )?\w+ =", "", page, flags=re.M)
+        page = re.sub(r"^(# )?\w+ =", "\n", page.replace('"', ""), flags=re.M)
     page = re.sub(r"^```.*?^```$|<!--.*?-->", "", page, flags=re.S | re.M)
     return re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "code", page))
 
