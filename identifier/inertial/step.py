@@ -82,7 +82,7 @@ PORTS = (
         "UD",
         "-; -; -; rad; g; rad per g; rad/s",
         "covariance U D U' of ln grip and ln stiffness of both curves, a factor of both "
-        "compliances and sensors, where they are learnt: D, and U above it, by rows",
+        "compliances and sensors, where they are estimated: D, and U above it, by rows",
         learnt=True,
         rule=FACTORS,
     ),
