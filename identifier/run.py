@@ -189,7 +189,8 @@ class History:
         if self.online:
             raise ValueError("an online run is beside another drive as of identify")
         model = self.freeze(t)
-        recording, outputs = _with_v_y(recording.as_logged(), model)
+        known = self.design.reads(recording.as_logged(), self.vehicle)
+        recording, outputs = _with_v_y(known, model)
         force = model.axle_force(recording)
         return replace(
             self,
@@ -204,9 +205,9 @@ class History:
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
-            if one.v_y is None:
+            if one.v_y is None or self.design.whole:
                 v_y = self.recording.needed("v_y")[first:end]
-                one = replace(one, v_y=v_y, estimated=("v_y",))
+                one = replace(one, v_y=v_y, estimated=self.recording.estimated)
             state, outputs = self.state, self.outputs
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)
@@ -277,7 +278,7 @@ def identify(
     RecordingError
         Where the method needs v_y or a_y and the recording has none.
     """
-    recording = recording.as_logged()
+    recording = design.reads(recording.as_logged(), vehicle)
     check_recording(recording, design)
     if design.whole:
         model = design.fitted(recording, vehicle, start, progress=progress)
@@ -366,7 +367,7 @@ def learn(
     RecordingError
         Where the method needs v_y or a_y and the recording has none.
     """
-    recording = recording.as_logged()
+    recording = design.reads(recording.as_logged(), vehicle)
     check_recording(recording, design)
     n = len(recording) if t is None else state_index(recording, t)
     if design.whole:
