@@ -31,8 +31,8 @@ import numpy as np
 from codegen.compiler import CompilationError
 from identifier.compare.work import Map, fresh_processes
 from identifier.estimate.fit import fit
-from identifier.estimate.poor import on_time
 from identifier.estimate.model import FittedModel
+from identifier.estimate.poor import on_time
 from identifier.estimate.priors import Priors
 from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier

@@ -1,4 +1,4 @@
-"""A v_y that comes rarely, late or noisy is as good as a good one, and a good one stays as it is."""
+"""A v_y that is rare, late or noisy teaches as a good one, and a good one stays as it is."""
 
 from dataclasses import replace
 
