@@ -69,6 +69,8 @@ class Trust:
     observable : largest standard deviation of side slip that is observed [rad].
     usual : mean of the squared residuals of a node, over their weights, from which covariances are
         those of the likelihood [-]; where more is left, they grow likewise.
+    lasting : times by which drives tell less of parameters than their likelihood says [-]: what
+        curves and roads miss lasts as long as a corner, and does not average out.
     """
 
     error: float = 0.01
@@ -89,7 +91,7 @@ class Trust:
     parted: float = 0.0035
     observable: float = 0.01
     usual: float = 0.25
-    lasting: float = 1.0
+    lasting: float = 2.0
 
 
 TRUST = Trust()

@@ -19,6 +19,7 @@ from identifier.estimate.latent import (
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import Priors
+from identifier.estimate.solve import around_beliefs
 from identifier.methods import usual
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
@@ -109,10 +110,32 @@ def test_the_step_is_that_of_the_dense_matrix(problem, place):
     if not bounded:
         np.testing.assert_allclose(dp, step[n:], rtol=1e-4, atol=1e-6)
         np.testing.assert_allclose(dz.ravel(), step[:n], rtol=1e-3, atol=1e-6)
-    own, P, slopes, _ = problem.spread(z, p, problem.R)
+    exactly = Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=1.0))
+    own, P, slopes, _ = exactly.spread(z, p, problem.R)
     inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
     whole = own[:, 0, 0] + np.einsum("ni,ij,nj->n", slopes, P, slopes)
     np.testing.assert_allclose(whole, np.diag(inverse)[: z.size : 8], rtol=1e-3)
+
+
+def test_what_a_drive_tells_counts_less_and_what_is_believed_does_not(problem, place):
+    z, p, _ = place
+    told = []
+    for lasting in (1.0, 2.0, 4.0):
+        one = Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=lasting))
+        told.append(np.linalg.inv(one.spread(z, p, problem.R)[1]))
+    believed = around_beliefs(problem.priors, p)[1][np.ix_(problem.index, problem.index)]
+    shares = [(one - believed) / np.abs(np.diag(told[0])).max() for one in told]
+    np.testing.assert_allclose(shares[1], shares[0] / 2.0, atol=1e-9)
+    np.testing.assert_allclose(shares[2], shares[0] / 4.0, atol=1e-9)
+    assert np.abs(shares[0]).max() > 1e-3
+    assert TRUST.lasting > 1.0
+
+
+def test_more_is_left_of_a_delay_that_was_taken_out():
+    delay = LATENT_NAMES.index("a_y_delay")
+    on_time, late = (latent_priors(CAR, Priors.of(CAR), one) for one in (False, True))
+    sd = [one.information[delay, delay] ** -0.5 for one in (on_time, late)]
+    assert sd == pytest.approx([0.0007, 0.01], rel=0.05)
 
 
 def test_parameters_that_are_held_leave_their_doubt(problem, place):
