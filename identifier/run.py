@@ -205,9 +205,10 @@ class History:
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
-            if one.v_y is None or self.design.whole:
-                v_y = self.recording.needed("v_y")[first:end]
-                one = replace(one, v_y=v_y, estimated=self.recording.estimated)
+            whole = self.recording
+            if one.v_y is None or (self.design.whole and not whole.estimated):
+                v_y = whole.needed("v_y")[first:end]
+                one = replace(one, v_y=v_y, estimated=whole.estimated)
             state, outputs = self.state, self.outputs
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)

@@ -106,8 +106,11 @@ def test_a_single_wrong_value_does_not_move_it(log):
 def test_a_drive_of_two_pieces_is_two_problems(log):
     pieces = [log.between(0.0, 9.0), driven(5).between(3.0, 12.0)]
     exact = joined(pieces)
-    found = on_time(joined([received(one) for one in pieces]), CAR)
+    shown = [received(one) for one in pieces]
+    found = on_time(joined(shown), CAR)
     assert np.std(found.v_y - exact.v_y) < 0.05
+    parts = ti.identify(joined(shown), CAR, check=False).history.parts(shown)
+    np.testing.assert_array_equal(np.concatenate([one.recording.v_y for one in parts]), found.v_y)
 
 
 def test_banded_algebra_gives_the_least_squares(log):
