@@ -1,13 +1,15 @@
-"""Logs without v_y, as a user gives them to `ti.identify`: side slip, frozen tires, honesty.
+"""Logs without v_y or with a poor one, as a user gives them to `ti.identify`.
 
     python -m benchmarks.latent [--record] [--only PART ...] [--cars N]
 
-Side slip is judged by the true v_y, which nobody is shown, rms in degrees over all samples; frozen
-force by the true one, in percent of its rms, both axles together, beside that of the default
-learning with v_y. Random cars of four classes: half of the drives on banked roads, half under a
-driver who brakes and pulls on banked roads too, so that forces are missed for as long as a corner
-lasts. Sensors have noise, bias and lateness; the body rolls. Then CarMaker, also with an a_y that
-was smoothed, and a real race car whose stiffness is told in two ways. Recordings are those of
+Without v_y side slip is judged by the true v_y, which nobody is shown, rms in degrees over all
+samples; frozen force by the true one, in percent of its rms, both axles together, beside that of
+the default learning with v_y. Random cars of four classes: half of the drives on banked roads, half
+under a driver who brakes and pulls on banked roads too, so that forces are missed for as long as a
+corner lasts. Sensors have noise, bias and lateness; the body rolls. Then CarMaker, also with an a_y
+that was smoothed, and a real race car whose stiffness is told in two ways. A poor v_y is that of a
+satellite receiver (10 Hz, 150 ms late, twice without reception), or it is noisy, or biased: frozen
+force on exact signals, with the same bias, over that of a good v_y. Recordings are those of
 `recorded_cars`.
 """
 
@@ -51,7 +53,10 @@ DRAWS = 40
 SMOOTH = (5.0, 2.0)  # Hz
 TOLD = {"66/105": (66e3, 105e3), "150/150": (150e3, 150e3)}  # N/rad
 OF_DART = ("ramp_steerneg025", "rubber_12_37_59", "tape_tiles_steer_neg03")
-PARTS = ("random", "carmaker", "smoothed", "ferrari", "dart")
+POOR = {"receiver": 0.01, "noise/0.05": 0.05, "noise/0.1": 0.1, "bias/0.3": 0.3}  # [m/s], sedan
+RECEIVED, RECEIVED_LATE, LOST = 0.1, 0.15, (1.0, 3.0)  # s
+REPEATED = 3  # draws of noise on a recording
+PARTS = ("random", "poor", "carmaker", "smoothed", "ferrari", "dart")
 
 
 class Answer(NamedTuple):
@@ -208,6 +213,86 @@ def random_drives(targets: Targets, cars: int) -> None:
     targets.at_most("valid above 20 %", wrong, 0, "", key="cars/wrong")
 
 
+def poor_v_y(kind: str, good: Array, exact: Recording, size: float, seed: int) -> Array:
+    """Return a v_y that is poor in one way, (n,) [m/s].
+
+    Parameters
+    ----------
+    kind : of `POOR`.
+    good : of a good sensor (n,) [m/s].
+    exact : the truth.
+    size : root of the wheelbase over 2.7 m.
+    """
+    rng, much, n = np.random.default_rng([seed, 11]), POOR[kind] * size, len(exact)
+    if kind.startswith("bias"):
+        return good + much
+    true = exact.needed("v_y")
+    if kind.startswith("noise"):
+        return true + much * rng.normal(size=n)
+    told = np.interp(exact.t - RECEIVED_LATE, exact.t, true) + much * rng.normal(size=n)
+    at = np.arange(n) // round(RECEIVED / exact.dt) * round(RECEIVED / exact.dt)
+    for _ in range(2):
+        lost = rng.uniform(LEAD, exact.duration - 5.0) / exact.dt
+        inside = (at > lost) & (at < lost + rng.uniform(*LOST) / exact.dt)
+        at = np.where(inside, at[np.searchsorted(at, lost, side="right") - 1], at)
+    return told[at]
+
+
+def over_good(
+    shown: Recording, exact: Recording, car: Vehicle, slowest: float, asked: Recording, seed: int
+) -> dict[str, tuple[float, float, bool]]:
+    """Return what is missed with each poor v_y, and with a good one [%], and wrong verdicts.
+
+    A biased sensor is asked at its own speed, since at one speed nobody tells it from a turned one.
+
+    Parameters
+    ----------
+    shown, exact, asked : as of `answer`, v_y in all of them.
+    """
+    size, good = math.sqrt(car.wheelbase / 2.7), shown.needed("v_y")
+    best, found = ti.identify(shown, car, check=False), {}
+    for kind in POOR:
+        v_y = poor_v_y(kind, good, exact, size, seed)
+        run = ti.identify(replace(shown, v_y=v_y), car, check=False)
+        biased = kind.startswith("bias")
+        other = exact if biased else asked
+        off = POOR[kind] * size * biased
+        missed = force_missed(run, replace(other, v_y=other.needed("v_y") + off), slowest)
+        with_good = force_missed(best, other, slowest)
+        found[kind] = missed, with_good, run.verdict.valid and missed > 20.0
+    return found
+
+
+def poor(targets: Targets, cars: int) -> None:
+    """Judge a poor v_y against a good one."""
+    kinds, of_cars = list(CLASSES), []
+    for k in range(cars):
+        drive = (banked_drive, pulled_drive)[k // len(kinds) % 2](
+            kinds[k % len(kinds)], FIRST_SEED + k
+        )
+        slowest = 0.5 * drive.told.froude_speed
+        of_cars.append(over_good(drive.shown, drive.exact, drive.told, slowest, drive.exact, k))
+    wrong = sum(bad for one in of_cars for *_, bad in one.values())
+    for kind in POOR:
+        ratio = float(np.median([one[kind][0] / one[kind][1] for one in of_cars]))
+        label = f"random cars, {kind}, force over a good v_y, median"
+        targets.at_most(label, ratio, 1.3, "-", key=f"poor/cars/{kind}")
+    if DATA.is_dir():
+        runs = [read_recording(DATA / "carmaker.csv.gz", run=name) for name in CARMAKER_RUNS]
+        found = [
+            over_good(one, one, CARMAKER, 1.0, other, seed)
+            for one, other in (runs, runs[::-1])
+            for seed in range(REPEATED)
+        ]
+        wrong += sum(bad for one in found for *_, bad in one.values())
+        for kind in POOR:
+            missed, with_good = (float(np.mean([one[kind][k] for one in found])) for k in (0, 1))
+            targets.record(f"poor/carmaker/{kind}/missed", missed, "%")
+            ratio, label = missed / with_good, f"CarMaker, {kind}, force over a good v_y, of means"
+            targets.at_most(label, ratio, 1.3, "-", key=f"poor/carmaker/{kind}")
+    targets.at_most("poor v_y, valid above 20 %", wrong, 0, "", key="poor/wrong")
+
+
 def carmaker(targets: Targets) -> None:
     """Judge both runs of CarMaker, frozen force on the other."""
     runs = [read_recording(DATA / "carmaker.csv.gz", run=name) for name in CARMAKER_RUNS]
@@ -279,6 +364,8 @@ def main() -> int:
     targets, there = Targets("latent"), DATA.is_dir()
     if "random" in options.only:
         random_drives(targets, options.cars)
+    if "poor" in options.only:
+        poor(targets, options.cars)
     for name, part in (
         *(("carmaker", carmaker), ("smoothed", smoothed)),
         *(("ferrari", ferrari), ("dart", dart)),

@@ -127,6 +127,11 @@ class Method(ABC):
         """What a table of methods must say of it beside its name; empty: nothing."""
         return ""
 
+    def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:
+        """Return a log as the method reads it; a whole one may be read better than its samples."""
+        del vehicle
+        return recording
+
     @property
     def whole(self) -> bool:
         """Whether it learns from a whole log at once, by `fitted`, and has no step."""

@@ -153,7 +153,8 @@ class History:
         if self.online:
             raise ValueError("an online run cannot be compared with another drive of identify")
         model = self.freeze(t)
-        recording, outputs = _with_v_y(recording.as_logged(), model)
+        known = self.design.reads(recording.as_logged(), self.vehicle)
+        recording, outputs = _with_v_y(known, model)
         force = model.axle_force(recording)
         return replace(
             self,
@@ -168,9 +169,10 @@ class History:
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
-            if one.v_y is None:
-                v_y = self.recording.needed("v_y")[first:end]
-                one = replace(one, v_y=v_y, estimated=("v_y",))
+            whole = self.recording
+            if one.v_y is None or (self.design.whole and not whole.estimated):
+                v_y = whole.needed("v_y")[first:end]
+                one = replace(one, v_y=v_y, estimated=whole.estimated)
             state, outputs = self.state, self.outputs
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)
@@ -224,7 +226,7 @@ def identify(
     start : stored weights to begin with; None begins afresh.
     progress : called now and then with the share that is done, 0 to 1.
     """
-    recording = recording.as_logged()
+    recording = design.reads(recording.as_logged(), vehicle)
     check_recording(recording, design)
     if design.whole:
         model = design.fitted(recording, vehicle, start, progress=progress)
@@ -300,7 +302,7 @@ def learn(
 
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
-    recording = recording.as_logged()
+    recording = design.reads(recording.as_logged(), vehicle)
     check_recording(recording, design)
     n = len(recording) if t is None else state_index(recording, t)
     if design.whole:

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from identifier.doctor import diagnose
 from identifier.estimate.method import FitMethod
+from identifier.estimate.model import FittedModel
+from identifier.estimate.poor import on_time
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.methods import make_method
@@ -83,6 +85,8 @@ def identify(
                 log.warning("%s: %s", recording.name, finding.text, extra=said)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
     history = run_over(recording, vehicle, design, start, progress=progress)
+    for note in history.recording.notes[len(recording.notes) :]:  # of a poor v_y
+        log.warning("%s: %s", recording.name, note)
     if history.diverged_at is not None:
         at = freeze_key(history.diverged_at)
         law = getattr(design, "law", type(design).__name__)
@@ -115,6 +119,8 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     """Return a drive with its v_y, or with that which the tires or a filter tell.
 
+    For tires of a fit a v_y that is rare or noisy is brought on time, as the fit reads it.
+
     Parameters
     ----------
     tire : where it tells no v_y, the inertial identifier does, beginning with it where it can.
@@ -125,7 +131,7 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
         Where there is no a_y to estimate from.
     """
     if recording.v_y is not None:
-        return recording
+        return on_time(recording, tire.vehicle) if isinstance(tire, FittedModel) else recording
     found = tire.estimated_v_y(recording)
     if found is not None:
         return replace(recording, v_y=found.v_y, estimated=("v_y",))

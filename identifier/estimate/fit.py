@@ -106,7 +106,7 @@ def fit(
         nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=own)
         late = max(late, own, key=abs)
         if nodes.counts.any():
-            learnt = learn_latent(nodes, vehicle, beliefs)
+            learnt = learn_latent(nodes, vehicle, beliefs, late=own != 0.0)
             found, parted = learnt.posterior, max(parted, learnt.parted)
             reach = reach.with_(Reach.of_states(learnt))
             beliefs = _after(beliefs, found)

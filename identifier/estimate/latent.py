@@ -1,4 +1,4 @@
-"""The estimate where no sensor shows v_y well: full information, v_y a state at every node.
+"""The estimate where no sensor shows v_y: full information, v_y a state at every node.
 
 Minimized over the states z_k of all nodes and the parameters p (`motion.nodes`):
 Σ |moves(z_k, z_k+1, p)|²/Q + Σ ρ(|y_k - shows(z_k, p)|²/R) + Σ |begins(z, p)|²/P + prior(p),
@@ -12,7 +12,6 @@ what is left of all of it, which is more on a real car than on a simulated one.
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -37,8 +36,11 @@ GYRO, INERTIA = 0.002, 0.007  # sd of the bias of r of a sedan [rad/s], and of l
 AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
 BLOCK, BESIDE = 600.0, 5.0  # [s] that are smoothed at once, and what is so beside them
 ASKED = 60.0  # [s] that are asked for a late a_y
-DELAYS, GAINED = 0.04, 8.0  # [s] between delays that are tried, of a sedan; nats that one gains,
-# more where more is left (`Trust.usual`)
+ANY_DELAY, MOST_LATE, SMALL = 0.1, 0.3, 0.003  # [s] of a sedan: sd of a delay that is looked for,
+# largest, and one that does not matter
+LOOKS = 4  # at a delay
+LEFT_LATE = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
+GAINED = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
 ALIKE = 1e-4  # probability from which another start's end counts
 STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
 FIRM, FEW = 50.0, 8  # times that beliefs count at first, and iterations of all but the last
@@ -59,14 +61,16 @@ class Trust:
     push, turn : what no tire pushes: v_y [sqrt(g L)/sqrt(s)], r [(g/L)^(3/4)].
     lag : of lagged slip, from node to node [rad].
     side_slip : at the first node [rad].
-    r, a_y, v_y : what no noise explains of sensors [rad/s], [m/s²], [m/s].
+    r, a_y : what no noise explains of sensors [rad/s], [m/s²].
     a_y_share : the same of a_y over it [-].
-    r_noise, a_y_noise, v_y_noise : noise before it is learnt, in the same units.
+    r_noise, a_y_noise : noise before it is learnt, in the same units.
     clip : standard deviations from which a residual counts less.
     parted : side slip by which two starts may part [rad].
     observable : largest standard deviation of side slip that is observed [rad].
     usual : mean of the squared residuals of a node, over their weights, from which covariances are
         those of the likelihood [-]; where more is left, they grow likewise.
+    lasting : times by which drives tell less of parameters than their likelihood says [-]: what
+        curves and roads miss lasts as long as a corner, and does not average out.
     """
 
     error: float = 0.01
@@ -80,15 +84,14 @@ class Trust:
     side_slip: float = 0.1
     r: float = 0.003
     a_y: float = 0.2
-    v_y: float = 0.01
     a_y_share: float = 0.04
     r_noise: float = 0.003
     a_y_noise: float = 0.2
-    v_y_noise: float = 0.05
     clip: float = 3.0
     parted: float = 0.0035
     observable: float = 0.01
     usual: float = 0.25
+    lasting: float = 2.0
 
 
 TRUST = Trust()
@@ -118,7 +121,7 @@ class Around(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Smoothed:
-    """States (n, 8) and all parameters (p + 4,) at an optimum, its cost J [nats], R (3,), and
+    """States (n, 8) and all parameters (p + 4,) at an optimum, its cost J [nats], R (2,), and
     covariances: of the states alone (n, 8, 8), of the parameters that move (m, m); dz/dp of v_y
     (n, m).
     """
@@ -132,17 +135,17 @@ class Smoothed:
     slopes: Array
 
 
-def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Priors:
+def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Priors:
     """Return beliefs with those of the accelerometer behind, and of yaw rate and inertia.
 
     Parameters
     ----------
     beliefs : of the car, of one of these, or of a log that came before.
-    v_y : whether a sensor shows v_y, whose errors are looked for.
+    late : whether a delay of a_y was found and taken out, so that more of it may be left.
     """
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
     information, moves = beliefs.information.copy(), beliefs.moves.copy()
-    fixed = [INDEX[name] for name in ("ln_sway", *(() if v_y else OF_V_Y))]
+    fixed = [INDEX[name] for name in ("ln_sway", *OF_V_Y)]
     information[fixed], information[:, fixed], moves[fixed] = 0.0, 0.0, False
     mean, bias, inertia = beliefs.mean.copy(), INDEX["r_bias"], INDEX["ln_inertia"]
     mean[INDEX["ln_sway"]] = 0.0  # as the sway that the nodes are given
@@ -151,6 +154,8 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, v_y: bool = False) -> Prior
     if not moves[inertia]:
         information[inertia, inertia], moves[inertia] = INERTIA**-2, True
     felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
+    if late:
+        felt[list(FELT).index("a_y_delay")] = LEFT_LATE * scale
     whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
     whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
@@ -193,9 +198,9 @@ class Latent:
         s, L = float(np.sqrt(vehicle.wheelbase / SEDAN)), vehicle.wheelbase
         self.scale = s
         self._times = np.array([trust.error_time * s, trust.bank_time * s])
-        per = np.array([1.0 / s, 1.0, s])
-        self._floor = per * (trust.r, trust.a_y, trust.v_y)
-        self.R = (per * (trust.r_noise, trust.a_y_noise, trust.v_y_noise)) ** 2
+        per = np.array([1.0 / s, 1.0])
+        self._floor = per * (trust.r, trust.a_y)
+        self.R = (per * (trust.r_noise, trust.a_y_noise)) ** 2
         dt, (T_e, T_p) = nodes.dt, self._times
         self._kept = np.exp(-dt / T_e)
         self._sd = np.array(
@@ -221,6 +226,12 @@ class Latent:
                 },
             )
 
+    def variance(self, R: Array) -> Array:
+        """Return the variance of what sensors show, (n, 2)."""
+        found = np.tile(R + self._floor**2, (len(self.nodes.t), 1))
+        found[:, 1] += (self.trust.a_y_share * self.nodes.given[:, 5]) ** 2
+        return found
+
     def weights(self, z: Array, p: Array, R: Array) -> dict[str, Array]:
         """Return the weights of what is missed, by port of `node_scan`."""
         nodes, t = self.nodes, self.trust
@@ -229,10 +240,9 @@ class Latent:
         sd = np.tile(self._sd, (len(z), 1))
         between = (phi + _next(phi)) / 2
         sd[:, 4:6] = (t.error + t.relative * between) * np.sqrt(1.0 - self._kept**2)
-        variance = np.tile(R + self._floor**2, (len(z), 1))
-        variance[:, 1] += (t.a_y_share * nodes.given[:, 5]) ** 2
+        variance = self.variance(R)
         off = np.abs(nodes.measured - out["shows"]) / np.sqrt(variance)
-        counts = nodes.counts[:, None] & np.isfinite(nodes.measured)
+        counts = nodes.counts[:, None]
         first = np.column_stack(
             [
                 t.side_slip * nodes.given[:, 0],
@@ -255,18 +265,30 @@ class Latent:
         total = self.misfit(z, p, weights) + beliefs_cost(self.priors, p)
         return float(np.nan_to_num(total, nan=np.inf))
 
+    def value(self, z: Array, p: Array, R: Array) -> float:
+        """Return J with Huber's loss, by which optima are compared [nats].
+
+        A residual of o > c deviations has the weight c/o in `cost`, in which c o/2 is left of
+        c o - c²/2.
+        """
+        weights = self.weights(z, p, R)
+        share = weights["of_shows"] * self.variance(R)
+        clipped = share[(share > 0.0) & (share < 1.0)]
+        lost = 0.5 * self.trust.clip**2 * float(np.sum(1.0 / clipped - 1.0))
+        return self.cost(z, p, weights) + lost
+
     def misfit(self, z: Array, p: Array, weights: dict[str, Array]) -> float:
         """Return J without what is believed [nats]."""
         out = self._run(self._plain, z, p, {})
-        out["shows"] = np.nan_to_num(out["shows"] - self.nodes.measured)
+        out["shows"] = out["shows"] - self.nodes.measured
         parts = (("moves", "of_moves"), ("shows", "of_shows"), ("begins", "of_begins"))
         return 0.5 * sum(float(np.sum(weights[w] * out[name] ** 2)) for name, w in parts)
 
     def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[Around, Array]:
-        """Return matrix and gradient at a point, and the slopes of what sensors show (n, 3, 8)."""
+        """Return matrix and gradient at a point, and the slopes of what sensors show (n, 2, 8)."""
         m = len(self.index)
-        measured = np.nan_to_num(self.nodes.measured)
-        more = {"measured": measured, **weights, "sums": np.zeros((m, m)), "slopes": np.zeros(m)}
+        sums = {"sums": np.zeros((m, m)), "slopes": np.zeros(m)}
+        more = {"measured": self.nodes.measured, **weights, **sums}
         out = self._run(self._slopes, z, p, more)
         A, B, g = out["now"], out["border"], out["slope"]
         A[1:] += out["next"][:-1]
@@ -335,7 +357,7 @@ class Latent:
 
     def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float]:
         """Return states, parameters and cost at an optimum."""
-        damping, v_x, cost = 1e-4, self.nodes.given[:, 0], np.inf
+        damping, v_x = 1e-4, self.nodes.given[:, 0]
         index = self.index[self.free]
         sd = np.diag(self.priors.information)[index] ** -0.5
         low, high = self.priors.low[index], self.priors.high[index]
@@ -364,11 +386,11 @@ class Latent:
             moved = float(np.abs((better[0] - z)[:, 0] / v_x).max())
             turned = float(np.abs((better[1] - p)[index] / sd).max(initial=0.0))
             gained = cost - better[2]
-            z, p, cost = better
+            z, p, _ = better
             damping = max(damping / 6.0, 1e-9)
             if (moved < 3e-4 and turned < 0.05) or gained < 0.02:
                 break
-        return z, p, cost
+        return z, p, self.value(z, p, R)
 
     def spread(self, z: Array, p: Array, R: Array) -> tuple[Array, Array, Array, Array]:
         """Return covariance of states alone (n, 8, 8), of parameters that move, dz/dp of v_y
@@ -376,7 +398,9 @@ class Latent:
         """
         at, shows = self.around(z, p, self.weights(z, p, R))
         _, X = self._eliminated(at, 0.0)
-        S = at.C - at.B.reshape(len(X), -1).T @ X
+        believed = around_beliefs(self.priors, p)[1][np.ix_(self.index, self.index)]
+        shown = at.C - believed - at.B.reshape(len(X), -1).T @ X
+        S = believed + shown / self.trust.lasting
         slopes, free = -X.reshape(len(z), N, -1)[:, 0], self.free
         held = np.setdiff1d(np.arange(len(self.index)), free)
         inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
@@ -395,16 +419,15 @@ class Latent:
         return own, inverse, slopes, shows
 
     def noise(self, z: Array, p: Array, own: Array, shows: Array, R: Array) -> Array:
-        """Return R (3,) by what is left of each sensor: its density at low frequency."""
+        """Return R (2,) by what is left of each sensor: its density at low frequency."""
         missed = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
         doubt = np.einsum("nij,njk,nik->ni", shows, own, shows)
-        found = R.copy()
+        found, on = R.copy(), self.nodes.counts
         lags = max(2, int(LOOKED * self.scale / self.nodes.dt))
+        if np.count_nonzero(on) < SHORTEST:
+            return found
         for i in range(len(MEASURED)):
-            on = self.nodes.counts & np.isfinite(missed[:, i])
             e = missed[on, i]
-            if e.size < SHORTEST:
-                continue
             most = 4.0 * float(np.median(np.abs(e))) / 0.6745
             e = np.clip(e, -most, most)
             power = max(float(np.mean(e**2)), 1e-18)
@@ -424,7 +447,7 @@ class Latent:
 
         Parameters
         ----------
-        R : to begin with (3,); None takes that of good sensors.
+        R : to begin with (2,); None takes that of good sensors.
         """
         R = self.R if R is None else R
         for _ in range(rounds):
@@ -439,7 +462,7 @@ class Latent:
 
 
 class Learnt(NamedTuple):
-    """What a drive without a good v_y taught: the posterior, where it is, and its states.
+    """What a drive without v_y taught: the posterior, where it is, and its states.
 
     parted : side slip by which the starts parted, rms [rad].
     """
@@ -450,7 +473,7 @@ class Learnt(NamedTuple):
     parted: float
 
 
-def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool = False) -> Learnt:
+def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool = False) -> Learnt:
     """Return what the nodes of a drive teach.
 
     It begins with soft and with stiff tires. Where they end elsewhere, the covariance has the
@@ -459,9 +482,9 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, v_y: bool =
     Parameters
     ----------
     beliefs : of the car, or what other drives of it left.
-    v_y : whether the nodes have a measured v_y.
+    late : as of `latent_priors`.
     """
-    problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, v_y))
+    problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
     first = problem.smoothed(*problem.settled(STARTS[0]))
     z, p, cost = problem.descend(*problem.settled(STARTS[1]), first.R)
     best, other = first, (z, p, cost)
@@ -515,8 +538,9 @@ def hardest(recording: Recording, seconds: float) -> slice:
 def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     """Return by how much a_y is later than the yaw rate [s], where that is no small matter.
 
-    It is the delay with which the minute of hardest cornering is explained best, by whole samples,
-    since interpolation averages noise, and refined by a parabola. 0 where none gains enough.
+    It is the delay with which the minute of hardest cornering is explained best, found as a
+    parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
+    too little.
 
     Parameters
     ----------
@@ -524,26 +548,32 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     """
     part = hardest(recording, ASKED)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
+    # Interpolation averages noise: what is smooth is not changed by it.
     smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
     piece = replace(recording, a_y=smooth)
-    count = max(Nodes.of(piece, vehicle, part).counts.sum(), 1)
+    delay = LATENT_NAMES.index("a_y_delay")
+    information = priors.information.copy()
+    information[delay, delay] = (ANY_DELAY * scale) ** -2
+    open_ = replace(priors, information=information)
 
-    @cache
-    def cost(samples: int) -> float:
-        problem = Latent(Nodes.of(piece, vehicle, part, a_y_late=samples * dt), vehicle, priors)
-        return problem.descend(*problem.settled(), problem.R, FEW)[2]
+    def problem(late: float, beliefs: Priors) -> Latent:
+        return Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
-    h = max(round(DELAYS * scale / dt), 1)
-    near = min((k * h for k in range(-1, 5)), key=cost)
-    if h > 1:  # and one between
-        h //= 2
-        near = min((near - h, near, near + h), key=cost)
-    if cost(0) - cost(near) < GAINED * max(1.0, 2.0 * cost(near) / count / TRUST.usual):
+    on_time = problem(0.0, priors)
+    z, p, least = on_time.descend(*on_time.settled(), on_time.R, FEW)
+    late = 0.0
+    for _ in range(LOOKS):
+        z, p, _ = problem(late, open_).descend(z, p, on_time.R, FEW)
+        more, p[delay] = float(p[delay]), 0.0
+        late = min(max(late + more, -MOST_LATE * scale), MOST_LATE * scale)
+        if abs(more) < SMALL * scale:
+            break
+    if abs(late) < SMALL * scale:
         return 0.0
-    before, at, after = (cost(near + k * h) for k in (-1, 0, 1))
-    bend = before - 2.0 * at + after
-    off = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-    return dt * (near + h * float(np.clip(off, -0.5, 0.5)))
+    found = problem(late, priors).descend(z, p, on_time.R, FEW)[2]
+    count = max(on_time.nodes.counts.sum(), 1)
+    enough = GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
+    return late if least - found > enough else 0.0
 
 
 def estimate_v_y(
@@ -555,26 +585,28 @@ def estimate_v_y(
     ----------
     p, covariance : of the tires, as `motion.parameters` lists them (p,), (p, p).
     """
-    believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=p))
-    columns = np.flatnonzero(believed.moves)
     again = np.array([LATENT_NAMES.index(name) for name in AGAIN])
-    moves = np.zeros_like(believed.moves)
-    moves[again] = True
-    information = np.zeros_like(believed.information)
-    information[again, again] = believed.information[again, again]
-    held = replace(believed, moves=moves, information=information)
+    moves = np.isin(np.arange(len(LATENT_NAMES)), again)
+
+    def held(late: bool) -> Priors:
+        believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=p), late)
+        information = np.zeros_like(believed.information)
+        information[again, again] = believed.information[again, again]
+        return replace(believed, moves=moves, information=information)
+
+    columns = np.flatnonzero(latent_priors(vehicle, Priors.of(vehicle)).moves)
     found_v_y = LateralVelocity(
         vehicle.bicycle.l_r * recording.r,
         TRUST.side_slip * np.maximum(recording.v_x, vehicle.lowest_speed),
         np.zeros(len(recording), dtype=bool),
         np.zeros(len(recording)),
     )
-    late = lateness(recording, vehicle, held)
+    late = lateness(recording, vehicle, held(late=False))
     for outer, inner in _blocks(recording):
         nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
         if not nodes.counts.any():
             continue
-        problem = Latent(nodes, vehicle, held, columns)
+        problem = Latent(nodes, vehicle, held(late != 0.0), columns)
         found = problem.smoothed(*problem.begin(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]

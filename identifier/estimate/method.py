@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from codegen.arrays import Array
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
+from identifier.estimate.poor import on_time
 from identifier.method import CannotFreezeError, Method
 from identifier.motion.model import REPLAYED
 from identifier.setup import AXLE_FORCE, Port, Setup
@@ -67,6 +68,10 @@ class FitMethod(Method):
     def whole(self) -> bool:
         """Whether it learns from a whole log at once."""
         return True
+
+    def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:
+        """Return a log whose v_y is on time, also where it was rare or noisy (`estimate.poor`)."""
+        return on_time(recording, vehicle)
 
     def fitted(
         self,

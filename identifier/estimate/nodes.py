@@ -40,7 +40,7 @@ class Nodes:
     t : time in the recording's own clock [s], (n,).
     dt : from a node to the next [s].
     given : columns as `motion.nodes.GIVEN`, (n, 8).
-    measured : r [rad/s], a_y [m/s²] and v_y [m/s], nan where there is none, (n, 3).
+    measured : r [rad/s] and a_y [m/s²], (n, 2).
     counts : where the car drives fast enough, (n,).
     goes : whether the motion goes on to the next node, (n,).
     """
@@ -58,14 +58,12 @@ class Nodes:
         recording: Recording,
         vehicle: Vehicle,
         part: slice = ALL,
-        v_y: Array | None = None,
         a_y_late: float = 0.0,
     ) -> "Nodes":
         """Return the nodes of a recording.
 
         Parameters
         ----------
-        v_y : as it was measured, on time; nan where it was not [m/s], (n,).
         a_y_late : by which a_y is late [s].
 
         Raises
@@ -77,7 +75,6 @@ class Nodes:
         every = max(1, round(between / recording.dt))
         begin, end, _ = part.indices(len(recording))
         a_y = recording.needed("a_y")
-        nothing = np.full(len(recording), np.nan)
         pieces = []
         for one in recording.segments:
             first, last = max(one.start, begin), min(one.stop, end)
@@ -85,8 +82,7 @@ class Nodes:
             if count >= FEWEST:
                 some = slice(first, first + count * every)
                 felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
-                shown = (nothing if v_y is None else v_y)[some]
-                pieces.append(_piece(recording, some, vehicle, every, felt, shown))
+                pieces.append(_piece(recording, some, vehicle, every, felt))
         if not pieces:
             raise ValueError(f"{recording.name}: too short to learn from without v_y")
         t, given, measured, counts, goes = (
@@ -112,7 +108,7 @@ def _earlier(signal: Array, samples: float) -> Array:
 
 
 def _piece(
-    recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array, v_y: Array
+    recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return t, given, measured, counts and goes of a segment."""
     dt, scale = recording.dt, float(np.sqrt(vehicle.wheelbase / SEDAN))
@@ -145,13 +141,9 @@ def _piece(
             *(mean(one) for one in (rho, rate, jerk)),
         ]
     )
-    fresh = np.isfinite(v_y).reshape(-1, every)
-    total = np.where(fresh, v_y.reshape(-1, every), 0.0).sum(axis=1)
-    count = fresh.sum(axis=1)
-    v_y = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     counts: NDArray[np.bool_] = np.asarray(on.reshape(-1, every).all(axis=1))
     goes = np.append(counts[:-1] & counts[1:], False)
-    return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y), v_y]), counts, goes
+    return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y)]), counts, goes
 
 
 def low_passed(signal: Array, hertz: float, dt: float) -> Array:

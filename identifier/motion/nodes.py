@@ -7,7 +7,7 @@ Tires, slip, load and ellipse are those of `motion.model`; the sway follows the 
 F_i/F_z,i = λ_i G_i φ_i(x_i) cos δ_i + e_i,   a = g Σ share_i F_i/F_z,i
 v_y' = a - v_x r + g p,   r' = m g l_f l_r/(L I_z) (F_f/F_z,f - F_r/F_z,r),   e' = -e/T_e,
 p'' = -2 p'/T_p - p/T_p²: trapezoids; x_i as in `motion.model`, its stiffness of the middle.
-Measured: r + b_r,   a + x_a r' + roll ρ + g b_a - τ_a a',   v_y + b + β v_x + x_s r.
+Measured: r + b_r,   a + x_a r' + roll ρ + g b_a - τ_a a'.
 """
 
 from functools import cache
@@ -32,7 +32,7 @@ from models.vehicle import GRAVITY, LIGHTEST
 STATES = ("v_y", "r", "x_f", "x_r", "e_f", "e_r", "bank", "bank_rate")
 GIVEN = ("v_x", "delta_f", "delta_r", "a_x", "turning", "rho", "rho_rate", "jerk")
 ACCELEROMETER = ("a_y_bias", "roll", "a_y_delay", "a_y_lever")  # [g], [-], [s], [m]
-MEASURED = ("r", "a_y", "v_y")
+MEASURED = ("r", "a_y")
 TIMES = ("error", "bank")  # T_e and T_p [s]
 LATENT_NAMES = (*NAMES, *ACCELEROMETER)
 
@@ -43,9 +43,9 @@ def node_scan(columns: Columns = ()) -> Scan:
 
     Its ports: `z` and `z_next` (8,), `given` and `given_next` (8,) have a row a node, `parameters`
     (p,), `accelerometer` (4,), `car` (7,), `times` (2,) and `dt` are constant. `moves` (8,), what
-    the step to the next node misses, `shows` (3,), what sensors show, `begins` (8,), what the
+    the step to the next node misses, `shows` (2,), what sensors show, `begins` (8,), what the
     first node misses, and `force` (2,) [static loads] without e come out. Where slopes are asked
-    for, `measured` (3,) and the weights `of_moves` (8,), `of_shows` (3,) and `of_begins` (8,) have
+    for, `measured` (2,) and the weights `of_moves` (8,), `of_shows` (2,) and `of_begins` (8,) have
     a row a node, too, and parts of Gauss-Newton's matrix come out: of the node, of the next, of
     both, with the parameters, the gradient, and of the parameters alone as sums that are carried.
 
@@ -170,14 +170,13 @@ class _Instant:
 
 
 def _shows(now: _Instant, p: dict[str, Any]) -> list[Any]:
-    """Return what sensors of r, a_y and v_y show."""
+    """Return what sensors of r and a_y show."""
     a, turns = now.accelerations
-    v_x, given = now.given["v_x"], now.given
+    given = now.given
     felt = a + p["a_y_lever"] * turns + p["roll"] * given["rho"] + GRAVITY * p["a_y_bias"]
     return [
         now.r + p["r_bias"],
         felt - p["a_y_delay"] * given["jerk"],
-        now.v_y + p["v_y_bias"] + p["v_y_angle"] * v_x + p["v_y_lever"] * now.r,
     ]
 
 

@@ -32,6 +32,7 @@ from codegen.compiler import CompilationError
 from identifier.compare.work import Map, fresh_processes
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
+from identifier.estimate.poor import on_time
 from identifier.estimate.priors import Priors
 from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier
@@ -318,6 +319,7 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
     if recording.logged_v_y is None:
         inertial = InertialIdentifier.for_vehicle(vehicle, dt=recording.dt)
         recording = identify(recording, vehicle, inertial, start).recording
+    recording = on_time(recording, vehicle)
     priors = start.as_prior(vehicle) if isinstance(start, FittedModel) else None
     measured = replace(recording, estimated=())  # an estimated v_y is fitted as one of a sensor
     model, _, parts = fit([measured], vehicle, priors, block=telling.part, coarse=True)

@@ -1,0 +1,243 @@
+"""A v_y that comes rarely or is noisy, brought on time by the motion between its samples.
+
+v_y' = (1 - ρ) a_y - v_x r - b + w,   b' = white,   shown: v_y(t - τ) + noise,
+ρ: what a rolling body adds to a_y, b: bank and bias. Linear least squares over the log, by banded
+Cholesky; τ and the variances of w, b' and noise are those of the largest likelihood over its
+minute of hardest cornering. No tire is in it. A v_y that is good stays as it is.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.estimate.drive import SMOOTHED
+from identifier.estimate.priors import SEDAN
+from models.recordings import Recording
+from models.sensors import white_noise
+from models.vehicle import Vehicle
+
+RARE = 0.03  # [s] of a sedan between new values, more of which are too few
+NOISY = 0.015  # [m/s] of a sedan, white noise that is too much in the mean that the estimate takes
+FEWEST = 20  # new values
+FINE = 0.005  # [s] of a sedan, to which a delay is found
+SURE = 20.0  # nats that a delay must gain
+ASKED, MOST = 60.0, 12000  # [s] and samples of hardest cornering that tell delay and noise
+ROLL, ROLL_SD = 0.05, 0.04  # ρ
+OFF = 0.15  # [m/s²], b at first
+WANDERS = 5e-3  # [(m/s²)²/s], variance of b' of a banked road
+EQUAL = 1e-9  # of the largest change, below which two are one
+CLIP, AGAIN = 3.0, 3  # deviations from which a sample counts less, and how often it is asked
+DELAYS = np.arange(0.0, 0.41, 0.05)  # [s]
+NOISE = 3e-3 * 10.0 ** np.arange(0.0, 2.1, 0.25)  # [m/s] of a sedan
+PUSHES = 10.0 ** np.arange(-5.0, 0.1, 0.5)  # [(m/s²)² s], variance of w
+BANKS = WANDERS * 10.0 ** np.arange(-3.0, 1.1, 1.0)
+ROUNDS = 5
+
+
+class Shown(NamedTuple):
+    """How a sensor shows v_y.
+
+    interval : between new values [s].   late : [s].   noise : [m/s].
+    push, wanders : variances of w [(m/s²)² s] and of b' [(m/s²)²/s].
+    """
+
+    interval: float
+    late: float = 0.0
+    noise: float = float(NOISE[0])
+    push: float = 0.003
+    wanders: float = WANDERS
+
+
+def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
+    """Return a recording with a v_y that is known at each sample, and a note where it was not.
+
+    It is the same where the sensor shows v_y well, or where there is none.
+    """
+    v_y = recording.logged_v_y
+    if v_y is None:
+        return recording
+    scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
+    new = new_values(v_y)
+    rare = len(new) < len(v_y) and _interval(new) * recording.dt > RARE * scale
+    new = new if rare else np.arange(len(v_y))
+    shown = Shown(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
+    if len(new) < FEWEST or (recording.a_y is None and not rare):
+        return recording
+    if recording.a_y is None:
+        shown = shown._replace(push=float(PUSHES[-1]))
+    else:
+        problem = _hardest(recording, new)
+        white = white_noise(problem.shown) if problem.shown.size > FEWEST else 0.0
+        if not rare and not white * np.sqrt(shown.interval / SMOOTHED) > NOISY * scale:
+            return recording
+        shown = _likeliest(problem, shown._replace(noise=max(white, shown.noise)), scale)
+        if not rare and not shown.push < PUSHES[-1]:
+            return recording  # a_y does not show this motion
+    weights, whole = np.ones(len(new)), Kinematics(recording, new)
+    for _ in range(AGAIN):
+        found, missed = whole.carried(shown, weights)
+        weights = np.minimum(1.0, CLIP * shown.noise / np.maximum(np.abs(missed), 1e-12))
+    found.setflags(write=False)
+    by = "straight lines" if recording.a_y is None else "ay, vx and r"
+    note = (
+        f"vy: a new value every {1e3 * shown.interval:.0f} ms, {1e3 * shown.late:.0f} ms late, "
+        f"noise {shown.noise:.2g} m/s: brought on time and smoothed by {by}"
+    )
+    return replace(recording, v_y=found, notes=(*recording.notes, note))
+
+
+def new_values(signal: Array) -> NDArray[np.intp]:
+    """Return which samples are new: not the last one held, nor on a straight line, (m,).
+
+    All are new where neither is the rule.
+    """
+    step = np.diff(signal)
+    most = EQUAL * max(float(np.abs(step).max(initial=0.0)), 1e-12)
+    changes = 1 + np.flatnonzero(np.abs(step) > most)
+    if changes.size > 3 and np.median(np.diff(changes)) > 1.0:
+        return np.concatenate([[0], changes])
+    bends = 1 + np.flatnonzero(np.abs(np.diff(step)) > most)
+    ends = bends[np.append(np.diff(bends) > 1, True)] if bends.size else bends
+    ends = ends[ends < len(signal) - 2]  # what bends at the last one nobody sees
+    few = 2 * bends.size < 1.1 * len(signal)
+    if ends.size > 3 and few and np.median(np.diff(ends)) > 2.0:
+        return np.concatenate([[0], ends])
+    return np.arange(len(signal))
+
+
+def _interval(new: NDArray[np.intp]) -> float:
+    return float(np.median(np.diff(new))) if new.size > 1 else np.inf
+
+
+class Kinematics:
+    """v_y over a recording as least squares, its unknowns v_y and b of each sample in turn.
+
+    Parameters
+    ----------
+    new : samples at which a value is new, (m,).
+    """
+
+    def __init__(self, recording: Recording, new: NDArray[np.intp]) -> None:
+        self.recording, self.new = recording, new
+        self.dt, self.n = recording.dt, len(recording)
+        self.shown = recording.needed("v_y")[new]
+        self.goes = np.ones(self.n - 1, dtype=bool)
+        self.goes[np.array(recording.breaks, dtype=np.intp) - 1] = False
+        a_y = recording.a_y
+        zero = np.zeros(self.n - 1)
+        self.felt = zero if a_y is None else self._over(a_y)
+        self.moved = zero if a_y is None else self._over(a_y - recording.v_x * recording.r)
+        self.first = np.concatenate([[0], np.flatnonzero(~self.goes) + 1])
+
+    def _over(self, signal: Array) -> Array:
+        return 0.5 * self.dt * (signal[1:] + signal[:-1])
+
+    @cached_property
+    def _piece(self) -> NDArray[np.intp]:
+        return np.searchsorted(np.array(self.recording.breaks), np.arange(self.n), side="right")
+
+    def _solved(self, s: Shown, weights: Array) -> tuple[Array, Array, float]:
+        """Return v_y (n,), what it misses of what was shown (m,), and -ln of the likelihood."""
+        from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
+
+        n, dt = self.n, self.dt
+        push = self.goes / (s.push * dt)
+        wander = self.goes / (s.wanders * dt)
+        band, g = np.zeros((4, 2 * n)), np.zeros((2 * n, 2))
+        slope = (-1.0, 0.5 * dt, 1.0, 0.5 * dt)  # over v, b, and the next v, b
+        for i, of in enumerate(slope):
+            rows = slice(i, i + 2 * (n - 1), 2)
+            g[rows, 0] += push * of * self.moved
+            g[rows, 1] += push * of * self.felt
+            for j in range(i + 1):
+                band[i - j, j : j + 2 * (n - 1) : 2] += push * of * slope[j]
+        band[0, 1:-1:2] += wander
+        band[0, 3::2] += wander
+        band[2, 1:-2:2] -= wander
+        band[0, 2 * self.first] += 1e-4
+        band[0, 2 * self.first + 1] += OFF**-2
+        at = np.maximum(self.new - s.late / dt, 0.0)
+        i = np.minimum(at.astype(np.intp), n - 2)
+        share = at - i
+        there = (self.new * dt >= s.late) & (self._piece[i] == self._piece[self.new])
+        there &= self._piece[i + 1] == self._piece[self.new]
+        w = np.where(there, weights, 0.0) / s.noise**2
+        for place, value in (
+            ((0, 2 * i), w * (1.0 - share) ** 2),
+            ((0, 2 * i + 2), w * share**2),
+            ((2, 2 * i), w * share * (1.0 - share)),
+        ):
+            np.add.at(band, place, value)
+        np.add.at(g[:, 0], 2 * i, w * (1.0 - share) * self.shown)
+        np.add.at(g[:, 0], 2 * i + 2, w * share * self.shown)
+        factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+        x, X = cho_solve_banded((factor, True), g, check_finite=False).T
+        # ρ is a border of the matrix: eliminated by Schur's complement.
+        S = np.sum(push * self.felt**2) + ROLL_SD**-2 - g[:, 1] @ X
+        roll = (np.sum(push * self.felt * self.moved) + ROLL / ROLL_SD**2 - g[:, 1] @ x) / S
+        x = x - roll * X
+        v, b = x[::2], x[1::2]
+        missed = (1.0 - share) * v[i] + share * v[i + 1] - self.shown
+        moves = np.diff(v) + 0.5 * dt * (b[1:] + b[:-1]) - self.moved + roll * self.felt
+        squares = w @ missed**2 + push @ moves**2 + wander @ np.diff(b) ** 2
+        squares += ((roll - ROLL) / ROLL_SD) ** 2 + np.sum(b[self.first] ** 2) / OFF**2
+        count, steps = np.count_nonzero(there), np.count_nonzero(self.goes)
+        logs = 2.0 * np.sum(np.log(factor[0])) + np.log(S) + count * np.log(s.noise**2)
+        logs += steps * np.log(s.push * s.wanders)
+        return v, np.where(there, missed, 0.0), 0.5 * float(squares + logs)
+
+    def carried(self, shown: Shown, weights: Array) -> tuple[Array, Array]:
+        """Return v_y (n,) and what it misses of the values that were shown (m,) [m/s].
+
+        Parameters
+        ----------
+        weights : of the values, at most 1 (m,).
+        """
+        v_y, missed, _ = self._solved(shown, weights)
+        return v_y, missed
+
+    def cost(self, shown: Shown) -> float:
+        """Return -ln of the likelihood of how a sensor shows v_y [nats], but for a constant."""
+        return self._solved(shown, np.ones(len(self.new)))[2]
+
+
+def _hardest(recording: Recording, new: NDArray[np.intp]) -> Kinematics:
+    """Return the problem of the hardest cornering."""
+    n = min(round(ASKED / recording.dt), MOST, len(recording))
+    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
+    begin = int(np.argmax(power[n:] - power[:-n]))
+    inside = new[(new >= begin) & (new < begin + n)] - begin
+    return Kinematics(recording.taken(slice(begin, begin + n)), inside)
+
+
+def _likeliest(problem: Kinematics, best: Shown, scale: float) -> Shown:
+    """Return how v_y is shown, by the largest likelihood, from a beginning on."""
+    least = problem.cost(best)
+
+    def better(**lists: Array) -> bool:
+        nonlocal best, least
+        before = least
+        for name, values in lists.items():
+            for value in values:
+                one = best._replace(**{name: float(value)})
+                if (cost := problem.cost(one)) < least:
+                    best, least = one, cost
+        return least < before - 0.1
+
+    others = {"noise": NOISE * scale, "push": PUSHES, "wanders": BANKS}
+    better(late=DELAYS, **others)
+    step = float(DELAYS[1])
+    for _ in range(ROUNDS):
+        step *= 0.5
+        near = np.maximum(best.late + step * np.array([-1.0, 1.0]), 0.0)
+        if not better(late=near, **others) and step < FINE * scale:
+            break
+    if best.late and problem.cost(best._replace(late=0.0)) - least < SURE:
+        best = best._replace(late=0.0)
+        least = problem.cost(best)
+        better(**others)
+    return best

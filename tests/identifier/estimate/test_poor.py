@@ -1,0 +1,161 @@
+"""A v_y that is rare, late or noisy teaches as a good one, and a good one stays as it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from identifier.estimate.fit import fit
+from identifier.estimate.poor import Kinematics, Shown, new_values, on_time
+from models.recordings.record import joined
+
+from .conftest import driven
+
+CAR = ti.sedan()
+LATE = 0.15  # s
+
+
+def received(log, between=10, late=LATE, how="held", lost=(300, 420)):
+    """A receiver: a value every few samples, late, none for a while; between them held or lines."""
+    at = np.arange(0, len(log), between)
+    at = at[(at < lost[0]) | (at >= lost[1])]
+    values = np.interp(log.t[at] - late, log.t, log.v_y)
+    if how == "lines":
+        return replace(log, v_y=np.interp(log.t, log.t[at], values))
+    last = np.searchsorted(at, np.arange(len(log)), side="right") - 1
+    if how == "held":
+        return replace(log, v_y=values[last])
+    slope = np.diff(values, prepend=values[0]) / np.diff(at, prepend=-between)
+    ahead = np.minimum(np.arange(len(log)) - at[last], between)
+    return replace(log, v_y=values[last] + slope[last] * ahead)
+
+
+@pytest.fixture(scope="module")
+def log():
+    return driven(3)
+
+
+def off(found, log):
+    return float(np.std((found.v_y - log.v_y)[100:]))
+
+
+def share_missed(learnt, log):
+    force, truth = learnt.axle_force(log), log.axle_force
+    return float(np.sqrt(np.sum((force - truth) ** 2) / np.sum(truth**2)))
+
+
+@pytest.mark.parametrize("how", ["held", "ahead", "lines"])
+def test_new_values_are_found(log, how):
+    shown = received(log, how=how)
+    at = np.arange(0, len(log), 10)
+    at = at[(at < 300) | (at >= 420)]
+    found = new_values(shown.v_y)
+    assert np.isin(found, at if how != "ahead" else np.append(at, 300)).all()
+    assert len(found) > 0.9 * len(at)
+
+
+def test_of_a_good_signal_all_are_new(log):
+    assert len(new_values(log.v_y)) == len(log)
+    assert len(new_values(np.where(log.t < 2.0, 0.0, log.v_y))) == len(log)
+    assert len(new_values(np.zeros(100))) == 100
+
+
+@pytest.mark.parametrize("how", ["held", "ahead", "lines"])
+def test_rare_and_late_values_are_brought_on_time(log, how):
+    shown = received(log, how=how)
+    found = on_time(shown, CAR)
+    assert off(found, log) < 0.04 < 0.1 < off(shown, log)
+    assert "every 100 ms" in found.notes[-1] and "ay" in found.notes[-1]
+
+
+def test_noise_is_smoothed(log):
+    noise = 0.1 * np.random.default_rng(1).normal(size=len(log))
+    found = on_time(replace(log, v_y=log.v_y + noise), CAR)
+    assert off(found, log) < 0.03
+
+
+def test_a_good_v_y_stays_as_it_is(log):
+    for one in (log, replace(log, a_y=None), replace(log, v_y=None)):
+        assert on_time(one, CAR) is one
+    with_a_lateness = replace(log, v_y=np.interp(log.t - 0.1, log.t, log.v_y))
+    assert on_time(with_a_lateness, CAR) is with_a_lateness  # it is the doctor's
+
+
+def test_a_y_of_another_motion_smooths_nothing(log):
+    rng = np.random.default_rng(2)
+    noisy = log.v_y + 0.1 * rng.normal(size=len(log))
+    wrong = replace(log, v_y=noisy, a_y=20.0 * rng.normal(size=len(log)))
+    assert on_time(wrong, CAR) is wrong
+
+
+def test_without_a_y_lines_are_drawn(log):
+    shown = replace(received(log, late=0.0, lost=(0, 0)), a_y=None)
+    found = on_time(shown, CAR)
+    assert off(found, log) < 0.5 * off(shown, log)
+
+
+def test_a_single_wrong_value_does_not_move_it(log):
+    shown = received(log)
+    v_y = shown.v_y.copy()
+    v_y[1000:1010] += 3.0
+    found = on_time(replace(shown, v_y=v_y), CAR)
+    assert off(found, log) < 0.06
+
+
+def test_a_drive_of_two_pieces_is_two_problems(log):
+    pieces = [log.between(0.0, 9.0), driven(5).between(3.0, 12.0)]
+    exact = joined(pieces)
+    shown = [received(one) for one in pieces]
+    found = on_time(joined(shown), CAR)
+    assert np.std(found.v_y - exact.v_y) < 0.05
+    parts = ti.identify(joined(shown), CAR, check=False).history.parts(shown)
+    np.testing.assert_array_equal(np.concatenate([one.recording.v_y for one in parts]), found.v_y)
+
+
+def test_banded_algebra_gives_the_least_squares(log):
+    """By a dense matrix of the same equations."""
+    some = log.between(2.0, 2.6)
+    new = np.arange(3, len(some), 7)
+    s = Shown(interval=0.07, late=0.013, noise=0.02, push=0.01, wanders=0.1)
+    v_y, missed = Kinematics(some, new).carried(s, np.ones(len(new)))
+    n, dt = len(some), some.dt
+    rows, right = [], []
+
+    def row(weight, value, **at):
+        one = np.zeros(2 * n + 1)
+        for place, factor in at.items():
+            one[int(place[1:])] += factor
+        rows.append(weight * one)
+        right.append(weight * value)
+
+    felt = 0.5 * dt * (some.a_y[1:] + some.a_y[:-1])
+    turns = some.v_x * some.r
+    moved = felt - 0.5 * dt * (turns[1:] + turns[:-1])
+    for k in range(n - 1):
+        v, b = 2 * k, 2 * k + 1
+        at = {f"_{v}": -1, f"_{v + 2}": 1, f"_{b}": dt / 2, f"_{b + 2}": dt / 2}
+        row((s.push * dt) ** -0.5, moved[k], **at, **{f"_{2 * n}": felt[k]})
+        row((s.wanders * dt) ** -0.5, 0.0, **{f"_{b}": -1, f"_{b + 2}": 1})
+    row(1e-2, 0.0, _0=1)
+    row(1 / 0.15, 0.0, _1=1)
+    row(1 / 0.04, 0.05, **{f"_{2 * n}": 1})
+    for k in new[new * dt >= s.late]:
+        i, share = divmod(k - s.late / dt, 1.0)
+        at = {f"_{2 * int(i)}": 1 - share, f"_{2 * int(i) + 2}": share}
+        row(1 / s.noise, some.v_y[k], **at)
+    x = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+    np.testing.assert_allclose(v_y, x[: 2 * n : 2], atol=1e-7)
+    assert len(missed) == len(new)
+
+
+def test_a_user_learns_from_a_receiver_nearly_as_well(log, caplog):
+    other = driven(8)
+    best = share_missed(ti.identify(log, CAR, check=False).freeze(), other)
+    poor = received(log)
+    run = ti.identify(poor, CAR, check=False)
+    assert share_missed(run.freeze(), other) < 1.3 * best + 0.005
+    assert run.verdict.valid and "every 100 ms" in caplog.text
+    assert share_missed(fit([poor], CAR).model, other) > 3.0 * best  # as it is
+    prediction = ti.replay(received(other), run.freeze())
+    assert prediction.verdict.valid
