@@ -58,8 +58,8 @@ def onward(start: ti.TireModel, recording: Recording) -> History:
 
 def changes(history: History) -> list[float]:
     """Return when another road was taken to have begun [s]."""
-    state = history.state["watch"].reshape(len(history.recording) + 1, -1)[:, 0] > 0.0
-    return list(history.recording.t[np.flatnonzero(state[1:] & ~state[:-1])])
+    road = history.state["change"].reshape(len(history.recording) + 1, -1)[:, 2]
+    return [float(t) for t in history.recording.t[np.flatnonzero(np.diff(road))]]
 
 
 def dart(targets: Targets) -> None:

@@ -23,16 +23,16 @@ from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
-    ChangeDetector,
     Regression,
+    RoadChange,
+    RoadState,
     bounded,
     rising_shares,
 )
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.slip import SHORTEST, SensitivityState, Sway, SwayState
+from identifier.axle.slip import SHORTEST, SensitivityState, Sensors, Sway, SwayState
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
-from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
 from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
@@ -57,8 +57,7 @@ class AxleIdentifier(Method):
     bounds : limits of what is learnt.
     plausibility : which samples are believed, and the lowest speeds.
     regression : filter, error model and memory.
-    change : detector of a change of friction.
-    watch : when what is measured is not what was learnt, and how long to wait for it.
+    change : when another friction is believed, and which errors teach less.
     road : what of an accelerometer's a_y tells of a road that is not level.
     ladder : slip scales of the units [rad], rising by powers of two.
     rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
@@ -77,8 +76,7 @@ class AxleIdentifier(Method):
     bounds: Bounds
     plausibility: Plausibility
     regression: Regression = field(default_factory=Regression)
-    change: ChangeDetector = field(default_factory=ChangeDetector)
-    watch: Watch = field(default_factory=Watch)
+    change: RoadChange = field(default_factory=RoadChange)
     road: RoadSlope = field(default_factory=RoadSlope)
     ladder: tuple[float, ...] = LADDER
     rising_until: float | None = 0.0
@@ -171,10 +169,11 @@ class AxleIdentifier(Method):
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
-        excitation = np.zeros((2, 1 + len(EDGES)))
+        excitation, sensors = np.zeros((2, 1 + len(EDGES))), Sensors()
         if start is not None:
             stored = self._resumed(start)
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
+            sensors = stored.sensors
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self.within_bounds(W, own, P)
         return Setup(
@@ -190,9 +189,9 @@ class AxleIdentifier(Method):
                 "filters": np.zeros((2, n + 5)),
                 "errors": np.tile([0.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
-                "watch": np.array(BEGIN._replace(known=0.0 if start is None else self.watch.known)),
-                "kept": np.hstack([W, own]),
+                "change": np.zeros(len(RoadState._fields)),
                 "bank": np.zeros(len(SlopeState._fields)),
+                "sensors": np.array(sensors),
             },
             constants={
                 "dt": np.array(self.dt),
@@ -201,8 +200,7 @@ class AxleIdentifier(Method):
                 "plausibility": np.array(self.plausibility.numbers()),
                 "roll": np.array(self.sway.numbers()),
                 "regression": np.array(self.regression.at(self.dt)),
-                "change": np.array(self.change.at(self.dt)),
-                "watching": np.array(self.watch.at(self.dt)),
+                "changing": np.array(self.change.at(self.dt)),
                 "road": np.array(self.road.at(self.dt)),
                 "bounds": np.array(self.bounds.of_ladder(self.ladder, self.rising_until)),
                 "friction_direction": friction_direction(self.ladder),
@@ -353,6 +351,7 @@ class AxleIdentifier(Method):
             covariance=unpacked(state["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=state["excitation"].copy(),
+            sensors=Sensors(*map(float, np.ravel(state["sensors"]))),
         )
 
 

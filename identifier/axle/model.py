@@ -40,7 +40,7 @@ from identifier.axle.guarantee import (
     slip_beyond,
 )
 from identifier.axle.prior import SD_FRICTION, friction_direction
-from identifier.axle.slip import SHORTEST, Sway, SwayState
+from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
@@ -76,6 +76,7 @@ class AxleModel(TireModel):
     covariance : of [W, own], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
+    sensors : errors that were known before it learnt, and stay.
     calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
     guarantee : weights that the drive left possible; None where nobody asked.
@@ -99,6 +100,7 @@ class AxleModel(TireModel):
     covariance: Array
     prior_covariance: Array
     excitation: Array
+    sensors: Sensors = Sensors()
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
     guarantee: Guarantee | None = None
@@ -596,14 +598,15 @@ class AxleModel(TireModel):
         slip : lagged slip (2,) [rad].
         x : [v_y, r] (2,), as the sensors read them while learning.
         """
+        v_y = self.sensors.v_y(x[0], x[1], v_x)
         return lagged_force(
             Car(*car_numbers(self.vehicle).T),
             curve_at_speed(slip, v_x, self.W, self.ladder, self.vehicle),
             series_compliance(self.own, self.sway.frequency),
             self.own[:, 2],
             slip=slip,
-            x=x,
-            delta=delta,
+            x=[v_y, x[1]],
+            delta=self.sensors.steering(delta),
             v_x=v_x,
             least_lag=least_lag,
         )
@@ -642,6 +645,7 @@ class AxleModel(TireModel):
                 "scales": 1.0 / np.array(self.ladder)[None],
                 "plausibility": np.array(self.plausibility.numbers()),
                 "roll": np.array(self.sway.numbers()),
+                "sensors": np.array(self.sensors),
                 **downforce_numbers(self.vehicle),
             },
             ends_run=self.plausibility.rest(dt),
@@ -670,6 +674,7 @@ class AxleModel(TireModel):
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
             **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
+            **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
         }
@@ -687,6 +692,7 @@ class AxleModel(TireModel):
                 sway=Sway(**data["sway"]),
                 plausibility=Plausibility(**data["plausibility"]),
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
+                sensors=Sensors(*(float(one) for one in data.get("sensors", {}).values())),
                 calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
                 guarantee=(
                     Guarantee.from_dict(data["guarantee"], len(data["ladder"]))
