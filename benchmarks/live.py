@@ -1,4 +1,4 @@
-"""Learning while the car drives, begun with a fit: another road, the same road, a freeze at any time.
+"""Learning while the car drives, begun with a fit: another road, the same, a freeze at any time.
 
     python -m benchmarks.live [--record] [--cars N]
 
@@ -58,7 +58,7 @@ def onward(start: ti.TireModel, recording: Recording) -> History:
 
 def changes(history: History) -> list[float]:
     """Return when another road was taken to have begun [s]."""
-    road = history.state["change"].reshape(len(history.recording) + 1, -1)[:, 2]
+    road = history.state["change"].reshape(len(history.recording) + 1, -1)[:, -1]
     return [float(t) for t in history.recording.t[np.flatnonzero(np.diff(road))]]
 
 

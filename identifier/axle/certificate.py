@@ -306,10 +306,10 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             advice="the boxes alone hold it: sample faster, or lower the rate",
         ),
     )
-    return proven if vehicle.has_downforce else (*proven, _drop(design, vehicle, driving))
+    return proven if vehicle.has_downforce else (*proven, _drop(design, driving))
 
 
-def _drop(design: Design, vehicle: Vehicle, driving: Driving) -> Property:
+def _drop(design: Design, driving: Driving) -> Property:
     """Return how long the drop of friction of a car takes whose loads are the static ones."""
     follows = FrictionDrop().time(design, driving.friction, driving.v_x)
     by_memory = design.regression.memory * math.log(2.0)

@@ -174,6 +174,8 @@ class AxleIdentifier(Method):
             stored = self._resumed(start)
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
             sensors = stored.sensors
+            if stored is not start:  # of another form: units can be what no curve of it could
+                P = _within_prior(P, prior_P, n)
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self.within_bounds(W, own, P)
         return Setup(
@@ -187,7 +189,7 @@ class AxleIdentifier(Method):
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
                 "sensitivity": np.zeros((2, len(SensitivityState._fields))),
                 "filters": np.zeros((2, n + 5)),
-                "errors": np.tile([0.0, 1.0, 0.0], (2, 1)),
+                "errors": np.tile([0.0, 1.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
                 "change": np.zeros(len(RoadState._fields)),
                 "bank": np.zeros(len(SlopeState._fields)),
@@ -353,6 +355,14 @@ class AxleIdentifier(Method):
             excitation=state["excitation"].copy(),
             sensors=Sensors(*map(float, np.ravel(state["sensors"]))),
         )
+
+
+def _within_prior(P: Array, prior: Array, n: int) -> Array:
+    """Return covariances (2, q, q) whose weights are also believed as before any drive."""
+    found = np.zeros_like(P)
+    found[:, n:, n:] = P[:, n:, n:]
+    found[:, :n, :n] = np.linalg.inv(np.linalg.inv(P[:, :n, :n]) + np.linalg.inv(prior[:, :n, :n]))
+    return found
 
 
 @cache

@@ -203,12 +203,14 @@ def update(
 # Another road, and errors that nothing explains.
 #
 # Another friction moves the force that the weights explain by g = h'M w times the change of ln μ
-# (φ = μ φ₀(α/μ)), at both axles alike. With e of a second, leaking, that change is m = b/(A + 1/s²),
-# A = Σ g²/V, b = Σ g e/V, V the variance of e with what the weights still leave open, and more
-# likely than none by b²/(2 (A + 1/s²)) nats. Where that passes `evidence`, the road is believed:
-# weights move by m M w, and P opens along it by what m still leaves open.
-# q = e²/V of one sample is about one where all is as learnt. Its fast mean makes samples count less
-# that neither the weights nor a friction explain; the slow one is the noise to get used to.
+# (φ = μ φ₀(α/μ)), at both axles alike. With e of a second, leaking, that change is
+# m = b/(A + 1/s²), A = Σ g²/V, b = Σ g e/V, V the variance of e with what the weights still leave
+# open, and it takes b²/(A + 1/s²) off the squared errors Σ e²/V. Where that is twice `evidence`,
+# and most of them, as no broken sensor has it, the road is believed: weights move by m M w, and P
+# opens along it by what m still leaves open.
+# q = e²/V of one sample is about one where all is as learnt. Its fast mean over its trend makes
+# samples count less that come suddenly and that nothing explains; the slow mean of e²/σ² is the
+# noise to get used to.
 
 LARGEST_Q = 25.0  # of one outlier
 SLOW_Q = 4.0  # the slow mean does not follow a change
@@ -222,19 +224,22 @@ class RoadChange:
     Parameters
     ----------
     evidence : from which another road is believed [nats].
+    explains : share of the squared errors that it must take off [-].
     time : over which evidence is collected [s].
     correlation_time : of errors that a friction could be taken for [s].
     spread : standard deviation of ln μ of another road.
     step : largest change of ln μ that is believed at once.
-    fast, slow : time constants of the means of squared errors [s].
+    fast, trend, slow : time constants of the means of squared errors [s].
     """
 
     evidence: float = 6.0
+    explains: float = 0.8
     time: float = 1.0
     correlation_time: float = 0.5
     spread: float = 0.7
     step: float = 0.3
     fast: float = 0.2
+    trend: float = 10.0
     slow: float = 20.0
 
     def __post_init__(self) -> None:
@@ -252,41 +257,47 @@ class RoadChange:
             keep=math.exp(-dt / self.time),
             per_sample=dt / self.correlation_time,
             before=self.spread**-2,
+            explains=self.explains,
             step=self.step,
             fast=min(dt / self.fast, 1.0),
+            trend=min(dt / self.trend, 1.0),
             slow=min(dt / self.slow, 1.0),
         )
 
 
 class RoadNumbers(NamedTuple):
-    """Twice the evidence; share that a sample keeps; share of a sample that is new; 1/s²; largest
-    step; gains of the means.
+    """Twice the evidence; share that a sample keeps; share of it that is new; 1/s²; share that must
+    be explained; largest step; gains of the means.
     """
 
     twice_evidence: Any
     keep: Any
     per_sample: Any
     before: Any
+    explains: Any
     step: Any
     fast: Any
+    trend: Any
     slow: Any
 
 
 class RoadState(NamedTuple):
-    """A and b, and ln of the friction over that at the start [-]."""
+    """A, b and E = Σ e²/V; ln of the friction over that at the start [-]."""
 
     A: Any
     b: Any
+    E: Any
     ln_friction: Any
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast mean of q [-]; slow mean of e²/σ², by which the variance of y is larger
-    than told, from 1 to 4 [-]; recent peak of the measured force, which is a mean of y over a
-    moment [static axle loads].
+    """Columns (2,): fast mean of q and its trend [-]; slow mean of e²/σ², by which the variance of
+    y is larger than told, from 1 to 4 [-]; recent peak of the measured force, which is a mean of y
+    over a moment [static axle loads].
     """
 
     fast: Any
+    trend: Any
     slow: Any
     peak: Any
 
@@ -295,7 +306,8 @@ def believed(numbers: RoadNumbers, state: RoadState) -> tuple[Any, Any]:
     """Return by how much ln μ is believed to have changed, 0 where it has not, and its variance."""
     precision = state.A + numbers.before
     per_precision = reciprocal(precision)
-    sure = state.b * state.b > numbers.twice_evidence * precision
+    least = larger(numbers.twice_evidence, numbers.explains * state.E)
+    sure = state.b * state.b > least * precision
     change = within(state.b * per_precision, -numbers.step, numbers.step)
     return ca.if_else(sure, change, 0), ca.if_else(sure, per_precision, 0)
 
@@ -303,7 +315,7 @@ def believed(numbers: RoadNumbers, state: RoadState) -> tuple[Any, Any]:
 def evidence(
     numbers: RoadNumbers, state: RoadState, change: Any, *, g: Any, e: Any, V: Any, learns: Any
 ) -> Any:
-    """Return the next state (3,); what was believed is asked no more.
+    """Return the next state (4,); what was believed is asked no more.
 
     Parameters
     ----------
@@ -316,6 +328,7 @@ def evidence(
     return ca.vertcat(
         keep * state.A + ca.dot(weight, g * g),
         keep * state.b + ca.dot(weight, g * e),
+        keep * state.E + ca.dot(weight, e * e),
         state.ln_friction + change,
     )
 

@@ -57,6 +57,7 @@ ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
 DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
 DRAWS = 1000  # of weights, before a possible tire must have been among them
+EXACT = Sensors()
 BENT = 0.4  # slope over that at zero, below which a curve shows where it saturates
 
 
@@ -100,7 +101,7 @@ class AxleModel(TireModel):
     covariance: Array
     prior_covariance: Array
     excitation: Array
-    sensors: Sensors = Sensors()
+    sensors: Sensors = EXACT
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
     guarantee: Guarantee | None = None
@@ -692,7 +693,7 @@ class AxleModel(TireModel):
                 sway=Sway(**data["sway"]),
                 plausibility=Plausibility(**data["plausibility"]),
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
-                sensors=Sensors(*(float(one) for one in data.get("sensors", {}).values())),
+                sensors=Sensors(**data.get("sensors", {})),
                 calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
                 guarantee=(
                     Guarantee.from_dict(data["guarantee"], len(data["ladder"]))

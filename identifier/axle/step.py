@@ -2,7 +2,7 @@
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
-`forward`; sensitivity (2, 3); filters (2, q + 2); errors (2, 3); excitation (2, 9); change (3,), of
+`forward`; sensitivity (2, 3); filters (2, q + 2); errors (2, 4); excitation (2, 9); change (4,), of
 another friction; bank (4,), of the accelerometer.
 Of a car with downforce every force, slope and regressor is that of the load at v_x (`Curve.under`).
 Sampled: x, u, v_x, and a_y [m/s²] of an accelerometer, NaN where there is none. Everything else is
@@ -241,8 +241,8 @@ PORTS = (
     Port("filters", LOAD, "filters of the regressors and of the target; mean force; per axle"),
     Port(
         "errors",
-        f"-; -; {LOAD}",
-        "fast and slow mean squared error, peak of the measured force, per axle",
+        f"-; -; -; {LOAD}",
+        "fast mean, trend and slow mean of squared errors, peak of the measured force, per axle",
         learnt=True,
         rule=NOT_NEGATIVE,
     ),
@@ -256,8 +256,8 @@ PORTS = (
     Port(
         "change",
         "-",
-        "evidence of another friction, precision and mean times it; ln of the friction over that "
-        "at the start",
+        "evidence of another friction: precision, mean times it, squared errors; ln of the "
+        "friction over that at the start",
         learnt=True,
     ),
     Port(
@@ -467,7 +467,7 @@ def _sample_of(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Regre
         h=ca.horzcat(h[:, :-1] * holds, h[:, -1]),
         e=e,
         innovation=within(e, -bound, bound),
-        R=sigma**2 * errors.slow * larger(errors.fast, 1) * numbers.samples,
+        R=sigma**2 * errors.slow * larger(errors.fast / errors.trend, 1) * numbers.samples,
         sigma=sigma,
         learns=learns,
         force=force,
@@ -511,12 +511,13 @@ def _errors(
     """
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     numbers = RoadNumbers(*ca.vertsplit(ports["changing"]))
-    fast, slow, _ = ca.horzsplit(ports["errors"])
+    fast, trend, slow, _ = ca.horzsplit(ports["errors"])
     learns, told = sample.learns, sample.sigma**2
     V = told * slow + unsure
     q = smaller(sample.e**2 / V, LARGEST_Q)
     of_noise = smaller(sample.e**2 / told, SLOW_Q * slow)
     means = fast + learns * numbers.fast * (q - fast)
+    lasting = trend + learns * numbers.trend * (larger(q, 1) - trend)
     noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, MOST_SLOW)
     road = evidence(
         numbers,
@@ -534,7 +535,7 @@ def _errors(
         samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
         learns=learns * sample.holds,
     )
-    return {"errors": ca.horzcat(means, noise, peak), "excitation": times, "change": road}
+    return {"errors": ca.horzcat(means, lasting, noise, peak), "excitation": times, "change": road}
 
 
 def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:
