@@ -313,24 +313,25 @@ def believed(numbers: RoadNumbers, state: RoadState) -> tuple[Any, Any]:
 
 
 def evidence(
-    numbers: RoadNumbers, state: RoadState, change: Any, *, g: Any, e: Any, V: Any, learns: Any
+    numbers: RoadNumbers, state: RoadState, change: Any, *, g: Any, e: Any, V: Any, holds: Any, learns: Any
 ) -> Any:
     """Return the next state (4,); what was believed is asked no more.
 
     Parameters
     ----------
     change : of ln μ that this sample was told to believe.
-    g, e, V : of both axles (2,).
-    learns : of both axles (2,).
+    g, e, V : of both axles (2,).   holds : whether an axle carries a force (2,).
+    learns : whether to take the sample.
     """
-    keep = numbers.keep * (change == 0)
-    weight = learns * numbers.per_sample / V
-    return ca.vertcat(
+    keep = ca.if_else(change == 0, numbers.keep, 0)
+    weight = holds * numbers.per_sample / V
+    taken = ca.vertcat(
         keep * state.A + ca.dot(weight, g * g),
         keep * state.b + ca.dot(weight, g * e),
         keep * state.E + ca.dot(weight, e * e),
         state.ln_friction + change,
     )
+    return ca.if_else(learns, taken, ca.vertcat(*state))
 
 
 # Bounds of what is learnt, kept after every sample, exactly: also in float, whatever was learnt.

@@ -526,7 +526,8 @@ def _errors(
         g=ca.sum2(h * sample.direction),
         e=sample.innovation,
         V=V,
-        learns=learns * sample.holds,
+        holds=sample.holds,
+        learns=learns,
     )
     times = excited(
         ports["excitation"],
