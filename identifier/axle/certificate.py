@@ -215,7 +215,8 @@ class FrictionDrop:
 
         While both are, evidence of the drop grows at least as fast as here, where errors are the
         least, are told the largest and are cut; what is then believed takes that off the error.
-        inf where that does not end within a minute.
+        That is of errors that are one change of ln μ at both axles, but for `RoadChange.explains`
+        of their squares. inf where it does not end within a minute.
 
         Parameters
         ----------
@@ -315,7 +316,7 @@ def _drop(design: Design, driving: Driving) -> Property:
     by_memory = design.regression.memory * math.log(2.0)
     return Property(
         name="drop_time",
-        title="friction drops to half in a steady corner: both axles stay half wrong",
+        title="friction drops to half in a steady corner, alike at both axles: both stay half wrong",
         value=follows,
         limit=by_memory,
         margin=by_memory / follows,
