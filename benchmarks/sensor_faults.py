@@ -42,7 +42,7 @@ LASTS, BEGINS = (0.2, 4.0), (LEAD + 8.0, LEAD + 18.0)  # s
 AFTER, LOOK, RIGHT = 3.0, 5.0, 5.0  # s, s, % of the rms force
 ON, BAD = (GateState._fields.index(name) for name in ("on", "bad"))
 SOON, NEVER = 0.5, 1e9  # s; a time in which no mean of errors moves
-HALF = 2.0  # fast mean of errors over its trend, where a sample counts half
+HALF = 2.0**0.5  # fast mean of errors over its trend, where a sample counts half
 NOBODY = 1e4  # m/s: the largest speed that a recording holds, of no car
 PROCESSES = 2
 
@@ -243,7 +243,7 @@ def report(results: dict[str, list[Result]], alarm: float, targets: Targets) -> 
     targets.record("cases", len(everything))
     targets.at_least("forces right 3 s after the fault", right, 99.0, "%", key="right")
     trusting = float(100.0 * np.mean([one.trusting <= RIGHT for one in everything]))
-    targets.record("trusting", trusting, "%")
+    targets.record("unwatched", trusting, "%")
     show("the same without doubt", f"{trusting:.1f} %")
     at_once = [one.noticed for one in harmful if one.fault.kind != "drifting"]
     targets.record("harmful", len(harmful))
@@ -267,7 +267,7 @@ def _row(some: Sequence[Result], key: str, targets: Targets) -> str:
     noticed = [one.noticed for one in some if one.trusting > RIGHT]
     targets.record(f"{key}/cases", len(some))
     targets.record(f"{key}/right", float(shares[0]), "%")
-    targets.record(f"{key}/trusting", float(shares[1]), "%")
+    targets.record(f"{key}/unwatched", float(shares[1]), "%")
     text = f"{len(some):5} {shares[0]:6.1f} {shares[1]:8.1f} {len(noticed):8}"
     if noticed:
         times = np.quantile(noticed, (0.5, 0.9, 1.0), method="lower")

@@ -208,9 +208,9 @@ def update(
 # open, and it takes b²/(A + 1/s²) off the squared errors Σ e²/V. Where that is twice `evidence`,
 # and most of them, as no broken sensor has it, the road is believed: weights move by m M w, and P
 # opens along it by what m still leaves open.
-# q = e²/V of one sample is about one where all is as learnt. Its fast mean over its trend makes
-# samples count less that come suddenly and that nothing explains; the slow mean of e²/σ² is the
-# noise to get used to.
+# q = e²/V of one sample is about one where all is as learnt. The square of its fast mean over its
+# trend makes samples count less that come suddenly and that nothing explains, as of a sensor that
+# breaks; the slow mean of e²/σ² is the noise to get used to.
 
 LARGEST_Q = 25.0  # of one outlier
 SLOW_Q = 4.0  # the slow mean does not follow a change
@@ -233,13 +233,13 @@ class RoadChange:
     """
 
     evidence: float = 6.0
-    explains: float = 0.8
+    explains: float = 0.85
     time: float = 1.0
     correlation_time: float = 0.5
     spread: float = 0.7
     step: float = 0.3
     fast: float = 0.2
-    trend: float = 10.0
+    trend: float = 5.0
     slow: float = 20.0
 
     def __post_init__(self) -> None:

@@ -467,7 +467,7 @@ def _sample_of(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Regre
         h=ca.horzcat(h[:, :-1] * holds, h[:, -1]),
         e=e,
         innovation=within(e, -bound, bound),
-        R=sigma**2 * errors.slow * larger(errors.fast / errors.trend, 1) * numbers.samples,
+        R=sigma**2 * errors.slow * larger(errors.fast / errors.trend, 1) ** 2 * numbers.samples,
         sigma=sigma,
         learns=learns,
         force=force,

@@ -515,7 +515,7 @@ def test_representations_are_short(tires, run, log, car):
 
 def test_the_default_and_the_paper_s_identifier_are_certified(car):
     axle = ti.certify(ti.AxleIdentifier.for_vehicle(car), car)
-    assert axle.verdict == "pass" and axle["drop_time"].value < 1.0
+    assert axle.verdict == "pass" and axle["drop_time"].value < 3.0
     assert axle.held["grip_static_axle_loads"] == [0.1, 3.0]
     assert "verdict: pass" in str(axle)
     paper = ti.certify(ti.PaperIdentifier.for_vehicle(car), car)

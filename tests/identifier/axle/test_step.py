@@ -212,7 +212,7 @@ class ByHand:
             metric[i] = P[:n, :n]
             Ph = P @ h[i]
             excited[i] = h[i] @ Ph
-            doubt = max(self.fast[i] / self.trend[i], 1.0)
+            doubt = max(self.fast[i] / self.trend[i], 1.0) ** 2
             R = sd[i] ** 2 * self.slow[i] * doubt * m.correlation_time / dt
             lam = np.exp(-dt / m.memory)
             shrink = (1 - (1 - lam) / lam * R / excited[i]) / (R + excited[i])
