@@ -720,6 +720,9 @@ def _require_plausible(data: dict[str, Any], source: str) -> None:
         table.table(name).record(record)
     if "tells_v_y" in data and not isinstance(data["tells_v_y"], bool):
         table.refuse("tells_v_y", f"must be true or false, it is {shown(data['tells_v_y'])}")
+    if "sensors" in data:
+        for name in Sensors._fields:
+            table.table("sensors").number(name)
     if "band" in data:
         band = table.table("band")
         for name in ("factors", "speeds", "color", "noise"):
