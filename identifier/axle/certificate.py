@@ -316,7 +316,7 @@ def _drop(design: Design, driving: Driving) -> Property:
     by_memory = design.regression.memory * math.log(2.0)
     return Property(
         name="drop_time",
-        title="friction drops to half in a steady corner, alike at both axles: both stay half wrong",
+        title="friction drops to half in a steady corner, alike at both axles: half wrong for",
         value=follows,
         limit=by_memory,
         margin=by_memory / follows,

@@ -313,7 +313,15 @@ def believed(numbers: RoadNumbers, state: RoadState) -> tuple[Any, Any]:
 
 
 def evidence(
-    numbers: RoadNumbers, state: RoadState, change: Any, *, g: Any, e: Any, V: Any, holds: Any, learns: Any
+    numbers: RoadNumbers,
+    state: RoadState,
+    change: Any,
+    *,
+    g: Any,
+    e: Any,
+    V: Any,
+    holds: Any,
+    learns: Any,
 ) -> Any:
     """Return the next state (4,); what was believed is asked no more.
 

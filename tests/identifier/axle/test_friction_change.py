@@ -1,4 +1,4 @@
-"""Another road by its rules, on numbers; and what a broken sensor taught is gone once it is good."""
+"""Another road by its rules; and what a broken sensor taught is gone once it is good."""
 
 from dataclasses import replace
 from functools import cache
