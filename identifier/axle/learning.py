@@ -233,7 +233,7 @@ class RoadChange:
     """
 
     evidence: float = 6.0
-    explains: float = 0.85
+    explains: float = 0.7
     time: float = 1.0
     correlation_time: float = 0.5
     spread: float = 0.7

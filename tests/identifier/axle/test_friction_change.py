@@ -142,7 +142,7 @@ def test_a_biased_steering_may_look_like_less_grip_and_no_more_than_that():
     off, friction = off_afterwards(
         broken("delta_f", "biased", 0.04), AxleIdentifier.for_vehicle(sedan())
     )
-    assert off < 0.12 and friction.min() >= -RoadChange().step
+    assert off < 0.25 and friction.min() >= -RoadChange().step
 
 
 @pytest.mark.parametrize(
