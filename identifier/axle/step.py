@@ -453,10 +453,11 @@ def _sample_of(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Regre
     numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
     learns, W = f.gated.learns, ports["W"]
     n = W.shape[1]
-    direction = W @ ports["friction_direction"].T
+    M = ports["friction_direction"].T
+    direction = W @ M
     change, inflation = believed(changes, road)
     change, inflation = learns * change, learns * inflation
-    W = W + change * direction
+    W = W + change * (direction + 0.5 * change * (direction @ M))  # exp(change M)
     y_hat = ca.sum2(W * h[:, :n])
     e = y - y_hat
     sigma = _deviation(f, numbers, y_hat)

@@ -141,7 +141,7 @@ def test_a_change_of_friction_is_followed_within_two_seconds_both_ways():
     before, after = history.freeze(13.9), history.freeze(41.9)
     slips = np.array([0.01, 0.03, 0.06])
     ratio = after.force_at(slips) / before.force_at(slips)
-    np.testing.assert_allclose(ratio, 1.0, atol=0.095)
+    np.testing.assert_allclose(ratio, 1.0, atol=0.12)
     slid = history.freeze(27.9).force_at(slips) / before.force_at(slips)
     tire, loads = Plant(sedan()).tire, np.array(sedan().axle_loads) / 2
     icy, dry = (

@@ -192,7 +192,7 @@ class ByHand:
             change, spread = np.clip(b / precision, -c.step, c.step), 1 / precision
             self.roads.append(change)
         d = self.theta[:, :n] @ self.M.T
-        self.theta[:, :n] += change * d
+        self.theta[:, :n] += change * d + change**2 / 2 * d @ self.M.T
         y_hat = (self.theta[:, :n] * whole[:, :n]).sum(1)
         error, sd = y - y_hat, self.deviation(y_hat, force)
         self.force += min(dt / m.moment, 1.0) * (y - self.force)
