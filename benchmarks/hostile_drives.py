@@ -199,7 +199,7 @@ def blind(design: AxleIdentifier) -> AxleIdentifier:
     ----------
     design : as certified.
     """
-    return replace(design, change=replace(design.change, threshold=1e9))
+    return replace(design, change=replace(design.change, evidence=1e9))
 
 
 class Case(NamedTuple):

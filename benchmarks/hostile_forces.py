@@ -15,8 +15,8 @@ from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
 from identifier.axle.along import BEGIN, Adjoint, Lessons, adjoint, begin_error, lessons
 from identifier.axle.certificate import FrictionDrop
-from identifier.axle.covariance import per_variance, unpacked
-from identifier.axle.prior import friction_direction
+from identifier.axle.covariance import unpacked
+from identifier.axle.learning import ErrorState
 from identifier.run import identify
 
 IDENTITY = 1e-6  # of the error, that sums of thousands of terms may differ
@@ -31,12 +31,10 @@ def forward(taught: Lessons, error: Array, noise: Array) -> Array:
     error : before the first sample (2, q).
     noise : ε (N, 2).
     """
-    theta, kept = error.copy(), error + taught.apart
-    for k, (back, follow) in enumerate(taught.watched):
+    theta = error.copy()
+    for k in range(len(noise)):
         e = noise[k] - (taught.h[k] * theta).sum(axis=1)
-        learnt = theta + taught.gains[k] * (taught.counts[k] * e)[:, None]
-        theta = (kept if back else learnt) + taught.moved[k]
-        kept = kept + follow * (theta - kept)
+        theta = theta + taught.gains[k] * (taught.counts[k] * e)[:, None] + taught.moved[k]
     return theta
 
 
@@ -168,27 +166,23 @@ def followed(rng: np.random.Generator) -> Followed:
         np.abs((W * np.tanh(x) - slopes * x).sum(axis=2)),
         slopes / np.array(design.ladder),
     )
-    M = friction_direction(design.ladder)
-    means = design.prior.means(car, design.ladder)[0] * case.level / design.prior.friction
-    direction = np.linalg.norm(W @ M.T, axis=2) / np.linalg.norm(means @ M.T, axis=1)
     P = unpacked(state["UD"][case.at], n + 3)
-    prior = design.prior.covariance(car, design.ladder)
-    limit = per_variance(prior, n, design.regression.widest)[:, 0]
-    taken = np.trace(P[:, :n, :n], axis1=1, axis2=2) * limit
-    offset = np.sqrt(P[:, -1, -1]) * [1.0, 1.0 / v_x] * slope.sum(axis=2).max(axis=0)
-    watch, errors = state["watch"].reshape(-1, 7)[case.at], state["errors"][case.at]
+    h = np.zeros((2, n + 3))
+    h[:, :n], h[:, -1] = np.tanh(x[0]), slope[0].sum(axis=1) * [1.0, 1.0 / v_x]
+    unsure = np.sqrt(np.einsum("ai,aij,aj->a", h, P, h))
+    A, b, E, _ = state["change"].reshape(-1, 4)[at].T
+    change, slow = design.change, ErrorState(*state["errors"][case.at].T).slow
+    taken = b**2 / (A + change.spread**-2)
+    alike = taken >= change.explains * E
     fair = (
         seen.min() >= claim.seen
         and slope.sum(axis=2).max() <= claim.slope
-        and direction.max() <= claim.direction
-        and taken.max() <= 1.0 - claim.free
-        and offset.max() <= claim.unsure
-        and watch[6] >= design.watch.known
-        and watch[0] == 0.0
-        and errors[:, 1].max() <= claim.errors
+        and unsure.max() <= claim.unsure
+        and alike[taken >= 2.0 * change.evidence].all()
+        and slow.max() <= claim.errors
         and before.max() <= claim.noise
     )
-    bound = claim.time(design, car, case.level, v_x)
+    bound = claim.time(design, case.level, v_x)
     return Followed(times[0], times[1], bound, bool(fair))
 
 

@@ -43,6 +43,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "guaranteed": [],
     "guaranteed_faster": [],
     "road_friction": [],
+    "live": [],
     "braking": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],

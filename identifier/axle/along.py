@@ -1,17 +1,16 @@
 """What is proven of the axle identifier along a drive: how wrong may its forces be after it?
 
 Whatever the true parameters θ* are, ε := y - h'θ* (with the model's nonlinearity, noise, bias and
-all that it leaves out) makes the errors θ̃ = θ - θ* of the weights that learn and k̃ = k - θ* of
-those that are kept obey, exactly, with all other letters known from the run:
+all that it leaves out) makes the errors θ̃ = θ - θ* obey, exactly, with all other letters known
+from the run:
 
-θ̃⁺ = (I - c K h') θ̃ + c K ε + m   where weights come back: θ̃⁺ = k̃ + m
-k̃⁺ = k̃ + f (θ̃⁺ - k̃)
+θ̃⁺ = (I - c K h') θ̃ + c K ε + m
 
-K: gain.   c: share of the innovation that counts.   m: what bounds and the limited step moved.
-f: share by which kept weights follow.   So the error of the force at a slip, t'θ̃ with the units
-t = tanh(x/α_j), is (p_0 + r_0)'θ̃_0 + Σ g_k ε_k + M, with the adjoints p, r of θ̃ and k̃ run from
-the end to the beginning, g = c p'K, M = Σ p'm. That is a worst case that is reached: by errors
-|ε_k| <= z σ_k with the signs of g_k.
+K: gain.   c: share of the innovation that counts.   m: what bounds, the limited step and a road
+that is believed to be another moved.   So the error of the force at a slip, t'θ̃ with the units
+t = tanh(x/α_j), is p_0'θ̃_0 + Σ g_k ε_k + M, with the adjoint p of θ̃ run from the end to the
+beginning, g = c p'K, M = Σ p'm. That is a worst case that is reached: by errors |ε_k| <= z σ_k with
+the signs of g_k.
 """
 
 from collections.abc import Mapping
@@ -54,9 +53,8 @@ class Lessons(NamedTuple):
     """What N samples taught, rows front and rear, as of `identifier.axle.step.build_lesson`.
 
     theta : parameters before each sample and after the last (N + 1, 2, q).
-    moved : m, what neither learning nor going back explains (N, 2, q).
+    moved : m, what learning does not explain (N, 2, q).
     begin : covariance of the parameters before the first sample (2, q, q).
-    apart : by how much the kept parameters differ from them there (2, q).
     """
 
     h: Array
@@ -64,11 +62,9 @@ class Lessons(NamedTuple):
     counts: Array
     gains: Array
     told: Array
-    watched: Array
     theta: Array
     moved: Array
     begin: Array
-    apart: Array
 
     @property
     def left(self) -> Array:
@@ -79,7 +75,7 @@ class Lessons(NamedTuple):
 class Adjoint(NamedTuple):
     """What reaches the force of an axle at m slips, static axle loads, rows front and rear.
 
-    begin : p_0 + r_0, of the first error of the parameters (2, m, q).   moved : M (2, m).
+    begin : p_0, of the first error of the parameters (2, m, q).   moved : M (2, m).
     g : of the error of y at each sample (N, 2, m).
     """
 
@@ -93,23 +89,18 @@ def lessons(design: Learner, history: Run) -> Lessons:
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
     step = build_lesson(doublings(design.ladder), pressed=pressed)
-    parts, theta, kept, begin = [], [], [], []
+    parts, theta, begin = [], [], []
     for block in history.blocks(np.arange(max(n - MOST, 0), n)):
         seen = setup.shown(history.recording, block.part)
         signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
         parts.append(_taught(step, {**setup.constants, **block.before, **signals}, setup.constants))
         theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
-        kept.append(block.before["kept"])
         begin.append(block.state["UD"][0])
-    h, e, counts, gains, told, watched = (
-        np.concatenate([part[name] for part in parts]) for name in LESSON
-    )
+    h, e, counts, gains, told = (np.concatenate([part[name] for part in parts]) for name in LESSON)
     path = np.concatenate([*(one[:-1] for one in theta), theta[-1][-1:]])
     learnt = path[:-1] + gains * (counts * e)[:, :, None]
-    learnt = np.where(watched[:, :1, None] > 0.0, np.concatenate(kept), learnt)
     P = unpacked(begin[0], len(design.ladder) + 3)
-    apart = kept[0][0] - path[0]
-    return Lessons(h, e, counts, gains, told, watched, path, path[1:] - learnt, P, apart)
+    return Lessons(h, e, counts, gains, told, path, path[1:] - learnt, P)
 
 
 def _taught(
@@ -151,21 +142,14 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
     q, n = taught.h.shape[2], len(ladder)
     units = np.tanh(slips[:, :, None] / np.array(ladder))
     p = np.concatenate([units, np.zeros((*slips.shape, q - n))], axis=2)  # (2, m, q)
-    r, moved = np.zeros_like(p), np.zeros(slips.shape)
+    moved = np.zeros(slips.shape)
     g = np.zeros((len(taught.e), *slips.shape))
     gains = taught.gains * taught.counts[:, :, None]
     for k in range(len(taught.e) - 1, -1, -1):
-        back, follow = taught.watched[k]
-        p = p + follow * r
-        r = (1.0 - follow) * r
         moved += (p @ taught.moved[k, :, :, None])[:, :, 0]
-        if back:
-            p, r = np.zeros_like(p), r + p
-            continue
         g[k] = (p @ gains[k, :, :, None])[:, :, 0]
         p = p - g[k, :, :, None] * taught.h[k, :, None]
-    moved += (r @ taught.apart[:, :, None])[:, :, 0]
-    return Adjoint(p + r, moved, g)
+    return Adjoint(p, moved, g)
 
 
 def certified_along(design: Learner, history: Run) -> tuple[Property, ...]:
@@ -177,8 +161,7 @@ def certified_along(design: Learner, history: Run) -> tuple[Property, ...]:
     reach = adjoint(taught, slips, design.ladder)
     box = corners(design.bounds, design.ladder, design.rising_until)
     jump = np.abs(np.cumsum(np.diff(taught.theta[:, :, : len(design.ladder)], axis=0), axis=2))
-    back = taught.watched[:, 0] > 0.0
-    largest = float(jump[~back].max(initial=0.0))
+    largest = float(jump.max(initial=0.0))
     limit = jump_by_learning(design)
     found = [
         Property(

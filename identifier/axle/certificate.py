@@ -21,17 +21,15 @@ from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
 from identifier.axle.learning import (
     FLOAT,
-    LARGEST_Q,
     LEAN,
     MOST_SLOW,
     SLOW_Q,
     Bounds,
-    ChangeDetector,
     Regression,
+    RoadChange,
     unit_slopes,
 )
-from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.watch import Watch
+from identifier.axle.prior import Prior
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
@@ -60,12 +58,8 @@ class Design(Protocol):
         """Filter, error model and memory."""
 
     @property
-    def change(self) -> ChangeDetector:
-        """Detector of a change of friction."""
-
-    @property
-    def watch(self) -> Watch:
-        """When what is measured is not what was learnt, and how long to wait for it."""
+    def change(self) -> RoadChange:
+        """When another friction is believed."""
 
     @property
     def ladder(self) -> tuple[float, ...]:
@@ -201,13 +195,10 @@ class FrictionDrop:
     ----------
     to : friction after it over that before [-].
     left : share of the change that may still be missing when it counts as followed [-].
-    seen : |φ - x φ'| of the regressor: what a change of friction makes there [static axle loads].
+    seen : least |φ - x φ'| of the regressor: what a change of ln μ makes [static axle loads].
     noise : largest error of the measured force [static axle loads].
-    unsure : standard deviation that lag and offsets leave in it [static axle loads].
+    unsure : standard deviation that weights, lag and offsets leave in it [static axle loads].
     slope : of the curves in the corner [static axle loads/rad].
-    free : share of the largest variance of weights that is not taken [-].
-    direction : size of the change of weights that another friction makes, over that of a brush
-        tire of that friction [-].
     errors : slow mean of the squared error over what is told, when it drops [-].
     """
 
@@ -215,56 +206,39 @@ class FrictionDrop:
     left: float = 0.5
     seen: float = 0.2
     noise: float = 0.01
-    unsure: float = 0.005
+    unsure: float = 0.02
     slope: float = 20.0
-    free: float = 0.85
-    direction: float = 1.5
     errors: float = 1.0
 
-    def time(self, design: Design, vehicle: Vehicle, friction: float, v_x: float) -> float:
+    def time(self, design: Design, friction: float, v_x: float) -> float:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
-        While both are, the mean of squared errors rises at least as fast as here, the alarm with
-        it, and the variance that the alarm adds opens the gain: at each sample the error falls by
-        at least what is taken off here. inf where that does not end within a minute.
+        While both are, evidence of the drop grows at least as fast as here, where errors are the
+        least, are told the largest and are cut; what is then believed takes that off the error.
+        That is of errors that are one change of ln μ at both axles, but for `RoadChange.explains`
+        of their squares. inf where it does not end within a minute.
 
         Parameters
         ----------
         friction : before the drop [-].
         v_x : speed [m/s].
         """
-        r, change, dt, n = design.regression, design.change, design.dt, len(design.ladder)
+        r, at, dt = design.regression, design.change.at(design.dt), design.dt
         error = friction * (1.0 - self.to)
         wrong = self.left * error
         told = r.error + r.relative_error * friction + r.noise * self.slope / v_x
-        sure = r.error + r.relative_error * friction * self.to
-        samples, step = r.correlation_time / dt, (1.0 - LEAN) * r.rate * dt
-        at = change.at(dt)
-        q = min(((wrong - self.noise) / told) ** 2, LARGEST_Q) if wrong > self.noise else 0.0
-        prior = design.prior.covariance(vehicle, design.ladder)[:, :n, :n]
-        widest = r.widest * np.trace(prior, axis1=1, axis2=2)
-        means = design.prior.means(vehicle, design.ladder)[0] * friction / design.prior.friction
-        along = np.linalg.norm(means @ friction_direction(design.ladder).T, axis=1)
-        along *= self.direction
-        room = float((self.free * widest / along**2).min())
-        fast, slow, a, added = 0.0, self.errors, 0.0, 0.0
+        A, b, slow = 0.0, 0.0, self.errors
         for k in range(1, math.ceil(LONGEST / dt) + 1):
-            fast += at.fast * (q - fast)
             slow = min(slow * (1.0 + (SLOW_Q - 1.0) * at.slow), MOST_SLOW)
-            alarm = min(max(fast / (slow * change.threshold) - 1.0, 0.0), 1.0)
-            if added + alarm * at.inflation <= room:
-                added, a = added + alarm * at.inflation, a + alarm * at.inflation * self.seen**2
-            pull = max(a - self.unsure * math.sqrt(a), 0.0)
-            move = min(
-                pull / (samples * slow * sigma**2 + a) * min(error - self.noise, r.clip * sigma)
-                for sigma in (sure, told)
-            )
-            if pull > 0.0:
-                error -= min(move, step * pull / math.sqrt(a * n * float(widest.max())))
+            weight = 2.0 * at.per_sample / (told**2 * slow + self.unsure**2)
+            e = min(wrong - self.noise, r.clip * told)
+            A, b = at.keep * A + weight * self.seen**2, at.keep * b + weight * self.seen * e
+            precision = A + at.before
+            if b > 0.0 and b * b > at.twice_evidence * precision:
+                error -= self.seen * min(b / precision, at.step)
+                A, b = 0.0, 0.0
             if error <= wrong:
                 return k * dt
-            least = samples * sure**2
-            a = a * least / (least + a)
         return math.inf
 
 
@@ -280,7 +254,6 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
     lean = _lean_over_rounding(design)
-    again = design.watch.known / 2.0
     proven = (
         Property(
             name="forgets",
@@ -333,30 +306,23 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             unit="static loads",
             advice="only the limits bound it: sample faster, or lower the rate",
         ),
-        statement(
-            "jump_back",
-            "largest jump where weights from before an alarm come back",
-            apart,
-            "static loads",
-            f"not twice within {again:.3g} s of driving that is explained",
-        ),
     )
-    return proven if vehicle.has_downforce else (*proven, _drop(design, vehicle, driving))
+    return proven if vehicle.has_downforce else (*proven, _drop(design, driving))
 
 
-def _drop(design: Design, vehicle: Vehicle, driving: Driving) -> Property:
+def _drop(design: Design, driving: Driving) -> Property:
     """Return how long the drop of friction of a car takes whose loads are the static ones."""
-    follows = FrictionDrop().time(design, vehicle, driving.friction, driving.v_x)
+    follows = FrictionDrop().time(design, driving.friction, driving.v_x)
     by_memory = design.regression.memory * math.log(2.0)
     return Property(
         name="drop_time",
-        title="friction drops to half in a steady corner: time with half the error left",
+        title="friction drops to half in a steady corner, alike at both axles: half wrong for",
         value=follows,
         limit=by_memory,
         margin=by_memory / follows,
         status=at_most(follows, good=by_memory, bad=None),
         unit="s",
-        advice="no alarm is proven: the declared errors exceed those of the drop",
+        advice="it is not proven to be followed: the declared errors exceed those of the drop",
     )
 
 

@@ -23,16 +23,16 @@ from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
-    ChangeDetector,
     Regression,
+    RoadChange,
+    RoadState,
     bounded,
     rising_shares,
 )
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.slip import SHORTEST, SensitivityState, Sway, SwayState
+from identifier.axle.slip import SHORTEST, SensitivityState, Sensors, Sway, SwayState
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
-from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
 from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
@@ -41,9 +41,6 @@ from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
 from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
-
-
-# What a search may vary of it, and what the number is multiplied and divided by.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,8 +54,7 @@ class AxleIdentifier(Method):
     bounds : limits of the estimates.
     plausibility : which samples are accepted, and the lowest speeds.
     regression : filter, error model and memory.
-    change : detector of a change of friction.
-    watch : when measured and identified forces differ, and how long to wait.
+    change : when another friction is accepted, and which errors count less.
     road : what of an accelerometer's a_y tells of a road that is not level.
     ladder : slip scales of the units [rad], rising by powers of two.
     rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
@@ -77,8 +73,7 @@ class AxleIdentifier(Method):
     bounds: Bounds
     plausibility: Plausibility
     regression: Regression = field(default_factory=Regression)
-    change: ChangeDetector = field(default_factory=ChangeDetector)
-    watch: Watch = field(default_factory=Watch)
+    change: RoadChange = field(default_factory=RoadChange)
     road: RoadSlope = field(default_factory=RoadSlope)
     ladder: tuple[float, ...] = LADDER
     rising_until: float | None = 0.0
@@ -171,10 +166,13 @@ class AxleIdentifier(Method):
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
-        excitation = np.zeros((2, 1 + len(EDGES)))
+        excitation, sensors = np.zeros((2, 1 + len(EDGES))), Sensors()
         if start is not None:
             stored = self._resumed(start)
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
+            sensors = stored.sensors
+            if stored is not start:  # of another form: units can be what no curve of it could
+                P = _within_prior(P, prior_P, n)
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self.within_bounds(W, own, P)
         return Setup(
@@ -188,11 +186,11 @@ class AxleIdentifier(Method):
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
                 "sensitivity": np.zeros((2, len(SensitivityState._fields))),
                 "filters": np.zeros((2, n + 5)),
-                "errors": np.tile([0.0, 1.0, 0.0], (2, 1)),
+                "errors": np.tile([0.0, 1.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
-                "watch": np.array(BEGIN._replace(known=0.0 if start is None else self.watch.known)),
-                "kept": np.hstack([W, own]),
+                "change": np.zeros(len(RoadState._fields)),
                 "bank": np.zeros(len(SlopeState._fields)),
+                "sensors": np.array(sensors),
             },
             constants={
                 "dt": np.array(self.dt),
@@ -201,8 +199,7 @@ class AxleIdentifier(Method):
                 "plausibility": np.array(self.plausibility.numbers()),
                 "roll": np.array(self.sway.numbers()),
                 "regression": np.array(self.regression.at(self.dt)),
-                "change": np.array(self.change.at(self.dt)),
-                "watching": np.array(self.watch.at(self.dt)),
+                "changing": np.array(self.change.at(self.dt)),
                 "road": np.array(self.road.at(self.dt)),
                 "bounds": np.array(self.bounds.of_ladder(self.ladder, self.rising_until)),
                 "friction_direction": friction_direction(self.ladder),
@@ -353,7 +350,16 @@ class AxleIdentifier(Method):
             covariance=unpacked(state["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=state["excitation"].copy(),
+            sensors=Sensors(*map(float, np.ravel(state["sensors"]))),
         )
+
+
+def _within_prior(P: Array, prior: Array, n: int) -> Array:
+    """Return covariances (2, q, q) whose weights are also believed as before any drive."""
+    found = np.zeros_like(P)
+    found[:, n:, n:] = P[:, n:, n:]
+    found[:, :n, :n] = np.linalg.inv(np.linalg.inv(P[:, :n, :n]) + np.linalg.inv(prior[:, :n, :n]))
+    return found
 
 
 @cache

@@ -200,104 +200,146 @@ def update(
     return Learnt(theta, after, a, spread.weights, gains)
 
 
-# A change of the road's friction: noticed at both axles at once, followed along one direction.
+# Another road, and errors that nothing explains.
 #
-# q = e²/S is one where the error model is right. Its fast mean over its slow mean rises at a
-# change; then the covariance is inflated along d = M w, the change of weights that a change of
-# friction makes (φ = μ φ₀(α/μ)), so that the weights move along it at once and the shape is kept.
-# Both axles must alarm: a faulty steering disturbs only one.
+# Another friction moves the force that the weights explain by g = h'M w times the change of ln μ
+# (φ = μ φ₀(α/μ)), at both axles alike. With e of a second, leaking, that change is
+# m = b/(A + 1/s²), A = Σ g²/V, b = Σ g e/V, V the variance of e with what the weights still leave
+# open, and it takes b²/(A + 1/s²) off the squared errors Σ e²/V. Where that is twice `evidence`,
+# and most of them, as no broken sensor has it, the road is believed: weights move by m M w, and P
+# opens along it by what m still leaves open.
+# q = e²/V of one sample is about one where all is as learnt. The square of its fast mean over its
+# trend makes samples count less that come suddenly and that nothing explains, as of a sensor that
+# breaks; the slow mean of e²/σ² is the noise to get used to.
 
-LARGEST_Q = 25.0  # one outlier alone is no alarm
-SLOW_Q = 4.0  # and the slow mean shall not follow a change
+LARGEST_Q = 25.0  # of one outlier
+SLOW_Q = 4.0  # the slow mean does not follow a change
 MOST_SLOW = 4.0  # squared errors: above twice what is told they are no noise to get used to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ChangeDetector:
-    """When friction is taken to have changed, and how fast it is followed.
+class RoadChange:
+    """When another friction is believed, and which errors teach less.
 
     Parameters
     ----------
-    threshold : of fast over slow mean of q [-]; from twice it on the inflation is full.
-    fast, slow : time constants of the means [s].
-    step : change of ln μ [-] that ...
-    step_time : ... may happen in this time [s] during an alarm.
-    offset_time : in which an alarm at an axle that is not known yet makes its offset as unsure as
-        it may get [s]: a bias that was there on the straight is gone, or a new one came.
+    evidence : from which another road is believed [nats].
+    explains : share of the squared errors that it must take off [-].
+    time : over which evidence is collected [s].
+    correlation_time : of errors that a friction could be taken for [s].
+    spread : standard deviation of ln μ of another road.
+    step : largest change of ln μ that is believed at once.
+    fast, trend, slow : time constants of the means of squared errors [s].
     """
 
-    threshold: float = 4.0
+    evidence: float = 6.0
+    explains: float = 0.7
+    time: float = 1.0
+    correlation_time: float = 0.5
+    spread: float = 0.7
+    step: float = 0.3
     fast: float = 0.2
+    trend: float = 5.0
     slow: float = 20.0
-    step: float = 0.5
-    step_time: float = 0.3
-    offset_time: float = 5.0
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def at(self, dt: float) -> "ChangeNumbers":
+    def at(self, dt: float) -> "RoadNumbers":
         """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
-        return ChangeNumbers(
-            per_threshold=1.0 / self.threshold,
+        return RoadNumbers(
+            twice_evidence=2.0 * self.evidence,
+            keep=math.exp(-dt / self.time),
+            per_sample=dt / self.correlation_time,
+            before=self.spread**-2,
+            explains=self.explains,
+            step=self.step,
             fast=min(dt / self.fast, 1.0),
+            trend=min(dt / self.trend, 1.0),
             slow=min(dt / self.slow, 1.0),
-            inflation=dt * self.step**2 / self.step_time,
-            offset=dt / self.offset_time,
         )
 
 
-class ChangeNumbers(NamedTuple):
-    """1/threshold, gains of fast and slow mean, and what an alarm adds a sample: variance along the
-    change of friction, and to the offset over its limit.
+class RoadNumbers(NamedTuple):
+    """Twice the evidence; share that a sample keeps; share of it that is new; 1/s²; share that must
+    be explained; largest step; gains of the means.
     """
 
-    per_threshold: Any
+    twice_evidence: Any
+    keep: Any
+    per_sample: Any
+    before: Any
+    explains: Any
+    step: Any
     fast: Any
+    trend: Any
     slow: Any
-    inflation: Any
-    offset: Any
+
+
+class RoadState(NamedTuple):
+    """A, b and E = Σ e²/V; ln of the friction over that at the start [-]."""
+
+    A: Any
+    b: Any
+    E: Any
+    ln_friction: Any
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast mean of q [-]; slow mean of q, by which the variance of y is larger than
-    told, from 1 to 4 [-]; recent peak of the measured force, which is a mean
-    of y over a moment [static axle loads].
+    """Columns (2,): fast mean of q and its trend [-]; slow mean of e²/σ², by which the variance of
+    y is larger than told, from 1 to 4 [-]; recent peak of the measured force, which is a mean of y
+    over a moment [static axle loads].
     """
 
     fast: Any
+    trend: Any
     slow: Any
     peak: Any
 
 
-def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) -> tuple[Any, Any]:
-    """Return fast and slow mean of q after a sample, (2,) each.
+def believed(numbers: RoadNumbers, state: RoadState) -> tuple[Any, Any]:
+    """Return by how much ln μ is believed to have changed, 0 where it has not, and its variance."""
+    precision = state.A + numbers.before
+    per_precision = reciprocal(precision)
+    least = larger(numbers.twice_evidence, numbers.explains * state.E)
+    sure = state.b * state.b > least * precision
+    change = within(state.b * per_precision, -numbers.step, numbers.step)
+    return ca.if_else(sure, change, 0), ca.if_else(sure, per_precision, 0)
+
+
+def evidence(
+    numbers: RoadNumbers,
+    state: RoadState,
+    change: Any,
+    *,
+    g: Any,
+    e: Any,
+    V: Any,
+    holds: Any,
+    learns: Any,
+) -> Any:
+    """Return the next state (4,); what was believed is asked no more.
 
     Parameters
     ----------
-    q : squared error over its variance, (2,).
+    change : of ln μ that this sample was told to believe.
+    g, e, V : of both axles (2,).   holds : whether an axle carries a force (2,).
+    learns : whether to take the sample.
     """
-    q = smaller(q, LARGEST_Q)
-    fast = state.fast + learns * numbers.fast * (q - state.fast)
-    slow = state.slow + learns * numbers.slow * (smaller(q, SLOW_Q * state.slow) - state.slow)
-    return fast, within(slow, 1, MOST_SLOW)
-
-
-def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
-    """Return how much each axle is taken to have changed, from 0 to 1, (2,).
-
-    Parameters
-    ----------
-    fast : mean of q (2,).
-    slow : mean of q (2,).
-    """
-    excess = fast / slow * numbers.per_threshold - 1
-    return smaller(larger(excess, 0), 1)
+    keep = ca.if_else(change == 0, numbers.keep, 0)
+    weight = holds * numbers.per_sample / V
+    taken = ca.vertcat(
+        keep * state.A + ca.dot(weight, g * g),
+        keep * state.b + ca.dot(weight, g * e),
+        keep * state.E + ca.dot(weight, e * e),
+        state.ln_friction + change,
+    )
+    return ca.if_else(learns, taken, ca.vertcat(*state))
 
 
 # Bounds of what is learnt, kept after every sample, exactly: also in float, whatever was learnt.

@@ -40,7 +40,7 @@ from identifier.axle.guarantee import (
     slip_beyond,
 )
 from identifier.axle.prior import SD_FRICTION, friction_direction
-from identifier.axle.slip import SHORTEST, Sway, SwayState
+from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
@@ -57,6 +57,7 @@ ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
 DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
 DRAWS = 1000  # of weights, before a possible tire must have been among them
+EXACT = Sensors()
 BENT = 0.4  # slope over that at zero, below which a curve shows where it saturates
 
 
@@ -76,6 +77,7 @@ class AxleModel(TireModel):
     covariance : of [W, own], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
+    sensors : errors that were known before it learnt, and stay.
     calibration : of the band, by segments that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
     guarantee : weights that the drive left possible; None where nobody asked.
@@ -99,6 +101,7 @@ class AxleModel(TireModel):
     covariance: Array
     prior_covariance: Array
     excitation: Array
+    sensors: Sensors = EXACT
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
     guarantee: Guarantee | None = None
@@ -596,14 +599,15 @@ class AxleModel(TireModel):
         slip : lagged slip (2,) [rad].
         x : [v_y, r] (2,), as the sensors read them while learning.
         """
+        v_y = self.sensors.v_y(x[0], x[1], v_x)
         return lagged_force(
             Car(*car_numbers(self.vehicle).T),
             curve_at_speed(slip, v_x, self.W, self.ladder, self.vehicle),
             series_compliance(self.own, self.sway.frequency),
             self.own[:, 2],
             slip=slip,
-            x=x,
-            delta=delta,
+            x=[v_y, x[1]],
+            delta=self.sensors.steering(delta),
             v_x=v_x,
             least_lag=least_lag,
         )
@@ -642,6 +646,7 @@ class AxleModel(TireModel):
                 "scales": 1.0 / np.array(self.ladder)[None],
                 "plausibility": np.array(self.plausibility.numbers()),
                 "roll": np.array(self.sway.numbers()),
+                "sensors": np.array(self.sensors),
                 **downforce_numbers(self.vehicle),
             },
             ends_run=self.plausibility.rest(dt),
@@ -670,6 +675,7 @@ class AxleModel(TireModel):
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
             **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
+            **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
         }
@@ -687,6 +693,7 @@ class AxleModel(TireModel):
                 sway=Sway(**data["sway"]),
                 plausibility=Plausibility(**data["plausibility"]),
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
+                sensors=Sensors(**data.get("sensors", {})),
                 calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
                 guarantee=(
                     Guarantee.from_dict(data["guarantee"], len(data["ladder"]))
@@ -713,6 +720,9 @@ def _require_plausible(data: dict[str, Any], source: str) -> None:
         table.table(name).record(record)
     if "tells_v_y" in data and not isinstance(data["tells_v_y"], bool):
         table.refuse("tells_v_y", f"must be true or false, it is {shown(data['tells_v_y'])}")
+    if "sensors" in data:
+        for name in Sensors._fields:
+            table.table("sensors").number(name)
     if "band" in data:
         band = table.table("band")
         for name in ("factors", "speeds", "color", "noise"):

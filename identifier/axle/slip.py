@@ -53,6 +53,24 @@ class Hold(NamedTuple):
     phi: Any
 
 
+class Sensors(NamedTuple):
+    """Errors of sensors that are known beforehand: v_y by β v_x + x_s r [rad, m], δ_f by a share
+    of it [-].
+    """
+
+    v_y_angle: Any = 0.0
+    v_y_lever: Any = 0.0
+    steering_gain: Any = 0.0
+
+    def v_y(self, v_y: Any, r: Any, v_x: Any) -> Any:
+        """Return v_y without them [m/s]."""
+        return v_y - self.v_y_angle * v_x - self.v_y_lever * r
+
+    def steering(self, delta: Any) -> Any:
+        """Return δ_f without them [rad]."""
+        return delta + self.steering_gain * delta
+
+
 def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
     """Return α without sway [rad], (2,).
 

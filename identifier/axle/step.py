@@ -2,8 +2,8 @@
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
-`forward`; sensitivity (2, 3); filters (2, q + 2); errors (2, 3); excitation (2, 9); watch (7,) and
-kept (2, q), the weights that are gone back to after a fault; bank (4,), of the accelerometer.
+`forward`; sensitivity (2, 3); filters (2, q + 2); errors (2, 4); excitation (2, 9); change (4,), of
+another friction; bank (4,), of the accelerometer.
 Of a car with downforce every force, slope and regressor is that of the load at v_x (`Curve.under`).
 Sampled: x, u, v_x, and a_y [m/s²] of an accelerometer, NaN where there is none. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
@@ -26,18 +26,22 @@ from identifier.axle.car import (
     smaller,
     within,
 )
-from identifier.axle.covariance import factors_of, inflated, loosened, row_of, spread, triangle
+from identifier.axle.covariance import factors_of, inflated, row_of, spread, triangle
 from identifier.axle.curve import EDGES, Curve, curve, excited
 from identifier.axle.gate import Gate, GateNumbers, GateState, gate
 from identifier.axle.learning import (
+    LARGEST_Q,
+    MOST_SLOW,
+    SLOW_Q,
     BoundNumbers,
-    ChangeNumbers,
     ErrorState,
     Learnt,
     RegressionNumbers,
-    alarm,
+    RoadNumbers,
+    RoadState,
+    believed,
     bounded,
-    error_means,
+    evidence,
     filtered,
     limited,
     update,
@@ -45,6 +49,7 @@ from identifier.axle.learning import (
 from identifier.axle.slip import (
     Hold,
     SensitivityState,
+    Sensors,
     SlipState,
     SwayNumbers,
     SwayState,
@@ -55,7 +60,6 @@ from identifier.axle.slip import (
     sensitivity,
     sway,
 )
-from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
 from identifier.setup import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
 from models.vehicle import GRAVITY, load_ratio
 
@@ -111,9 +115,14 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
     slip_port, last_slip = axle_port(SlipState, "slip")
     car_port, car = axle_port(Car, "car")
     roll_port, roll = named_port(SwayNumbers, "roll")
+    sensor_port, sensors = named_port(Sensors, "sensors")
     compliance, share, offset = ca.horzsplit(own)
 
     gated = gate(limits, dt, last_gate, x, u, v_x)
+    gated = gated._replace(
+        v_y=sensors.v_y(gated.v_y, gated.r, gated.v_x),
+        delta=ca.vertcat(sensors.steering(gated.delta[0]), gated.delta[1]),
+    )
     body = sway(
         roll,
         car,
@@ -146,6 +155,7 @@ def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
         "scales": scales,
         "plausibility": limit_port,
         "roll": roll_port,
+        "sensors": sensor_port,
     }
     if pressed:
         ports["downforce"] = ca.SX.sym("downforce", 2)
@@ -190,10 +200,9 @@ def _name(kind: str, steps: tuple[int, ...], **parts: bool) -> str:
     return "_".join([kind, *map(str, steps), *(part for part, there in parts.items() if there)])
 
 
-MOVING = 2.0  # errors of y that a force must have to tell weights apart
 LEARNING_OVER = (*OVER, "a_y")
 LEARNT = ("W", "own", "UD")
-BESIDE = ("errors", "excitation", "watch", "kept", "bank")
+BESIDE = ("errors", "excitation", "change", "bank", "sensors")
 CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", *BESIDE)
 LOAD = "static axle loads"
 PORTS = (
@@ -232,8 +241,8 @@ PORTS = (
     Port("filters", LOAD, "filters of the regressors and of the target; mean force; per axle"),
     Port(
         "errors",
-        f"-; -; {LOAD}",
-        "fast and slow mean squared error, peak of the measured force, per axle",
+        f"-; -; -; {LOAD}",
+        "fast mean, trend and slow mean of squared errors, peak of the measured force, per axle",
         learnt=True,
         rule=NOT_NEGATIVE,
     ),
@@ -245,17 +254,10 @@ PORTS = (
         rule=NOT_NEGATIVE,
     ),
     Port(
-        "watch",
-        "s; s; -; s",
-        "time in doubt, and in which kept explained again; mean squared error of W and of kept, "
-        "front and rear; time for which W explained forces",
-        learnt=True,
-        rule=NOT_NEGATIVE,
-    ),
-    Port(
-        "kept",
-        "of W and own",
-        "W and own that are gone back to after a fault, front and rear",
+        "change",
+        "-",
+        "evidence of another friction: precision, mean times it, squared errors; ln of the "
+        "friction over that at the start",
         learnt=True,
     ),
     Port(
@@ -264,6 +266,11 @@ PORTS = (
         "filter of a_y/g; slow means of what motion has more, and of motion; mean of what a_y "
         "explains of it",
     ),
+    Port(
+        "sensors",
+        "rad; m; -",
+        "errors that a fit found, which stay: angle and place of v_y, share of the steering",
+    ),
 )
 
 
@@ -271,20 +278,25 @@ class RegressionSample(NamedTuple):
     """A sample of the regression, rows front and rear.
 
     h : regressor (2, q), zero but for the offset where there is no force to learn from.
-    innovation : y - h'w, clipped (2,).   R : its variance (2,).   learns : 1 or 0.
-    force : mean of y over a moment (2,).
-    holds : whether there is a force to learn from (2,).   inflation : variance to add along a
-    change of friction.   drift : of the offset, over its limit (2,).
+    e : y - h'w (2,), w after what is believed of the road.   innovation : that, clipped (2,).
+    R : its variance (2,).   sigma : standard deviation that y is told to have (2,).
+    learns : 1 or 0.   force : mean of y over a moment (2,).   holds : whether there is a force to
+    learn from (2,).   W : weights to begin with (2, n).   direction : change of weights by ln μ.
+    change, inflation : of ln μ that is believed, and its variance.
     """
 
     h: Any
+    e: Any
     innovation: Any
     R: Any
+    sigma: Any
     learns: Any
     force: Any
     holds: Any
+    W: Any
+    direction: Any
+    change: Any
     inflation: Any
-    drift: Any
 
 
 def build_step(
@@ -302,20 +314,19 @@ def build_step(
     f, ports = _symbols(steps, pressed=pressed)
     h, y, next_state = _regression(f, ports)
     y, next_state["bank"] = _without_bank(f, ports, y)
-    sample, means = _sample_of(f, ports, h, y)
+    sample, peak = _sample_of(f, ports, h, y)
     ports["bounds"], limits = named_port(BoundNumbers, "bounds")
     if rises:
         ports["rising"] = ca.SX.sym("rising", n)
     axles = [_learn(ports, sample, i) for i in (0, 1)]
-    watch = _watch(f, ports, h, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
-    theta = ca.vertcat(*(_kept(ports, limits, axles[i], watch, i) for i in (0, 1)))
+    theta = ca.vertcat(*(_bounded(ports, limits, axles[i], i) for i in (0, 1)))
     next_state |= f.next_state
+    next_state["sensors"] = ports["sensors"]
     next_state["W"], next_state["own"] = theta[:, :n], theta[:, n:]
     next_state["UD"] = ca.vertcat(*(ca.horzcat(*row_of(axle.P)) for axle in axles))
     next_state["filters"] = ca.horzcat(next_state["filters"], sample.force)
-    next_state |= _kept_books(f, ports, sample, means, watch)
-    next_state["watch"] = watch.state
-    next_state["kept"] = ports["kept"] + watch.follow * (theta - ports["kept"])
+    unsure = ca.vertcat(*(axle.uncertainty for axle in axles))
+    next_state |= _errors(f, ports, sample, h[:, :n], unsure, peak)
     outputs = {AXLE_FORCE.name: f.axle_force}
     if bands:
         outputs[HALF_BAND.name] = _half_band(f, ports)
@@ -358,37 +369,23 @@ def _half_band(f: Forward, ports: dict[str, Any]) -> Any:
     return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * f.car.load, 0)
 
 
-LESSON = ("h", "e", "counts", "gains", "told", "watched")
+LESSON = ("h", "e", "counts", "gains", "told")
 
 
 def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
 
-    Its outputs are the regressors h (2, q); e = y - h'w (2,); which share of e counts, after
-    clipping; the gains K (2, q), 0 where nothing is learnt, of lag and offsets also while the watch
-    rests; the standard deviation that y is given (2,), without what the slow mean of squared errors
-    adds; and whether kept weights come back, and by how much they follow the learnt ones.
+    Its outputs are the regressors h (2, q); e = y - h'w (2,), w after what is believed of the road;
+    which share of e counts, after clipping; the gains K (2, q), 0 where nothing is learnt; and the
+    standard deviation that y is given (2,), without what the means of squared errors add.
     """
-    n = len(steps) + 1
     f, ports = _symbols(steps, pressed=pressed)
     h, y, _ = _regression(f, ports)
     y, _ = _without_bank(f, ports, y)
-    sample, means = _sample_of(f, ports, h, y)
-    axles = [_learn(ports, sample, i) for i in (0, 1)]
-    watch = _watch(f, ports, h, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
-    e = y - ca.sum2(ports["W"] * h[:, :n])
-    moves = ca.logic_not(watch.rests)
-    gains = ca.vertcat(*(ca.horzcat(*one.gains[:n], *(g * moves for g in one.gains[n:]))
-                         for one in axles))  # fmt: skip
-    samples = RegressionNumbers(*ca.vertsplit(ports["regression"])).samples
-    outputs = (
-        sample.h,
-        e,
-        ca.if_else(e == 0, 1, sample.innovation / e),
-        gains,
-        ca.sqrt(sample.R / (means.slow * samples)),
-        ca.vertcat(watch.returns, watch.follow),
-    )
+    sample, _ = _sample_of(f, ports, h, y)
+    gains = [ca.horzcat(*_learn(ports, sample, i).gains) for i in (0, 1)]
+    counts = ca.if_else(sample.e == 0, 1, sample.innovation / sample.e)
+    outputs = (sample.h, sample.e, counts, ca.vertcat(*gains), sample.sigma)
     name = _name("axle_lesson", steps, pressed=pressed)
     return ca.Function(name, list(ports.values()), list(outputs), list(ports), list(LESSON))
 
@@ -448,40 +445,40 @@ def _without_bank(f: Forward, ports: dict[str, Any], y: Any) -> tuple[Any, Any]:
     return y - road_push(numbers, state, UNPROVEN * regression.least_force), after
 
 
-def _sample_of(
-    f: Forward, ports: dict[str, Any], h: Any, y: Any
-) -> tuple[RegressionSample, ErrorState]:
-    """Return the sample of the regression, and means of its errors; adds its ports."""
+def _sample_of(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[RegressionSample, Any]:
+    """Return the sample of the regression, and the peak of the measured force; adds its ports."""
     ports["errors"], errors = axle_port(ErrorState, "errors")
-    ports["watch"], watch = named_port(WatchState, "watch")
-    ports["watching"], watching = named_port(WatchNumbers, "watching")
-    ports["change"], change = named_port(ChangeNumbers, "change")
+    ports["change"], road = named_port(RoadState, "change")
+    ports["changing"], changes = named_port(RoadNumbers, "changing")
     numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
     learns, W = f.gated.learns, ports["W"]
-    y_hat = ca.sum2(W * h[:, : W.shape[1]])
-    innovation = y - y_hat
+    n = W.shape[1]
+    M = ports["friction_direction"].T
+    direction = W @ M
+    change, inflation = believed(changes, road)
+    change, inflation = learns * change, learns * inflation
+    W = W + change * (direction + 0.5 * change * (direction @ M))  # exp(change M)
+    y_hat = ca.sum2(W * h[:, :n])
+    e = y - y_hat
     sigma = _deviation(f, numbers, y_hat)
-    fast, slow = error_means(change, errors, (innovation / sigma) ** 2, learns)
-    bound = numbers.clip * sigma * slow
+    bound = numbers.clip * sigma * errors.slow
     force, peak = _recent_force(ports, numbers, y, errors.peak, learns)
     holds = peak >= numbers.least_force
-    alarms = learns * alarm(change, fast, slow)
-    both = (
-        ca.logic_and(holds[0], holds[1])
-        * smaller(alarms[0], alarms[1])
-        * (watch.known >= watching.known)
-    )
     sample = RegressionSample(
         h=ca.horzcat(h[:, :-1] * holds, h[:, -1]),
-        innovation=within(innovation, -bound, bound),
-        R=sigma**2 * slow * numbers.samples,
+        e=e,
+        innovation=within(e, -bound, bound),
+        R=sigma**2 * errors.slow * larger(errors.fast / errors.trend, 1) ** 2 * numbers.samples,
+        sigma=sigma,
         learns=learns,
         force=force,
         holds=holds,
-        inflation=change.inflation * both,
-        drift=change.offset * (watch.known < watching.known) * alarms,
+        W=W,
+        direction=direction,
+        change=change,
+        inflation=inflation,
     )
-    return sample, ErrorState(fast, slow, peak)
+    return sample, peak
 
 
 def _recent_force(
@@ -506,60 +503,57 @@ def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:
     return of_force + numbers.lateness * late + numbers.noise * noisy
 
 
-def _watch(f: Forward, ports: dict[str, Any], h: Any, y: Any, uncertainty: Any) -> Watched:
-    """Return whether there is an alarm on the weights; adds its ports."""
-    n = f.curve.units.shape[1]
-    ports["kept"] = ca.SX.sym("kept", 2, n + 3)
-    numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
-    slow = ports["errors"][:, 1]
-
-    def normalized(W: Any) -> Any:
-        y_hat = ca.sum2(W * h[:, :n])
-        return (y - y_hat) ** 2 / (_deviation(f, numbers, y_hat) ** 2 * slow + uncertainty)
-
-    size = ca.fabs(y)
-    return watched(
-        WatchNumbers(*ca.vertsplit(ports["watching"])),
-        WatchState(*ca.vertsplit(ports["watch"])),
-        normalized(ports["W"]),
-        normalized(ports["kept"][:, :n]),
-        dt=ports["dt"],
-        learns=f.gated.learns,
-        moving=larger(size[0], size[1]) > MOVING * numbers.error,
-    )
-
-
-def _kept_books(
-    f: Forward, ports: dict[str, Any], sample: RegressionSample, means: ErrorState, watch: Watched
+def _errors(
+    f: Forward, ports: dict[str, Any], sample: RegressionSample, h: Any, unsure: Any, peak: Any
 ) -> dict[str, Any]:
-    """Return means of errors and excitation; in an alarm the mean error and what is known rest."""
+    """Return means of errors, excitation and the evidence of another road.
+
+    h : regressors of the weights (2, n).   unsure : variance of h'w by the weights (2,).
+    """
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
-    slow = ca.if_else(watch.rests, ports["errors"][:, 1], means.slow)
+    numbers = RoadNumbers(*ca.vertsplit(ports["changing"]))
+    fast, trend, slow, _ = ca.horzsplit(ports["errors"])
+    learns, told = sample.learns, sample.sigma**2
+    V = told * slow + unsure
+    q = smaller(sample.e**2 / V, LARGEST_Q)
+    of_noise = smaller(sample.e**2 / told, SLOW_Q * slow)
+    means = fast + learns * numbers.fast * (q - fast)
+    lasting = trend + learns * numbers.trend * (larger(q, 1) - trend)
+    noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, MOST_SLOW)
+    road = evidence(
+        numbers,
+        RoadState(*ca.vertsplit(ports["change"])),
+        sample.change,
+        g=ca.sum2(h * sample.direction),
+        e=sample.innovation,
+        V=V,
+        holds=sample.holds,
+        learns=learns,
+    )
     times = excited(
         ports["excitation"],
         f.size,
         dt=ports["dt"],
         samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
-        learns=sample.learns * sample.holds * ca.logic_not(watch.rests),
+        learns=learns * sample.holds,
     )
-    return {"errors": ca.horzcat(means.fast, slow, means.peak), "excitation": times}
+    return {"errors": ca.horzcat(means, lasting, noise, peak), "excitation": times, "change": road}
 
 
 def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:
     """Return parameters, before they are bounded, and covariance of axle i after the sample."""
-    w = ca.horzsplit(ports["W"][i, :])
+    w = ca.horzsplit(sample.W[i, :])
     theta = [*w, *ca.horzsplit(ports["own"][i, :])]
     n, q = len(w), len(theta)
     forgetting = RegressionNumbers(*ca.vertsplit(ports["regression"])).forgetting
     widest = ca.horzsplit(ports["per_variance"][i, :])
     P = factors_of(ca.horzsplit(ports["UD"][i, :]), q)
     before = spread(P, n)
-    direction = ca.vertsplit(ports["friction_direction"] @ ca.vertcat(*w))
+    direction = ca.horzsplit(sample.direction[i, :])
     trace = before.trace + sum(sample.inflation * d * d for d in direction)
     fits = trace * widest[0] <= 1
     P = inflated(P, direction, ca.if_else(fits, sample.inflation, 0))
     now = before._replace(trace=ca.if_else(fits, trace, before.trace))
-    P, now = loosened(P, now, sample.drift[i] / widest[-1], widest)
     return update(
         theta,
         P,
@@ -573,22 +567,12 @@ def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:
     )
 
 
-def _kept(
-    ports: dict[str, Any], limits: BoundNumbers, learnt: Learnt, watch: Watched, i: int
-) -> Any:
-    """Return the parameters of axle i that are gone on with, within their bounds (1, q)."""
+def _bounded(ports: dict[str, Any], limits: BoundNumbers, learnt: Learnt, i: int) -> Any:
+    """Return the parameters of axle i after the sample, within their bounds (1, q)."""
     n = ports["W"].shape[1]
-    before = [*[None] * n, *ca.horzsplit(ports["own"][i, :])]
-    theta = [
-        ca.if_else(watch.returns, old, one if own is None else ca.if_else(watch.rests, own, one))
-        for one, own, old in zip(
-            learnt.theta, before, ca.horzsplit(ports["kept"][i, :]), strict=True
-        )
-    ]
     offset = (limits.steering, limits.v_y)[i]
     slope = ca.vertsplit(ports["rising"]) if "rising" in ports else None
-    theta = bounded(limits, theta, learnt.weights, offset=offset, slope=slope)
+    theta = bounded(limits, learnt.theta, learnt.weights, offset=offset, slope=slope)
     per_step = RegressionNumbers(*ca.vertsplit(ports["regression"])).per_step
-    per_step = ca.if_else(watch.returns, 0, per_step)  # what is gone back to is gone to at once
     w = limited(limits, per_step, ca.horzsplit(ports["W"][i, :]), theta[:n])
     return ca.horzcat(*w, *theta[n:])

@@ -16,7 +16,7 @@ from identifier.axle.curve import EDGES, LADDER, unit_matrix
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import SD_FRICTION
-from identifier.axle.slip import SHORTEST, Sway
+from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
@@ -52,7 +52,7 @@ UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
 LEAST_REACH = 0.032  # rad, up to which it follows the curves at least
 WIDEST = 0.6  # rad, as far as it is fitted
 LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
-BEYOND = 0.02  # weight of a slip that no drive reached, in that fit
+BEYOND = 0.3  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
@@ -717,8 +717,7 @@ class FittedModel(TireModel):
     def in_units(self, ladder: tuple[float, ...] | None = None) -> AxleModel:
         """Return the tires in the hidden units of the axle identifier.
 
-        Curve, lag, sway and zeros of the sensors, that of v_y at the speed of the drives; without
-        load transfer, ellipse, lever and gain of the steering.
+        Curve, lag, sway and errors of the sensors; without load transfer and ellipse.
 
         Parameters
         ----------
@@ -733,12 +732,11 @@ class FittedModel(TireModel):
                 for i, (slip, pseudo) in enumerate(fits)
             ]
         )
-        bias = self["v_y_bias"] + self["v_y_angle"] * self.speeds.mean()
         limits = Plausibility.for_vehicle(self.vehicle)
         own = np.array(
             [
                 [self["compliance_f"], self["sway_share_f"], self["steering_zero"]],
-                [self["compliance_r"], self["sway_share_r"], bias],
+                [self["compliance_r"], self["sway_share_r"], self["v_y_bias"]],
             ]
         )
         own[0, 2] = np.clip(own[0, 2], -limits.max_steering, limits.max_steering)
@@ -755,6 +753,7 @@ class FittedModel(TireModel):
             covariance=self._units_covariance(fits, self.covariance),
             prior_covariance=self._units_covariance(fits, _covariance_before(self)),
             excitation=excitation,
+            sensors=Sensors(*(self[name] for name in Sensors._fields)),
         )
 
     @property

@@ -279,7 +279,7 @@ class InertialIdentifier(Method):
             ends_run=self.plausibility.rest(self.dt),
         )
 
-    def believed_body(self, vehicle: Vehicle) -> Body:
+    def body_prior(self, vehicle: Vehicle) -> Body:
         """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
         frequency = self.roll_frequency / vehicle.froude_time
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)

@@ -163,8 +163,12 @@ def axle_tire(model: AxleModel) -> PredictionTire:
         offset=(model.own[0, 2], model.own[1, 2]),
         downforce=_downforce(model.vehicle),
     )
+    mounted = any(model.sensors)
+    if mounted:
+        weights = np.append(weights, [model.sensors.v_y_angle, model.sensors.steering_gain])
     doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
-    structure = LadderAxles(units=ladder.size, pressed=model.vehicle.has_downforce)
+    pressed = model.vehicle.has_downforce
+    structure = LadderAxles(units=ladder.size, pressed=pressed, mounted=mounted)
     return PredictionTire(structure, weights, model.vehicle, doubt)
 
 
@@ -173,13 +177,8 @@ def fit_tire(model: FittedModel) -> PredictionTire:
 
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
-    units = model.in_units()
-    _, weights, vehicle, _ = axle_tire(units)
-    weights[1] = model["v_y_bias"]
-    weights = np.concatenate([weights, [model["v_y_angle"], model["steering_gain"]]])
     doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
-    structure = LadderAxles(units=len(units.ladder), pressed=vehicle.has_downforce, mounted=True)
-    return PredictionTire(structure, weights, vehicle, doubt)
+    return axle_tire(model.in_units())._replace(doubt=doubt)
 
 
 def _downforce(vehicle: Vehicle) -> tuple[float, ...]:

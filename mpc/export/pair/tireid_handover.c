@@ -155,9 +155,12 @@ bool tireid_handover(const tireid_weights *learnt, tireid_mpc_params *params, re
     bool taken = false;
     if ((learnt != NULL) && (params != NULL) && is_share(share)) {
         real w[WEIGHTS];
+        uint32_t i;
+        for (i = 0U; i < WEIGHTS; i++) {
+            w[i] = params->weights[i]; /* how sensors are mounted is not learnt: it stays */
+        }
         taken = convert(learnt, w);
         if (taken) {
-            uint32_t i;
             for (i = 0U; i < WEIGHTS; i++) {
                 const real moved = params->weights[i] + (share * (w[i] - params->weights[i]));
                 params->weights[i] = (share < (real)1.0) ? moved : w[i];

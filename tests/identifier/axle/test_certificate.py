@@ -171,12 +171,12 @@ def test_the_beginning_is_the_prior_s_where_nothing_was_taught(design, car, driv
     assert not reach.g.any()
 
 
-def test_a_drop_is_followed_later_the_less_is_seen_and_never_without_an_alarm(design, car):
+def test_a_drop_is_followed_later_the_less_is_seen_and_never_unless_it_is_believed(design, car):
     def time(design=design, **conditions):
-        return FrictionDrop(**conditions).time(design, car, 1.0, 20.0)
+        return FrictionDrop(**conditions).time(design, 1.0, 20.0)
 
-    assert time(seen=0.4) < time() < time(errors=1.5) < 2.0
-    blind = replace(design, change=replace(design.change, threshold=1e9))
+    assert time(seen=0.4) < time() < time(errors=1.5) < 5.0
+    blind = replace(design, change=replace(design.change, evidence=1e9))
     assert time(blind) == np.inf
     assert blind.certify(car)["drop_time"].status == "warn"
     assert time(noise=0.3) == np.inf

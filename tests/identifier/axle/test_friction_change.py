@@ -1,100 +1,82 @@
-"""The detector of a friction change by its rules, on numbers."""
+"""Another road by its rules; and what a broken sensor taught is gone once it is good."""
 
-from typing import NamedTuple
+from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
 import pytest
 
+from identifier.axle import AxleIdentifier
 from identifier.axle.car import larger, smaller, within
-from identifier.axle.learning import (
-    LARGEST_Q,
-    SLOW_Q,
-    ChangeDetector,
-    ChangeNumbers,
-    ErrorState,
-    alarm,
-    error_means,
-)
+from identifier.axle.learning import RoadChange, RoadState, believed, evidence
+from identifier.run import identify
+from models.faults import SensorFault
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.sensors import Sensor, Sensors
+from models.vehicle import sedan
 
 DT = 0.01
-
-
-def numbers(dt: float = DT) -> ChangeNumbers:
-    return ChangeDetector().at(dt)
-
-
-class Means(NamedTuple):
-    fast: np.ndarray
-    slow: np.ndarray
-
-
-def means(q, *, fast=(1.0, 1.0), slow=(1.0, 1.0), learns=1, dt=DT) -> Means:
-    state = ErrorState(ca.DM(fast), ca.DM(slow), ca.DM([1.0, 1.0]))
-    found = error_means(numbers(dt), state, ca.DM(q), learns)
-    return Means(*(np.array(value).ravel() for value in found))
-
-
-def settled(q, n, dt) -> Means:
-    """The means after n samples of one error."""
-    fast, slow = ca.SX.sym("fast", 2), ca.SX.sym("slow", 2)
-    found = error_means(numbers(dt), ErrorState(fast, slow, ca.SX.ones(2)), ca.SX(q), 1)
-    step = ca.Function("step", [ca.vertcat(fast, slow)], [ca.vertcat(*found)])
-    return Means(*np.array(step.mapaccum(n)(np.ones(4)))[:, -1].reshape(2, 2))
-
-
-def test_the_means_approach_a_constant_error_with_their_time_constants():
-    detector = ChangeDetector()
-    state = settled([3.0, 2.0], round(detector.fast / 0.001), dt=0.001)
-    reached = 1.0 - np.exp(-1.0)
-    np.testing.assert_allclose(state.fast, [1 + 2 * reached, 1 + reached], rtol=0.01)
-    share = 1.0 - np.exp(-detector.fast / detector.slow)
-    np.testing.assert_allclose(state.slow, [1 + 2 * share, 1 + share], rtol=1e-3)
-
-
-def test_the_slow_mean_is_at_least_one_and_keeps_what_is_above():
-    assert list(means([0.0, 0.0]).slow) == [1.0, 1.0]
-    assert list(means([0.0, 0.0], slow=(3.0, 3.0)).slow) == pytest.approx([2.9985, 2.9985])
-
-
-def test_an_outlier_counts_as_the_largest_error_and_no_more():
-    k = numbers()
-    found = means([1e9, 2.0])
-    assert found.fast[0] == pytest.approx(1.0 + k.fast * (LARGEST_Q - 1.0))
-    assert found.fast[1] == pytest.approx(1.0 + k.fast * 1.0)
-    assert found.slow[0] == pytest.approx(1.0 + k.slow * (SLOW_Q - 1.0))
-
-
-def test_nothing_moves_while_learning_rests():
-    found = means([9.0, 9.0], fast=(2.0, 3.0), slow=(4.0, 3.5), learns=0)
-    assert list(found.fast) == [2.0, 3.0]
-    assert list(found.slow) == [4.0, 3.5]
-
-
-def test_learning_does_not_get_used_to_errors_that_are_no_noise():
-    state = settled([1e3, 2.0], 5000, dt=0.1)
-    np.testing.assert_allclose(state.slow, [4.0, 2.0], rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("ratio", "expected"),
-    [
-        ((4.0, 1.0), (0.0, 0.0)),
-        ((6.0, 5.0), (0.5, 0.25)),
-        ((5.0, 8.0), (0.25, 1.0)),
-        ((90.0, 0.0), (1.0, 0.0)),
-    ],
+NOISE = Sensors(
+    v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
 )
-def test_an_axle_alarms_from_the_threshold_on_and_twice_of_it_is_all(ratio, expected):
-    slow = ca.DM([2.0, 3.0])
-    found = np.array(alarm(numbers(), ca.DM(ratio) * slow, slow)).ravel()
-    np.testing.assert_allclose(found, expected, atol=1e-12)
+STARTS, LASTS, AGAIN = 14.0, 2.0, 3.0  # s
 
 
-def test_the_inflation_adds_the_square_of_the_step_in_its_time():
-    detector = ChangeDetector(step=0.4, step_time=0.5)
-    per_sample = detector.at(DT).inflation
-    assert per_sample * 0.5 / DT == pytest.approx(0.4**2)
+def collected(e, *, g=(0.3, 0.2), seconds=2.0, holds=(1, 1), learns=1, state=None, rule=None):
+    """Evidence of errors e [loads] that last, with a variance of 0.03 squared."""
+    numbers = (rule or RoadChange()).at(DT)
+    state = RoadState(0.0, 0.0, 0.0, 0.0) if state is None else state
+    V = ca.DM([0.03**2, 0.03**2])
+    for _ in range(round(seconds / DT)):
+        found = evidence(
+            numbers, state, 0.0, g=ca.DM(g), e=ca.DM(e), V=V, holds=ca.DM(holds), learns=learns
+        )
+        state = RoadState(*np.array(found).ravel())
+    return state
+
+
+def change_of(state, rule=None):
+    change, variance = believed((rule or RoadChange()).at(DT), state)
+    return float(change), float(variance)
+
+
+def test_what_is_believed_is_the_estimate_of_least_squares_with_a_prior():
+    rule, m, g = RoadChange(time=1e6), -0.2, np.array([0.3, 0.2])
+    state = collected(m * g, g=g, seconds=2.0, rule=rule)
+    n = 2.0 / rule.correlation_time  # independent samples in two seconds
+    precision = n * (g @ g) / 0.03**2 + rule.spread**-2
+    change, variance = change_of(state, rule)
+    assert change == pytest.approx(m * n * (g @ g) / 0.03**2 / precision, rel=1e-3)
+    assert variance == pytest.approx(1.0 / precision, rel=1e-3)
+
+
+def test_a_change_is_believed_where_it_explains_both_axles_and_not_where_one_contradicts():
+    assert change_of(collected([-0.12, -0.08]))[0] == -RoadChange().step  # cut
+    assert change_of(collected([-0.12, 0.08])) == (0.0, 0.0)
+    assert change_of(collected([-0.01, -0.01])) == (0.0, 0.0)
+    assert change_of(collected([-0.12, 0.0], g=(0.3, 0.0)))[0] < 0.0  # that one tells nothing
+
+
+def test_an_axle_without_a_force_and_a_sample_that_is_not_learnt_tell_nothing():
+    assert collected([-0.1, 5.0], holds=(1, 0)) == collected([-0.1, 0.0], g=(0.3, 0.0))
+    before = RoadState(3.0, 1.0, 2.0, -0.1)
+    assert collected([-0.1, -0.1], learns=0, state=before) == before
+
+
+def test_evidence_is_that_of_about_a_second_and_gone_once_it_is_believed():
+    assert collected([-0.1, -0.1], seconds=9.0).A < 1.6 * collected([-0.1, -0.1], seconds=1.0).A
+    numbers, state = RoadChange().at(DT), collected([-0.1, -0.1])
+    none = ca.DM([0.0, 0.0])
+    V = ca.DM([1.0, 1.0])
+    after = evidence(numbers, state, -0.2, g=none, e=none, V=V, holds=ca.DM([1, 1]), learns=1)
+    np.testing.assert_allclose(np.array(after).ravel(), [0.0, 0.0, 0.0, -0.2])
+
+
+def test_numbers_of_a_change_are_positive():
+    with pytest.raises(ValueError, match="evidence must be positive and finite, it is 0"):
+        RoadChange(evidence=0.0)
 
 
 def test_larger_smaller_and_within_are_those_of_numpy(rng):
@@ -104,3 +86,102 @@ def test_larger_smaller_and_within_are_those_of_numpy(rng):
     np.testing.assert_array_equal(np.array(smaller(ca.DM(a), ca.DM(b))).ravel(), np.minimum(a, b))
     clipped = np.array(within(ca.DM(a), -0.3, 0.5)).ravel()
     np.testing.assert_array_equal(clipped, np.clip(a, -0.3, 0.5))
+
+
+@cache
+def drive():
+    """A noisy random drive of the sedan."""
+    steer = RandomSteer(
+        amplitude=0.08, frequency=0.5, seed=3, onset=0.5, rate_limit=1.0, duration=25.0
+    )
+    run = Plant(sedan()).simulate(steer, speed=20.0)
+    return run.recording(NOISE, np.random.default_rng(8))
+
+
+@cache
+def without_fault():
+    return identify(drive(), sedan(), AxleIdentifier.for_vehicle(sedan())).axle_force
+
+
+def broken(channel, kind, size=0.0):
+    clean = drive()
+    fault = SensorFault(channel=channel, kind=kind, start=STARTS, duration=LASTS, size=size)
+    good, wrong = getattr(clean, channel), fault.active(clean.t)
+    shown = fault.shown(clean.t, good, good[np.argmax(wrong)], 0.0)
+    return replace(clean, **{channel: np.where(wrong, shown, good)})
+
+
+def off_afterwards(recording, design):
+    """Difference of the forces told to those without the fault, over their rms; ln of friction."""
+    history = identify(recording, sedan(), design)
+    later = recording.t >= STARTS + LASTS + AGAIN
+    off = np.sqrt(np.mean((history.axle_force - without_fault())[later] ** 2, axis=0))
+    size = np.sqrt(np.mean(without_fault() ** 2, axis=0))
+    return (off / size).max(), history.state["change"].reshape(recording.t.size + 1, 4)[:, 3]
+
+
+HARMFUL = [
+    ("r", "stuck"),
+    ("r", "zero"),
+    ("r", "flipped"),
+    ("r", "scaled", 1.6),
+    ("v_y", "stuck"),
+    ("v_y", "biased", 1.0),
+    ("delta_f", "stuck"),
+]
+
+
+@pytest.mark.parametrize("fault", HARMFUL, ids=str)
+def test_what_a_broken_sensor_taught_is_gone_three_seconds_after_it_is_good(fault):
+    off, friction = off_afterwards(broken(*fault), AxleIdentifier.for_vehicle(sedan()))
+    assert off < 0.05
+    assert not friction.any(), "a fault was taken for another road"
+
+
+def test_a_biased_steering_may_look_like_less_grip_and_no_more_than_that():
+    off, friction = off_afterwards(
+        broken("delta_f", "biased", 0.04), AxleIdentifier.for_vehicle(sedan())
+    )
+    assert off < 0.25 and friction.min() >= -RoadChange().step
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fast": 1e9},  # sudden errors are not doubted
+        {"explains": 0.01},  # what explains nothing is taken for a road
+    ],
+    ids=str,
+)
+def test_a_rule_that_is_broken_is_caught(change):
+    design = AxleIdentifier.for_vehicle(sedan())
+    design = replace(design, change=replace(design.change, **change))
+    assert max(off_afterwards(broken(*fault), design)[0] for fault in HARMFUL) > 0.05
+
+
+def test_no_road_is_another_where_nothing_fails():
+    assert not off_afterwards(drive(), AxleIdentifier.for_vehicle(sedan()))[1].any()
+
+
+@pytest.mark.parametrize("channel", ["v_x", "v_y", "r", "delta_f", "delta_r"])
+@pytest.mark.parametrize("at", [0, 700])
+def test_samples_that_are_no_number_are_as_impossible_ones(channel, at):
+    """Bit for bit, wherever they come, in every carried number; and none of them is kept."""
+    car, clean, carried = sedan(), drive(), []
+    setup = AxleIdentifier.for_vehicle(car).setup(car)
+    names = ("v_x", "v_y", "r", "delta_f", "delta_r")
+    for wrong in (np.nan, 1e6):
+        seen = {name: getattr(clean, name).copy() for name in names}
+        seen[channel][at : at + 50] = wrong
+        over = {
+            "x": np.column_stack([seen["v_y"], seen["r"]]),
+            "u": np.column_stack([seen["delta_f"], seen["delta_r"]]),
+            "v_x": seen["v_x"],
+            "a_y": np.full(len(clean), np.nan),
+        }
+        carried.append(setup.scan(len(clean), {**setup.carry, **over, **setup.constants}))
+    for name, values in carried[0].items():
+        assert np.isfinite(values).all(), name
+        np.testing.assert_array_equal(values, carried[1][name], err_msg=name)
+    off = np.sqrt(np.mean((carried[0]["axle_force"] - without_fault())[1000:] ** 2, axis=0))
+    assert (off < 0.02 * np.sqrt(np.mean(without_fault() ** 2, axis=0))).all()

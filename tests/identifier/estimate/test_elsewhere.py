@@ -88,10 +88,13 @@ def test_hidden_units_of_the_tracker_follow_any_tire_to_a_percent_of_the_load():
     assert worst[0] > 0.05  # two wide units do not
 
 
-def test_zeros_of_the_sensors_are_those_of_the_speed_of_the_drives():
-    model = believed(v_y_bias=0.02, v_y_angle=0.01, steering_zero=0.003)
+def test_sensors_are_taken_over_and_the_doubt_of_an_angle_is_that_at_the_speed_of_the_drives():
+    model = believed(
+        v_y_bias=0.02, v_y_angle=0.01, steering_zero=0.003, v_y_lever=0.2, steering_gain=0.1
+    )
     units = model.in_units()
-    np.testing.assert_allclose(units.own[:, 2], [0.003, 0.02 + 0.01 * 18.0])
+    np.testing.assert_allclose(units.own[:, 2], [0.003, 0.02])
+    assert units.sensors == (0.01, 0.2, 0.1)
     b, angle = INDEX["v_y_bias"], INDEX["v_y_angle"]
     P = model.covariance
     variance = P[b, b] + 36.0 * P[b, angle] + 18.0**2 * P[angle, angle]

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from identifier.axle.slip import Sensors
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import build_package
 from identifier.methods import make_method
@@ -207,6 +208,24 @@ def test_c_hands_over_what_python_makes_of_the_same_weights(law, taught, pairs, 
         np.testing.assert_allclose(params[name], tracker.params[name], rtol=1e-14, err_msg=name)
     for name in kept:
         np.testing.assert_array_equal(params[name], pair.tracker.params[name], err_msg=name)
+
+
+def test_how_sensors_are_mounted_stays_at_a_handover(tmp_path):
+    design = make_method("axle", CAR)
+    fresh = design.frozen(CAR, design.setup(CAR).carry)
+    start = replace(fresh, sensors=Sensors(0.01, 0.2, 0.05))
+    pair = build_pair(build_package(design, CAR, start))
+    for part, files in (
+        ("identifier", pair.identifier.files),
+        ("mpc", pair.tracker.files),
+        ("", pair.files),
+    ):
+        put(tmp_path / part, files)
+    weights = CompiledPackage.of(pair.identifier, single=False).weights
+    taken, params = handed_over(joined(tmp_path), pair, weights, 1.0)
+    assert taken
+    np.testing.assert_allclose(params["weights"], prediction_tire(start).weights, rtol=1e-14)
+    np.testing.assert_array_equal(params["weights"][-2:], [0.01, 0.05])
 
 
 @pytest.mark.parametrize("law", LAWS)
