@@ -19,7 +19,7 @@ class FrozenModelError(TireidError, ValueError):
 
 
 DEAD = 0.02  # of the stated stiffness, below which an axle does not push
-_PROBE = 0.02  # rad, a slip at which every tire pushes back
+PROBE = 0.02  # rad, a slip at which every tire pushes back
 WIDE = 0.3  # rad, beyond the slip of every tire's peak
 _LARGEST_MIN_SPEED = 50.0  # m/s: above it, a car would have forces on motorways only
 
@@ -64,7 +64,7 @@ def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
 
     refusal : class of the error to raise.
     """
-    force = np.asarray(tires.force_at(np.array([-WIDE, -_PROBE, _PROBE, WIDE])))
+    force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
         raise refusal(
             f"axle forces must be finite and below {LARGEST_FORCE:g} N, at {WIDE} rad of slip and "
@@ -72,11 +72,11 @@ def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
         )
     if not (force[2] > force[1]).all():
         raise refusal(
-            f"axle forces must rise with slip, at {-_PROBE} and {_PROBE} rad they are "
+            f"axle forces must rise with slip, at {-PROBE} and {PROBE} rad they are "
             f"{force[1].tolist()} and {force[2].tolist()} N: check units, the order of inputs, "
             "and the sign of slip (slip_sign)"
         )
-    slope = (force[2] - force[1]) / (2.0 * _PROBE)
+    slope = (force[2] - force[1]) / (2.0 * PROBE)
     for axle, here, said in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
         if not here >= DEAD * said:
             raise refusal(

@@ -20,6 +20,8 @@ from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import ENOUGH, STRIDE, error_size, estimate, simulate
+from identifier.frozen import PROBE
+from identifier.motion.parameters import INDEX, SLIPS
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -126,6 +128,16 @@ def fit(
         parted=parted,
         a_y_late=late,
     )
+    least = model.force_at(np.array([0.05, 1.0]) * PROBE).min(axis=0)
+    falling = [
+        f"residual{j}_{axle}"
+        for axle, force in zip("fr", least, strict=True)
+        for j in range(len(SLIPS))
+        if not force > 0.0 and before.moves[INDEX[f"residual{j}_{axle}"]]
+    ]
+    if falling:  # as where a servo has play: such a curve is no tire, the formula alone is one
+        fewer = before.without(falling)
+        return fit(recordings, vehicle, fewer, block=block, coarse=coarse, progress=progress)
     return Fit(model, found, parts)
 
 

@@ -103,6 +103,14 @@ class Priors:
     typed: tuple[int, ...] = ()
     data: Information | None = None
 
+    def without(self, names: Collection[str]) -> "Priors":
+        """Return the beliefs with some parameters held at zero."""
+        mean, information, moves = self.mean.copy(), self.information.copy(), self.moves.copy()
+        index = [INDEX[name] for name in names]
+        mean[index], moves[index] = 0.0, False
+        information[index], information[:, index] = 0.0, 0.0
+        return replace(self, mean=mean, information=information, moves=moves)
+
     @classmethod
     def of(
         cls,
