@@ -26,8 +26,6 @@ IN_MEMORY = 8 * 8 * LONG  # bytes, beyond which an array lies on disk
 def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
     """Yield consecutive parts of samples: one where there are at most `LONG`, else of `BLOCK`.
 
-    Parameters
-    ----------
     n : samples, the end of the last part.
     """
     size = BLOCK if n > LONG else max(n, 1)
@@ -62,8 +60,6 @@ def on_disk(
 ) -> NDArray[Any]:
     """Return an array that is a file, of which memory holds what was used last alone.
 
-    Parameters
-    ----------
     mode : "r", or "w+" to make the file as large as that.
     """
     mapped = np.memmap(file, dtype, mode=mode, shape=shape)
@@ -90,8 +86,6 @@ def filled(n: int, compute: Callable[[slice], Array]) -> Array:
 
     Nobody may write them.
 
-    Parameters
-    ----------
     compute : returns the values of a part of them (k,).
     """
     values = large((n,))

@@ -35,8 +35,6 @@ EXPANDED = {**BUILDERS, **OWN}
 def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
 
-    Parameters
-    ----------
     whole : False leaves our own functions as the scalars that they are made of.
     """
     if not whole:
@@ -155,8 +153,6 @@ Unit = TypeVar("Unit")
 def in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
     """Return the units, each after those that it needs.
 
-    Parameters
-    ----------
     needs : of each unit that is written, which others, each once; there is no circle.
     results : units that nobody needs, in the order in which they are wanted.
     """
@@ -227,8 +223,6 @@ MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS", "floor": "FLOOR"}
 def literal(value: float, prefix: str) -> str:
     """Return a number in C, which reads back as the same double; in float the nearest there is.
 
-    Parameters
-    ----------
     value : finite.
     """
     size = abs(value)
@@ -249,17 +243,10 @@ def _digits(value: float) -> str:
 class Statements:
     """Statements that compute the outputs of a graph.
 
-    Parameters
-    ----------
     graph : the scalars; choices and our own functions are nodes.
     read : C expression of an entry of an input.
     write : C lvalue of an entry of an output.
     sums : whether the sum of all that is written is returned, which is finite only where all is.
-
-    Raises
-    ------
-    UnknownOperationError
-        Where an operation has no plain C.
     """
 
     def __init__(

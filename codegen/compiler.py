@@ -52,13 +52,7 @@ def cache_folder() -> Path:
 
 
 def _distrust(path: Path) -> str | None:
-    """Return why another user could have written a file or what is in a folder; None if none could.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be looked at.
-    """
+    """Return why another user could have written a file or into a folder; None if none could."""
     if not hasattr(os, "getuid"):  # Windows keeps a user's folders to the user
         return None
     found = path.lstat()
@@ -72,13 +66,7 @@ def _distrust(path: Path) -> str | None:
 
 
 def keep(stem: str, ending: str, content: bytes) -> Path:
-    """Keep a file for `kept`; return its path, which ends with the hash of its content.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be written.
-    """
+    """Keep a file for `kept`; return its path, which ends with the hash of its content."""
     folder = cache_folder()
     file = folder / f"{stem}.{_digest(content)}{ending}"
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
@@ -215,21 +203,12 @@ def load_library(
 def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) -> Path | None:
     """Compile C source to a shared library in the cache folder, or find it there.
 
-    Parameters
-    ----------
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
     flags : of the compiler; None takes `FLAGS`.
 
     Returns
     -------
     The library's path, or None where there is no compiler.
-
-    Raises
-    ------
-    CompilationError
-        Where the compiler refuses the source.
-    OSError
-        Where the compiler cannot be run or its result cannot be written.
     """
     compiler = find_compiler()
     if compiler is None:

@@ -45,8 +45,6 @@ Q = (
 def tanh(x: Any) -> Any:
     """Return tanh, entry by entry.
 
-    Parameters
-    ----------
     x : CasADi expression, array or number.
     """
     x = where(x > LIMIT, LIMIT, x)
@@ -58,8 +56,6 @@ def tanh(x: Any) -> Any:
 def polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
     """Return Σ c_k s^k by Horner's rule.
 
-    Parameters
-    ----------
     coefficients : c_0 first.
     """
     *lower, value = coefficients
@@ -71,8 +67,6 @@ def polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
 def where(condition: Any, a: Any, b: Any) -> Any:
     """Return a where the condition holds, else b.
 
-    Parameters
-    ----------
     a : expression, array or number.
     b : expression, array or number.
     """
@@ -83,8 +77,6 @@ def where(condition: Any, a: Any, b: Any) -> Any:
 def floor(x: Any) -> Any:
     """Return the largest whole number that is not above x, entry by entry; exact everywhere.
 
-    Parameters
-    ----------
     x : expression, array or number.
     """
     return ca.floor(x) if isinstance(x, ca.SX | ca.MX | ca.DM) else np.floor(x)
@@ -130,8 +122,6 @@ TURN = 2.0 * math.pi
 def exp(y: Any) -> Any:
     """Return e^y, entry by entry.
 
-    Parameters
-    ----------
     y : CasADi expression, array or number.
     """
     y = where(y > _EXP_LIMIT, _EXP_LIMIT, y)
@@ -148,8 +138,6 @@ def exp(y: Any) -> Any:
 def atan(x: Any) -> Any:
     """Return the arc tangent [rad], entry by entry.
 
-    Parameters
-    ----------
     x : CasADi expression, array or number.
     """
     steep = x * x > 1.0
@@ -163,8 +151,6 @@ def atan(x: Any) -> Any:
 def sin(x: Any) -> Any:
     """Return the sine, entry by entry.
 
-    Parameters
-    ----------
     x : CasADi expression, array or number [rad].
     """
     y = x - TURN * floor(x * (1.0 / TURN) + 0.5)

@@ -70,8 +70,6 @@ class Graph:
     def add(self, node: Node) -> int:
         """Return the place of a node, which is added unless it is there.
 
-        Parameters
-        ----------
         node : its `args` are places in this graph.
         """
         place = self._known.setdefault(node, len(self.nodes))
@@ -154,8 +152,6 @@ def _canonical(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
 def simplifying(on: bool) -> Iterator[None]:
     """Build SX expressions with or without CasADi's own simplifications, such as c/x for c (1/x).
 
-    Parameters
-    ----------
     on : whether CasADi simplifies.
     """
     before = ca.GlobalOptions.getSimplificationOnTheFly()
@@ -170,13 +166,7 @@ def simplifying(on: bool) -> Iterator[None]:
 def function_of(
     graph: Graph, like: ca.Function, builders: Mapping[str, Callable[..., Any]] = BUILDERS
 ) -> ca.Function:
-    """Return an SX function of a graph.
-
-    Raises
-    ------
-    UnknownOperationError
-        Where an operation has no builder.
-    """
+    """Return an SX function of a graph."""
     ports = [ca.SX.sym(name, *like.size_in(name)) for name in like.name_in()]
     entries = [ca.vertsplit(ca.vec(port)) if port.numel() else [] for port in ports]
     made: dict[int, Any] = {}
@@ -222,8 +212,6 @@ def decision(graph: Graph, ports: set[int]) -> int | None:
 def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
     """Return the graph where a condition is known; its choices are taken when it is simplified.
 
-    Parameters
-    ----------
     holds : whether it holds.
     """
     known = {condition: holds}
@@ -276,8 +264,6 @@ def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function,
     It computes the same bits, operation by operation; functions that differ in their constants
     alone become the same function.
 
-    Parameters
-    ----------
     port : name of the input that is added, the last; constants (n,) in their order in `function`.
     """
     graph, n_in = graph_of(function), function.n_in()

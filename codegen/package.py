@@ -37,8 +37,6 @@ class PackageNameError(TireidError, ValueError):
 def check_name(name: str, ending: str = "") -> None:
     """Refuse a name that cannot begin the symbols of a C library.
 
-    Parameters
-    ----------
     name : in lower case.
     """
     if not NAME.fullmatch(name.removesuffix(ending)):
@@ -57,8 +55,6 @@ def check_name(name: str, ending: str = "") -> None:
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """Return C, or the name of one of its files, with the beginnings of words changed, once.
 
-    Parameters
-    ----------
     text : of the repository; `tireid_step`, `TIREID_OK` and `tireid.h` are words with a beginning,
         `tireid` alone is none. So has `test_tireid.c`.
     names : new beginnings by old ones, in lower case; macros get them in upper case.
@@ -72,8 +68,6 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 def c_files(folder: Path, places: Mapping[str, str], names: Mapping[str, str]) -> dict[str, str]:
     """Return C files of the repository under the names of a package, by their path in it.
 
-    Parameters
-    ----------
     places : their folder in the package by name of the file.
     """
     return {
@@ -108,8 +102,6 @@ def generated(about: Values) -> str:
 def in_comment(words: str | Words) -> str:
     """Return words for the inside of a C comment.
 
-    Parameters
-    ----------
     words : from data, which are escaped, or a text of ours.
     """
     return c_comment(words.text) if isinstance(words, Words) else words
@@ -118,8 +110,6 @@ def in_comment(words: str | Words) -> str:
 def header(file: str, about: str, parts: Iterable[str]) -> str:
     """Return a generated header.
 
-    Parameters
-    ----------
     about : comment at its beginning, of lines that are escaped for C.
     """
     guard = re.sub(r"\W", "_", file).upper()
@@ -131,8 +121,6 @@ def header(file: str, about: str, parts: Iterable[str]) -> str:
 def precision(prefix: str, *, single: bool) -> str:
     """Return the switch of the precision and the type that it gives.
 
-    Parameters
-    ----------
     single : whether float is the default.
     """
     macro = f"{prefix.upper()}_SINGLE"
@@ -146,8 +134,6 @@ def precision(prefix: str, *, single: bool) -> str:
 def defines(prefix: str, values: Mapping[str, tuple[object, str]]) -> str:
     """Return macros, one a line.
 
-    Parameters
-    ----------
     values : value and comment by the name of the macro, without the prefix.
     """
     return "".join(
@@ -159,8 +145,6 @@ def defines(prefix: str, values: Mapping[str, tuple[object, str]]) -> str:
 def rows(table: Array) -> str:
     """Return the rows of a C initializer of doubles, which read back as the same ones.
 
-    Parameters
-    ----------
     table : (n, m); NaN is the NAN of <math.h>.
     """
     text = "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
@@ -180,8 +164,6 @@ FUNCTIONS: Mapping[str, tuple[str, str]] = {  # in float and in double
 def _own_functions(prefix: str, called: Collection[str]) -> str:
     """Return those of our own functions that are called, each over an array, from one expression.
 
-    Parameters
-    ----------
     called : their names, of `OWN`.
     """
     texts = []
@@ -203,8 +185,6 @@ def _entry(_port: int, _entry: int) -> str:
 def used_macros(prefix: str, text: str) -> str:
     """Return the definitions of the functions of both precisions that a text calls.
 
-    Parameters
-    ----------
     text : in C.
     """
     capital = prefix.upper()
@@ -249,8 +229,6 @@ def cmake(
 ) -> dict[str, str]:
     """Return CMakeLists.txt of a package by its path.
 
-    Parameters
-    ----------
     files : paths of the package; what lies in src/ is the library.
     about : of `about_package`.
     """
@@ -265,8 +243,6 @@ def cmake(
 def content_head(form: str, name: str, *, single: bool) -> dict[str, Any]:
     """Return what every manifest begins with.
 
-    Parameters
-    ----------
     single : whether float is the default precision.
     """
     return {
@@ -296,8 +272,6 @@ def about_package(content: Mapping[str, Any], title: str) -> dict[str, str | Wor
 def digest(content: Any) -> str:
     """Return the SHA-256 of data as JSON, 64 hexadecimal digits.
 
-    Parameters
-    ----------
     content : ready for JSON.
     """
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
@@ -307,8 +281,6 @@ def digest(content: Any) -> str:
 def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
     """Return <name>.json.
 
-    Parameters
-    ----------
     content : everything that went in, ready for JSON.
     """
     hashes = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
@@ -319,8 +291,6 @@ def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
 def manifest_with_figures(manifest: str, figures: Sequence[Mapping[str, Any]]) -> str:
     """Return <name>.json with what the package costs; its hashes are of the rest.
 
-    Parameters
-    ----------
     manifest : text of the JSON file.
     figures : one of each processor and precision, ready for JSON.
     """

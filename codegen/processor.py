@@ -114,19 +114,10 @@ def replay(
 ) -> Replay:
     """Run a program on a processor in QEMU, or on this machine.
 
-    Parameters
-    ----------
     where : one of `PROCESSORS`, or the C compiler of this machine.
     single : whether to compute in float.
     corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
         comparisons, and not those of libgcc, for costs.
-
-    Raises
-    ------
-    CompilationError
-        Where the compiler refuses a file.
-    ReplayError
-        Where the program does not come to its end.
     """
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
         folder = Path(scratch)
@@ -201,14 +192,7 @@ def size_on(
 ) -> Size:
     """Return the memory that a package takes on a processor, instances not included.
 
-    Parameters
-    ----------
     single : whether to compute in float.
-
-    Raises
-    ------
-    CompilationError
-        Where the compiler refuses a file.
     """
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
         folder = Path(scratch)
@@ -274,8 +258,6 @@ class Cost(NamedTuple):
 def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
     """Return what a program costs on a processor.
 
-    Parameters
-    ----------
     single : whether to compute in float.
     """
     size = size_on(processor, program.name, program.files, single=single)
@@ -287,8 +269,6 @@ def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
 def cost_table(costs: Sequence[Cost], about: str) -> str:
     """Return costs as Markdown; a line that they were not measured where there are none.
 
-    Parameters
-    ----------
     about : over what instructions and stack were measured, and what else is to be said.
     """
     if not costs:
@@ -314,8 +294,6 @@ def cost_table(costs: Sequence[Cost], about: str) -> str:
 def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
     """Return <name>.json with the costs; its hashes are of the rest.
 
-    Parameters
-    ----------
     manifest : text of the JSON file.
     """
     figures = [

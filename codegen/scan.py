@@ -82,17 +82,10 @@ class Layout(NamedTuple):
 class Scan:
     """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
 
-    Parameters
-    ----------
     step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
         of the same shape. Its name becomes part of a C identifier.
     over : inputs with one row a sample. Every other input is constant.
     flags : of the compiler; None takes `codegen.compiler.FLAGS`.
-
-    Raises
-    ------
-    ValueError
-        Where the ports do not fit together.
     """
 
     def __init__(
@@ -181,8 +174,6 @@ class Scan:
     ) -> dict[str, Array]:
         """Run `n` samples.
 
-        Parameters
-        ----------
         n : number of samples.
         values : one array for every input of the step: carried ports their start, ports of `over`
             one row a sample (n, size), constants their value. Matrices have the port's shape.
@@ -196,11 +187,6 @@ class Scan:
         recorded before each recorded step (n_recorded, *shape), and as `p_all` both (n_recorded +
         1, *shape); for each other output that is recorded its value (n_recorded, *shape). Column
         vectors have the shape (n_recorded, size).
-
-        Raises
-        ------
-        ValueError
-            Where a value is missing, unknown, or has the wrong shape, or there is no such port.
         """
         packed = self.packed(n, values)
         if every < 1:
@@ -221,14 +207,7 @@ class Scan:
     def packed(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
         """Check shapes; flatten matrices by columns, as CasADi stores them.
 
-        Parameters
-        ----------
         n : number of samples.
-
-        Raises
-        ------
-        ValueError
-            Where a value is missing, unknown, or has the wrong shape.
         """
         if values.keys() != self._size_in.keys():
             expected = set(self._size_in)
@@ -357,8 +336,6 @@ class Scan:
 def pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
     """Return where arrays begin, as C wants it.
 
-    Parameters
-    ----------
     arrays : contiguous; the caller keeps them alive. None is nowhere.
     """
     places = (None if a is None else a.ctypes.data for a in arrays)
@@ -368,8 +345,6 @@ def pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
 def shaped(flat: Array, size: tuple[int, int]) -> Array:
     """Return rows of column-major numbers in their matrix shape; column vectors stay flat.
 
-    Parameters
-    ----------
     flat : numbers (..., rows columns).
     size : rows and columns of the port.
     """
@@ -396,14 +371,7 @@ class Stepper:
     `over`, flat (size,) or, of several samples at once, one row a sample; and of the outputs that
     are not carried, those of the last sample, flat. Matrices lie by columns.
 
-    Parameters
-    ----------
     values : start of the carried ports and the constants, by name.
-
-    Raises
-    ------
-    ValueError
-        Where a value is missing, unknown, or has the wrong shape.
     """
 
     def __init__(self, scan: Scan, values: Mapping[str, Array], samples: int = 1) -> None:
@@ -451,13 +419,7 @@ class Stepper:
         ]
 
     def advance(self) -> None:
-        """Take the samples that `inputs` holds; leave what the last one tells in `outputs`.
-
-        Raises
-        ------
-        RuntimeError
-            Where the step reports a failure.
-        """
+        """Take the samples that `inputs` holds; leave what the last one tells in `outputs`."""
         if self._loop is None:
             self._advance_slowly()
             return
@@ -478,8 +440,6 @@ class Stepper:
     def begin(self, port: str, value: Array) -> None:
         """Go on from another value of a carried port.
 
-        Parameters
-        ----------
         value : (rows, columns) of the port, flat where it is a column.
         """
         self._now[port][:] = np.ravel(value, order="F")

@@ -18,8 +18,6 @@ LANGUAGES: Mapping[str, Callable[[str], str]] = {  # by the ending of the templa
 class Words:
     """Words from data, such as the name of a car: no text of any language.
 
-    Parameters
-    ----------
     text : any; a template takes it into comments and prose, escaped for its language.
     """
 
@@ -32,16 +30,8 @@ Values = Mapping[str, str | Words]
 def filled(template: Path, values: Values) -> str:
     """Return a template with every `@key@` replaced, once.
 
-    Parameters
-    ----------
     template : a file; its ending tells the language.
     values : by key: text of that language, or `Words`, which are escaped for it.
-
-    Raises
-    ------
-    KeyError
-        Where the template has a key that no value is given for, or words enter a language of which
-        nothing is known.
     """
 
     def value(found: re.Match[str]) -> str:

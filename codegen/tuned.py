@@ -31,8 +31,6 @@ class Tuned(NamedTuple):
 def tuned(function: ca.Function, *, sampled: tuple[str, ...]) -> Tuned:
     """Return a function with our own tanh, exp and atan and without needless operations.
 
-    Parameters
-    ----------
     sampled : inputs that may decide which part of the function is computed.
     """
     return _tuned(function.serialize(), sampled)

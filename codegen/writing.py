@@ -9,13 +9,7 @@ from pathlib import Path
 
 @contextmanager
 def naming(path: str | PathLike[str]) -> Iterator[None]:
-    """Name a file in the error of what writes it, where that names none.
-
-    Raises
-    ------
-    OSError
-        The same, of the same class, with the file.
-    """
+    """Name a file in the error of what writes it, where that names none."""
     try:
         yield
     except OSError as error:
@@ -27,14 +21,7 @@ def naming(path: str | PathLike[str]) -> Iterator[None]:
 def write_file(path: Path, content: str | bytes) -> None:
     """Write a file.
 
-    Parameters
-    ----------
     content : all of it, text in UTF-8 with line ends as they are.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be written, with its name.
     """
     with naming(path):
         path.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

@@ -15,8 +15,6 @@ _SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 class Property:
     """A property of a design, its limit, and what to do.
 
-    Parameters
-    ----------
     limit : what the value is held against; None where it is a statement only.
     margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
     advice : one line; empty where there is nothing to say.
@@ -36,8 +34,6 @@ class Property:
 class Certificate:
     """All properties of a design, and what its construction holds.
 
-    Parameters
-    ----------
     properties : in the order of the table; none where nothing is proven of stability and errors.
     held : by name and unit, what holds after every sample whatever is measured: plain data.
     """
@@ -91,8 +87,6 @@ class Certificate:
 def at_most(value: float, *, good: float, bad: float | None) -> Status:
     """Pass up to `good`, warn up to `bad`, fail beyond (never, where `bad` is None).
 
-    Parameters
-    ----------
     value : to be judged; nan fails.
     bad : largest value that only warns.
     """
@@ -104,8 +98,6 @@ def at_most(value: float, *, good: float, bad: float | None) -> Status:
 def at_least(value: float, *, good: float, bad: float | None) -> Status:
     """Pass down to `good`, warn down to `bad`, fail below (never, where `bad` is None).
 
-    Parameters
-    ----------
     value : to be judged; nan fails.
     bad : smallest value that only warns.
     """

@@ -30,8 +30,6 @@ class Driving:
     The sensors may err by as much as the noise at every sample, in any direction: it is a largest
     error, not a standard deviation.
 
-    Parameters
-    ----------
     v_x : speed [m/s], give or take `SPEED_SPREAD`.
     slip : largest slip angle of an axle [rad].
     friction : largest μ of the road [-]; an axle pushes with at most μ times its load.
@@ -40,12 +38,6 @@ class Driving:
     noise_v_y : largest error of the lateral velocity [m/s].
     noise_r : largest error of the yaw rate [rad/s].
     noise_delta : largest error of a steering angle [rad].
-
-    Raises
-    ------
-    ValueError
-        Where a condition is not positive or outside `RANGES`, or a noise negative, not a number or
-        beyond the speed.
     """
 
     v_x: float
@@ -81,8 +73,6 @@ _PEAK_NOISE = {"v_x": 0.12, "v_y": 0.12, "r": 0.012, "delta": 0.002}
 def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Driving:
     """Return hard driving on a dry road: both axles slide, at 4 sqrt(g L) (20 m/s for a sedan).
 
-    Parameters
-    ----------
     vehicle : the car; the slip is twice that at which its linear tire reaches the friction limit.
     bandwidth : highest frequency of steering that matters [Hz].
     """

@@ -40,13 +40,7 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
-    """Return the car that `vehicle_numbers` describes.
-
-    Raises
-    ------
-    ValueError
-        Where a key is missing or unknown, or a value has a wrong type or is impossible.
-    """
+    """Return the car that `vehicle_numbers` describes."""
     table = Table(data, "", FrozenModelError, "vehicle.")
     return Vehicle(**table.record(Vehicle, skip=("chassis",)))
 
@@ -61,8 +55,6 @@ class _SteadyTires(Protocol):
     def force_at(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
 
-        Parameters
-        ----------
         alpha : slip angles in the paper's sign [rad], (k,).
         """
 
@@ -70,14 +62,7 @@ class _SteadyTires(Protocol):
 def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
     """Refuse tires that no road has: forces that are not finite or too large, or a dead axle.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, with the forces or the stiffness.
     """
     force = np.asarray(tires.force_at(np.array([-WIDE, -_PROBE, _PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
@@ -103,14 +88,7 @@ def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
 def require_min_speed(speed: float) -> None:
     """Refuse a lowest speed [m/s] that is not positive, or that no car drives at.
 
-    Parameters
-    ----------
     speed : below which forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where it is not above zero, or above `_LARGEST_MIN_SPEED`.
     """
     if not 0.0 < speed <= _LARGEST_MIN_SPEED:
         raise ValueError(

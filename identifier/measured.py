@@ -15,8 +15,6 @@ def with_doubt(value: float, sd: float | None = None) -> str:
 
     Of the larger of both three digits are given, of the standard deviation one or two.
 
-    Parameters
-    ----------
     sd : in the unit of the value; None where it is not known.
     """
     if not math.isfinite(value):
@@ -39,8 +37,6 @@ def _places(size: float, digits: int) -> int:
 def printed_value(value: float, sd: float | None, unit: str) -> str:
     """Return a value with its standard deviation in the unit that is printed.
 
-    Parameters
-    ----------
     unit : of both; "N/rad" is printed as kN/rad.
     """
     scale = printed_scale(unit)

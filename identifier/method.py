@@ -36,14 +36,7 @@ Model = TypeVar("Model", bound=TireModel)
 def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any) -> Model:
     """Return a stored model to begin with, of the kind and structure that a method learns.
 
-    Parameters
-    ----------
     structure : what the method and the model must agree on, by attribute of the model.
-
-    Raises
-    ------
-    ValueError
-        Where the model is of another kind or structure.
     """
     if not fits(start, kind, **structure):
         raise ValueError(refusal)
@@ -86,16 +79,12 @@ class Run(Protocol):
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
         """Yield state and outputs over parts of the recording.
 
-        Parameters
-        ----------
         samples : rising indices; blocks without one are left out. None yields all.
         """
 
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time.
 
-        Parameters
-        ----------
         t : time in the recording's own clock [s].
         """
 

@@ -94,8 +94,6 @@ def _installed() -> dict[str, EntryPoint]:
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
 
-    Parameters
-    ----------
     name : one of `methods`.
     """
     return name in VARIANTS
@@ -132,14 +130,7 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
     """Return the method that goes on learning from a model.
 
-    Parameters
-    ----------
     dt : sampling interval [s].
-
-    Raises
-    ------
-    ValueError
-        Where no method goes on from such a model.
     """
     if model.kind not in LEARNERS:
         raise ValueError(f"no method can go on learning from a {type(model).__name__}")

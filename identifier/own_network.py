@@ -58,17 +58,10 @@ def read_network(content: bytes, inputs: Sequence[str] | None = None) -> ca.Func
 
     The function's inputs bear the names of the signals that the network reads.
 
-    Parameters
-    ----------
     content : the ONNX file. Its tensors are (columns,) or (batch, columns); a batch may be dynamic.
     inputs : the signal in each column, over all input tensors in turn. None takes the names of the
         tensors where each is one column with the name of a signal, else alpha_f, alpha_r for two
         columns and v_x, v_y, r, delta_f, delta_r for five.
-
-    Raises
-    ------
-    UnusableNetworkError
-        Where the file is no ONNX, an operator unknown, or a shape or name does not fit.
     """
     network = _imported(content)
     signals = _signals(network, inputs)
@@ -184,17 +177,10 @@ class OnnxModel(TireModel):
     A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
     where F_y = +C α; ISO 8855 has the opposite sign: for a network of that, set `slip_sign` to -1.
 
-    Parameters
-    ----------
     vehicle : the car, whose l_f and l_r make slip angles.
     min_speed : below this speed [m/s] the forces read zero.
     inputs : what the network's columns are, see `read_network`; None goes by names and number.
     slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
-
-    Raises
-    ------
-    ValueError
-        Where a number is impossible, the network cannot be read, or its forces do not push back.
     """
 
     kind = "onnx"
@@ -239,16 +225,9 @@ class OnnxModel(TireModel):
     ) -> "OnnxModel":
         """Read a network file.
 
-        Parameters
-        ----------
         min_speed : below this speed [m/s] the forces read zero.
         inputs : what the network's columns are; None goes by names and number.
         slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
-
-        Raises
-        ------
-        UnusableNetworkError
-            Where the file cannot be read or used; one line that names it.
         """
         try:
             return cls(
@@ -299,8 +278,6 @@ class OnnxModel(TireModel):
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
 
-        Parameters
-        ----------
         slip : empty.
         """
         del slip, least_lag
@@ -377,14 +354,7 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
 class FrozenMethod(Method):
     """A frozen model that takes part in a comparison of methods.
 
-    Parameters
-    ----------
     dt : sampling interval of recordings [s]; the model has none of its own.
-
-    Raises
-    ------
-    ValueError
-        Where the interval is not positive.
     """
 
     model: OnnxModel
@@ -402,15 +372,8 @@ class FrozenMethod(Method):
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
-        Parameters
-        ----------
         vehicle : the car; the model keeps its own.
         start : None; there is nothing that a stored model could begin.
-
-        Raises
-        ------
-        ValueError
-            Where a stored model is given.
         """
         del vehicle
         if start is not None:
@@ -420,8 +383,6 @@ class FrozenMethod(Method):
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:
         """Return the model itself.
 
-        Parameters
-        ----------
         vehicle : the car; the model keeps its own.
         """
         del vehicle, state

@@ -64,8 +64,6 @@ def paper_design(
 ) -> PaperIdentifier:
     """Return the design of the study.
 
-    Parameters
-    ----------
     law : one of `LAWS`.
     """
     return PaperIdentifier(gains=gains, network=network, seed=seed).with_law(law)
@@ -83,8 +81,6 @@ PAST_ONLINE, PAST, AFTER, ALL = MEASURES = (  # of frozen weights; the first is 
 def frozen_column(measure: str, t_freeze: float) -> str:
     """Return the column of a measure of frozen weights, "past_against_online_32".
 
-    Parameters
-    ----------
     measure : one of `MEASURES`.
     t_freeze : time of the freeze [s].
     """
@@ -94,8 +90,6 @@ def frozen_column(measure: str, t_freeze: float) -> str:
 def columns(maneuver: str) -> list[str]:
     """Return the columns of a maneuver: "online", and every measure at every freeze.
 
-    Parameters
-    ----------
     maneuver : "step_steer" or "slalom".
     """
     return [ONLINE, *(frozen_column(m, t) for t in FREEZES[maneuver] for m in MEASURES)]
@@ -105,8 +99,6 @@ def columns(maneuver: str) -> list[str]:
 class Trial:
     """One law with one seed on one maneuver.
 
-    Parameters
-    ----------
     replays : freeze time [s] to replay of the same recording; errors count from the onset on.
     errors : by column as `columns` names them: RMSE of both axles from the onset on [kN]; empty
         where the law diverged.
@@ -129,8 +121,6 @@ def drive_maneuvers() -> dict[str, Recording]:
 def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> Trial:
     """Run one design.
 
-    Parameters
-    ----------
     maneuver : "step_steer" or "slalom".
     design : from `paper_design`.
     """
@@ -161,8 +151,6 @@ def _measures(result: Replay) -> dict[str, AxleRmse | None]:
 class Study:
     """All errors of the study and the recordings behind them.
 
-    Parameters
-    ----------
     errors : by maneuver, then by law: the errors [kN] by column, for each seed.
     """
 
@@ -186,8 +174,6 @@ class Study:
     def typical(self, maneuver: str, law: str) -> Trial | None:
         """Return the trial of median error over all of the drive at the first freeze, if any.
 
-        Parameters
-        ----------
         maneuver : "step_steer" or "slalom".
         law : one of `LAWS`.
         """
@@ -216,8 +202,6 @@ STEPS = 1 + 2 * len(LAWS)  # of `run_study`: the drives, and each law on both ma
 def run_study(seeds: int, progress: Callable[[str], None]) -> Study:
     """Run every law with every seed on both maneuvers.
 
-    Parameters
-    ----------
     seeds : number of seeds, counted from 0.
     progress : told what is being done, `STEPS` times.
     """

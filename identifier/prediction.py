@@ -78,15 +78,8 @@ class Prediction:
 def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
     """Replay a recording with frozen weights and compare with its true forces, where it has any.
 
-    Parameters
-    ----------
     model : the frozen model; samples below its minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
-
-    Raises
-    ------
-    ValueError
-        Where no sample counts.
     """
     force = model.axle_force(recording)
     counted = counted_samples(recording, model.min_speed, since)

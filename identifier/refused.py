@@ -58,8 +58,6 @@ class SampleLimits(NamedTuple):
     ) -> bool:
         """Return whether a sample holds numbers within them; NaN is not.
 
-        Parameters
-        ----------
         v_x : longitudinal speed [m/s].
         v_y : lateral velocity [m/s].
         r : yaw rate [rad/s].
@@ -78,8 +76,6 @@ class SampleLimits(NamedTuple):
     def possible(self, v_y: float) -> float:
         """Return a lateral velocity that a car may have [m/s], NaN in place of any other number.
 
-        Parameters
-        ----------
         v_y : as it was measured [m/s].
         """
         return v_y if abs(v_y) <= self.speed else math.nan
@@ -93,8 +89,6 @@ def judges_samples(carry: Mapping[str, Any]) -> bool:
 def stale_samples(stale_time: float, dt: float) -> int:
     """Return how many refused samples in a row make forces stale, at least one.
 
-    Parameters
-    ----------
     stale_time : [s].
     dt : sampling interval [s].
     """
@@ -116,8 +110,6 @@ class Rests(NamedTuple):
 def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
     """Return n samples with rests before each stretch but the first.
 
-    Parameters
-    ----------
     breaks : samples with which stretches begin, rising.
     """
     begins = np.repeat(np.asarray(breaks, dtype=np.intp), rest)

@@ -42,8 +42,6 @@ def axle_rms(
 ) -> AxleRmse:
     """Return the root mean square of axle forces, or of their errors; NaN of no samples.
 
-    Parameters
-    ----------
     force : (n, 2) [N].
     where : samples that count (n,); None counts all.
     reference : forces that they are compared with (n, 2) [N]; None takes the forces themselves.
@@ -65,8 +63,6 @@ class Reproduction:
     The instant of the freeze belongs to neither side: there the frozen force is the online one. A
     side without a sample that counts has no error, None; nor has one against truth without truth.
 
-    Parameters
-    ----------
     past_against_online : error for t < T_freeze against what was identified online, the measure of
         the paper's section IV-A; the linear part of both forces is the same and cancels.
     after_against_truth : error for t > T_freeze against the true force.
@@ -81,8 +77,6 @@ class Reproduction:
 class Replay:
     """One recording replayed with frozen weights.
 
-    Parameters
-    ----------
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over all samples against the true force, None without truth.
     against_online : error over all samples, before and after a freeze, against the forces that were
@@ -101,8 +95,6 @@ class Replay:
 def freeze_key(t: float) -> str:
     """Return a freeze time as results, files and figures name it: "32", "1700000004.25".
 
-    Parameters
-    ----------
     t : time in the recording's own clock [s]; ten milliseconds of a Unix time are kept apart.
     """
     return f"{t:.12g}"
@@ -113,15 +105,8 @@ def counted_samples(
 ) -> NDArray[np.bool_]:
     """Return which samples count wherever a force or its error is summed up, (n,).
 
-    Parameters
-    ----------
     min_speed : samples below this speed [m/s] do not count.
     since : nor do samples before this time [s]; None begins at the first.
-
-    Raises
-    ------
-    NeverDrivesError
-        Where no sample is left.
     """
     counted: NDArray[np.bool_] = recording.v_x >= min_speed
     if since is not None:
@@ -138,8 +123,6 @@ def counted_samples(
 def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
     """Return the share of the samples with more slip than the model knows; None if nobody can tell.
 
-    Parameters
-    ----------
     recording : the drive; samples below the model's minimum speed do not count.
     """
     known = model.known_slip
@@ -160,17 +143,10 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
 def replay(model: TireModel, online: History, *, since: float | None = None) -> Replay:
     """Replay a recording with frozen weights and compare over all of it.
 
-    Parameters
-    ----------
     model : the frozen model; samples below its minimum speed do not count.
     online : a run of the identifier over the recording, the run that the weights come from or
         another.
     since : samples before this time [s] do not count; None counts all.
-
-    Raises
-    ------
-    ValueError
-        Where no sample counts.
     """
     force, truth = model.axle_force(online.recording), online.recording.axle_force
     counted = counted_samples(online.recording, model.min_speed, since)
@@ -185,19 +161,8 @@ def replay(model: TireModel, online: History, *, since: float | None = None) -> 
 def reproduce(online: History, t_freeze: float, *, since: float | None = None) -> Replay:
     """Freeze the weights of a run, replay its own recording and compare both sides of the freeze.
 
-    Parameters
-    ----------
     t_freeze : time of the freeze in the recording's own clock [s].
     since : samples before this time [s] do not count; None counts all.
-
-    Raises
-    ------
-    DivergedError
-        Where the law had diverged by then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
-    ValueError
-        Where no sample counts, or the recording begins after the freeze.
     """
     model = online.freeze(t_freeze)
     whole = replay(model, online, since=since)
@@ -228,15 +193,8 @@ def _side(force: Array, reference: Array | None, where: NDArray[np.bool_]) -> Ax
 def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
     """Return the error of the forces identified online, None without truth or without such forces.
 
-    Parameters
-    ----------
     history : an online run; samples below the design's minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
-
-    Raises
-    ------
-    ValueError
-        Where no sample counts.
     """
     truth = history.recording.axle_force
     if truth is None or not history.online:
@@ -248,14 +206,7 @@ def online_error(history: History, *, since: float | None = None) -> AxleRmse | 
 def force_rms(history: History, *, since: float | None = None) -> AxleRmse | None:
     """Return the size of the true forces, over the samples that `online_error` counts.
 
-    Parameters
-    ----------
     since : samples before this time [s] do not count; None counts all.
-
-    Raises
-    ------
-    ValueError
-        Where no sample counts.
     """
     truth = history.recording.axle_force
     if truth is None:

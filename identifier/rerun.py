@@ -30,8 +30,6 @@ class Found(NamedTuple):
 class Rerun:
     """A run that is computed again, block by block, or a part of it.
 
-    Parameters
-    ----------
     last : values carried after the last sample of the recording, by port.
     """
 
@@ -61,8 +59,6 @@ class Rerun:
         A port of a block is computed when it is asked for, together with those that were asked for
         of blocks before. Of a run that is one block it is kept.
 
-        Parameters
-        ----------
         samples : rising indices; blocks without one are left out. None yields all.
         """
         for k, whole in enumerate(self.parts):
@@ -96,8 +92,6 @@ class Rerun:
     def state_at(self, index: int) -> dict[str, Array]:
         """Return the carried values in effect at a sample, or after the last.
 
-        Parameters
-        ----------
         index : of the sample, counted from the first of the part; as many as there are is the end.
         """
         sample, after = self.first + index, int(index == len(self))
@@ -116,8 +110,6 @@ class Rerun:
 def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
     """Return whether one of the samples lies in a part.
 
-    Parameters
-    ----------
     samples : rising indices; None are all.
     """
     if samples is None:
@@ -158,8 +150,6 @@ class _OnDemand(Mapping[str, Array]):
 class Recalled(_OnDemand):
     """By port, what a run records: computed again when it is asked for.
 
-    Parameters
-    ----------
     kind : "state" or "outputs".
     """
 

@@ -29,14 +29,7 @@ class DivergedError(TireidError, ArithmeticError):
 def state_index(recording: Recording, t: float) -> int:
     """Return which carried values are in effect at a time: those before that sample; n at the end.
 
-    Parameters
-    ----------
     t : time in the recording's own clock [s].
-
-    Raises
-    ------
-    ValueError
-        Where the recording begins after that time.
     """
     if not isinstance(t, Real):
         raise TypeError(f"a time to freeze at is a number of seconds, not {t!r}")
@@ -52,8 +45,6 @@ def state_index(recording: Recording, t: float) -> int:
 class History:
     """An online run over n samples.
 
-    Parameters
-    ----------
     recording : what it ran over, with the v_y that the method estimated where there was none.
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
@@ -110,8 +101,6 @@ class History:
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
         """Yield the run block by block: state and outputs over parts of the recording.
 
-        Parameters
-        ----------
         samples : rising indices; blocks without one are left out. None yields all.
         """
         if isinstance(self.state, Recalled):
@@ -131,14 +120,7 @@ class History:
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time; from the end on, those after the last.
 
-        Parameters
-        ----------
         t : time in the recording's own clock [s].
-
-        Raises
-        ------
-        ValueError
-            Where the recording begins after that time.
         """
         index = state_index(self.recording, t)
         if isinstance(self.state, Recalled):
@@ -148,18 +130,7 @@ class History:
     def freeze(self, t: float | None = None) -> TireModel:
         """Return the model with the weights in effect at a time.
 
-        Parameters
-        ----------
         t : time in the recording's own clock [s]; None is the end.
-
-        Raises
-        ------
-        DivergedError
-            Where the law had diverged by then.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the recording begins after that time.
         """
         t = float(self.recording.t[-1]) if t is None else t
         if self.design.whole:
@@ -177,14 +148,7 @@ class History:
     def asked(self, recording: Recording, t: float | None = None) -> "History":
         """Return what the model frozen at a time says of another recording, which teaches nothing.
 
-        Parameters
-        ----------
         t : time of the freeze in this recording's own clock [s]; None is the end.
-
-        Raises
-        ------
-        ValueError
-            Where the run is online: then `identify` runs over the other recording, too.
         """
         if self.online:
             raise ValueError("an online run is beside another drive as of identify")
@@ -231,15 +195,7 @@ class History:
 
 
 def check_recording(recording: Recording, design: Method) -> None:
-    """Refuse a recording that a method cannot run over.
-
-    Raises
-    ------
-    ValueError
-        Where it is not sampled at the design's interval.
-    RecordingError
-        Where the method needs v_y or a_y and the recording has none.
-    """
+    """Refuse a recording that a method cannot run over."""
     if abs(recording.dt - design.dt) > 1e-6 * design.dt:
         raise ValueError(
             f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
@@ -263,19 +219,10 @@ def identify(
 ) -> History:
     """Run a method over a recording, sample by sample.
 
-    Parameters
-    ----------
     recording : signals, sampled at the design's interval; its forces are not looked at.
     design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
     progress : called now and then with the share that is done, 0 to 1.
-
-    Raises
-    ------
-    ValueError
-        Where recording and design differ in their sampling interval.
-    RecordingError
-        Where the method needs v_y or a_y and the recording has none.
     """
     recording = recording.as_logged()
     check_recording(recording, design)
@@ -351,20 +298,7 @@ def learn(
 ) -> TireModel:
     """Return what a method has learnt, without a record of the way there: `identify` and freeze.
 
-    Parameters
-    ----------
     t : time of the freeze in the recording's own clock [s]; None is the end.
-
-    Raises
-    ------
-    DivergedError
-        Where a number of the law is not finite then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
-    ValueError
-        Where the recording begins after that time, or is not sampled at the design's interval.
-    RecordingError
-        Where the method needs v_y or a_y and the recording has none.
     """
     recording = recording.as_logged()
     check_recording(recording, design)
@@ -387,8 +321,6 @@ def learn(
 class Counts:
     """What became of the samples.
 
-    Parameters
-    ----------
     refused : that held a number which is not finite or beyond what any car reaches.
     """
 
@@ -400,16 +332,9 @@ class Counts:
 class OnlineIdentifier:
     """A method that takes sample by sample; attributes vehicle, method, counts, limits.
 
-    Parameters
-    ----------
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.
     stale_time : time of refused samples after which forces read zero [s].
-
-    Raises
-    ------
-    ValueError
-        Where the interval is not that of the method, or the time is not positive and finite.
     """
 
     def __init__(
@@ -440,18 +365,11 @@ class OnlineIdentifier:
 
         Where the sample is refused, those of the last one it took, and zero once it is `stale`.
 
-        Parameters
-        ----------
         x : [v_y, r] (2,) [m/s, rad/s]; v_y NaN where there is none, if the method tells it itself.
         u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
         v_x : longitudinal speed [m/s].
         a_y : of an accelerometer at the center of gravity, positive to the left [m/s²]; None, or a
             number that is not finite, where there is none. No sample is refused for it.
-
-        Raises
-        ------
-        ValueError
-            Where x or u are not pairs.
         """
         (v_y, r), (delta_f, delta_r) = x, u
         felt = math.nan if a_y is None else float(a_y)
@@ -520,8 +438,6 @@ class OnlineIdentifier:
     def restart(self, start: TireModel | None) -> None:
         """Begin again at the next sample; the counts go on.
 
-        Parameters
-        ----------
         start : stored weights to begin with; None begins afresh.
         """
         self._start, self._stepper, self._diverged = start, None, False
@@ -555,17 +471,7 @@ class OnlineIdentifier:
         return self._stepper.state()
 
     def model(self) -> TireModel:
-        """Return the model with the weights in effect now.
-
-        Raises
-        ------
-        DivergedError
-            Where the law has diverged.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where a weight is not what the model allows.
-        """
+        """Return the model with the weights in effect now."""
         if self._diverged:
             raise DivergedError(f"the law diverged within {self.counts.samples} samples")
         if self._stepper is None and self._start is not None:

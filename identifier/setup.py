@@ -45,8 +45,6 @@ HALF_BAND = Port(
 def force_unit_name(force_unit: float) -> str:
     """Return the name of a unit of force.
 
-    Parameters
-    ----------
     force_unit : U [N].
     """
     return {1.0: "N", 1000.0: "kN"}.get(force_unit, f"{force_unit:g} N")
@@ -55,8 +53,6 @@ def force_unit_name(force_unit: float) -> str:
 def in_force_unit(ports: Iterable[Port], force_unit: float) -> tuple[Port, ...]:
     """Return ports with the name of the force unit in place of U.
 
-    Parameters
-    ----------
     ports : with units in which U stands for it.
     force_unit : U [N].
     """
@@ -86,13 +82,7 @@ class Setup(NamedTuple):
 
     @property
     def rest(self) -> int:
-        """Samples that the step is shown between stretches of a drive.
-
-        Raises
-        ------
-        ValueError
-            Where the step judges samples and `ends_run` is not told.
-        """
+        """Samples that the step is shown between stretches of a drive."""
         if not judges_samples(self.carry):
             return 1
         if self.ends_run is None:
@@ -102,8 +92,6 @@ class Setup(NamedTuple):
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.
 
-        Parameters
-        ----------
         x : [v_y, r] of the first sample (2,) [m/s, rad/s].
         """
         if self.observe is None:
@@ -122,8 +110,6 @@ class Setup(NamedTuple):
 
         Values are carried from block to block: the bits are those of one piece.
 
-        Parameters
-        ----------
         recording : its signals are the input; its forces are not looked at.
         parts : of the recording, one after the other; None takes all of it in `blocks`.
         carry : values that are carried into the first part; None begins with the recording.
@@ -153,8 +139,6 @@ class Setup(NamedTuple):
     def output(self, recording: Recording, port: str) -> Array:
         """Return an output that is a column, over a recording, (n, size).
 
-        Parameters
-        ----------
         recording : its signals are the input; its forces are not looked at.
         """
         told = large((len(recording), self.scan.step.numel_out(port)))
@@ -165,8 +149,6 @@ class Setup(NamedTuple):
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.
 
-        Parameters
-        ----------
         n : samples that are taken.
         """
         following = self.begun(recording)
@@ -207,8 +189,6 @@ class Block(NamedTuple):
 class Before(Mapping[str, Array]):
     """Carried values in effect at each sample, of those that have a row after the last.
 
-    Parameters
-    ----------
     state : by port (k + 1, ...).
     """
 
@@ -240,8 +220,6 @@ class Shown(NamedTuple):
     def place(self, k: int) -> int:
         """Return which of what is shown a sample of the part is.
 
-        Parameters
-        ----------
         k : from 0 to n, that after the last.
         """
         if self.at is None:
@@ -251,8 +229,6 @@ class Shown(NamedTuple):
     def of_recording(self, values: Array) -> Array:
         """Return what was recorded at the samples of the part, without rests.
 
-        Parameters
-        ----------
         values : of all that was shown, (N, ...) or (N + 1, ...) with that after the last.
         """
         if self.at is None:
@@ -263,8 +239,6 @@ class Shown(NamedTuple):
     def with_rests(self, values: Array) -> Array:
         """Return values of the part's samples with zeros at rests, (N, ...).
 
-        Parameters
-        ----------
         values : (n, ...).
         """
         if self.at is None:
@@ -282,8 +256,6 @@ def shown(
     A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
     that no difference over the gap is ever taken for one over a sampling interval.
 
-    Parameters
-    ----------
     over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
         there is none.
     judges : whether the step judges samples itself.

@@ -92,8 +92,6 @@ class Estimate(NamedTuple):
 
         The recursion knows of noise only; what its curves cannot say is in what they miss.
 
-        Parameters
-        ----------
         share : of the force of its axle, rms [-].
         """
         if self.sd is None or self.title not in (STIFFNESS, GRIP):
@@ -740,8 +738,6 @@ class TireModel(ABC):
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
     """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
 
-    Parameters
-    ----------
     vehicle : its wheelbase is L.
     min_speed : below which they do [m/s].
     """
@@ -751,8 +747,6 @@ def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
 def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
     """Return x = [v_y, r] at which straight wheels meet the road at some slopes, (2,).
 
-    Parameters
-    ----------
     slope : -(v_y ± l r)/v_x at the axles, (2,): the slip angle where it is small.
     v_x : longitudinal speed [m/s].
     """
@@ -774,14 +768,7 @@ MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported 
 def load_model(path: str | PathLike[str]) -> TireModel:
     """Read a frozen model of any kind.
 
-    Parameters
-    ----------
     path : a file that the `save` of a frozen model wrote.
-
-    Raises
-    ------
-    FrozenModelError
-        Where the file is not such a model; one line that names it.
     """
     path = Path(path)
     table = _stored(path)
@@ -803,14 +790,7 @@ def load_model(path: str | PathLike[str]) -> TireModel:
 def stored_verdict(path: str | PathLike[str]) -> bool | None:
     """Return whether a stored model was found valid when it was learnt; None where nobody judged.
 
-    Parameters
-    ----------
     path : a file that the `save` of a frozen model wrote.
-
-    Raises
-    ------
-    FrozenModelError
-        Where the file is not such a model; one line that names it.
     """
     return _verdict_of(_stored(Path(path)))
 

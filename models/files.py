@@ -17,17 +17,9 @@ from codegen.writing import naming
 def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[bytes]) -> None:
     """Write a file; whoever reads it meanwhile, or after a failure, sees the old one whole.
 
-    Parameters
-    ----------
     path : the file; where it is a link, what it points to.
     content : text, written in UTF-8 with line ends as they are, or bytes, also one part
         after the other.
-
-    Raises
-    ------
-    OSError
-        Where the file cannot be written, or something else than a file is there: a folder, or a
-        device, which a file in its place would end for every program; nothing is left behind.
     """
     target = resolved(path)
     if not target.parent.exists():
@@ -53,13 +45,7 @@ def _require_file_or_nothing(target: Path) -> None:
 
 
 def resolved(path: str | PathLike[str]) -> Path:
-    """Return where a path leads, by all its links.
-
-    Raises
-    ------
-    OSError
-        Where links go in a circle; Path.resolve tells some of them as a RuntimeError.
-    """
+    """Return where a path leads, by all its links."""
     try:
         return Path(path).resolve()
     except RuntimeError:
@@ -69,8 +55,6 @@ def resolved(path: str | PathLike[str]) -> Path:
 def digest(content: Any) -> str:
     """Return twelve characters that stand for a content.
 
-    Parameters
-    ----------
     content : ready for JSON.
     """
     return digest_of_bytes([json.dumps(content, sort_keys=True).encode()])

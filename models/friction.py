@@ -28,17 +28,10 @@ class FrictionError(TireidError, ValueError):
 class FrictionChange:
     """From here on the friction is `scale`.
 
-    Parameters
-    ----------
     scale : friction over the tire's own, after the change [-].
     at_time : when it starts [s]; give this or `at_place`.
     at_place : where it starts, coordinate X of the wheel [m].
     width : length of the smooth change [s or m], 0 for a step.
-
-    Raises
-    ------
-    FrictionError
-        For a scale that is not positive, a negative width, or not exactly one of time and place.
     """
 
     scale: float
@@ -65,14 +58,7 @@ class FrictionChange:
 class Friction:
     """A constant scale and the changes after it, all over time or all over the place.
 
-    Parameters
-    ----------
     scale : friction over the tire's own before the first change [-].
-
-    Raises
-    ------
-    FrictionError
-        For a scale that is not positive, mixed or unordered changes, or more than 4 places.
     """
 
     scale: float = 1.0
@@ -98,8 +84,6 @@ class Friction:
     def over_time(self, t: Array) -> Array:
         """Scale over time (n,) [-], without the changes over the place.
 
-        Parameters
-        ----------
         t : times [s], (n,).
         """
         scale = np.full(np.shape(t), self.scale)
@@ -126,8 +110,6 @@ class Friction:
 def place_change(table: Any, place: Any) -> Any:
     """Return the sum of the changes over the place as a CasADi expression [-].
 
-    Parameters
-    ----------
     table : from `Friction.over_place`, (3, 4).
     place : coordinate X of the wheel [m].
     """

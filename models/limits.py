@@ -17,8 +17,6 @@ class LimitError(TireidError, ValueError):
 class InputLimits:
     """How much may be asked for. `TIREID_LIMITS="samples=1e9 megabytes=4e4"` raises limits.
 
-    Parameters
-    ----------
     megabytes : of a log, unpacked; it is read piece by piece: 10 h at 1 kHz of 20 columns fit.
     samples : rows of a log, steps of a recording.
     path : samples of a path, rows of way-points.
@@ -46,13 +44,7 @@ class InputLimits:
 
 
 def limits() -> InputLimits:
-    """Return the limits, as the environment raises or lowers them.
-
-    Raises
-    ------
-    LimitError
-        Where the environment's words are not NAME=NUMBER.
-    """
+    """Return the limits, as the environment raises or lowers them."""
     known = [field.name for field in fields(InputLimits)]
     asked: dict[str, float] = {}
     for word in os.environ.get(VARIABLE, "").replace(",", " ").split():

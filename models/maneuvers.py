@@ -31,8 +31,6 @@ class Maneuver(Protocol):
     def steering(self, t: Array) -> Array:
         """Commanded [δ_f, δ_r] [rad], (n, 2).
 
-        Parameters
-        ----------
         t : times [s], (n,).
         """
 
@@ -69,8 +67,6 @@ def _both(front: Any, rear_ratio: float) -> Array:
 class StepSteer:
     """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
 
-    Parameters
-    ----------
     amplitude : final angle [rad].
     onset : start of the ramp [s].
     rate_limit : largest steering rate of either axle [rad/s].
@@ -106,8 +102,6 @@ class StepSteer:
 class TwoStepSteer:
     """A step steer whose angle changes again: two ramps at `rate_limit`, each to a held angle.
 
-    Parameters
-    ----------
     amplitude : angle held from the first ramp to the second [rad].
     second_share : angle held after the second ramp, over `amplitude` [-].
     onset : start of the first ramp [s].
@@ -155,8 +149,6 @@ class TwoStepSteer:
 class Slalom:
     """A sine from onset to the end.
 
-    Parameters
-    ----------
     amplitude : of the sine [rad].
     frequency : of the sine [Hz].
     onset : start [s].
@@ -185,8 +177,6 @@ class Slalom:
 class DoubleLaneChange:
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
 
-    Parameters
-    ----------
     amplitude : of both sines [rad].
     frequency : of both sines [Hz].
     pause : time straight ahead between them [s].
@@ -220,8 +210,6 @@ class DoubleLaneChange:
 class SineWithDwell:
     """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
 
-    Parameters
-    ----------
     amplitude : of the sine [rad].
     frequency : of the sine [Hz]; the test uses 0.7.
     dwell : time at the second peak [s]; the test uses 0.5.
@@ -255,8 +243,6 @@ class SineWithDwell:
 class SlowlyIncreasingSteer:
     """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
 
-    Parameters
-    ----------
     amplitude : final angle [rad].
     rate : slope of the ramp of the front axle [rad/s].
     onset : start [s].
@@ -289,8 +275,6 @@ class RandomSteer:
     half period, so that the steepest path between two is that of a sine of `frequency`. The same
     seed is the same maneuver, at any sampling.
 
-    Parameters
-    ----------
     amplitude : largest angle [rad].
     frequency : of the fastest swing [Hz].
     onset : start [s].
@@ -325,8 +309,6 @@ class RandomSteer:
 class SampledSteer:
     """Given angles at given times, joined by straight lines, as a planned maneuver is.
 
-    Parameters
-    ----------
     times : of the angles [s], rising, (k,); straight ahead before the first.
     angles : of the front wheels [rad], (k,), the first zero.
     rate_limit : largest steering rate of either axle [rad/s].

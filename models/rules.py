@@ -12,14 +12,7 @@ LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
 def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
     """Refuse what is no single real number.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, with the value.
     """
     try:
         if not isinstance(value, str | bytes):
@@ -33,14 +26,7 @@ def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
 def require_positive(refusal: type[ValueError], /, **values: float) -> None:
     """Refuse every value that is not a finite number above zero.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
     """
     for name, value in values.items():
         require_number(refusal, name, value)
@@ -49,27 +35,14 @@ def require_positive(refusal: type[ValueError], /, **values: float) -> None:
 
 
 def require_positive_fields(record: Any) -> None:
-    """Refuse a record in which a number is not finite and above zero.
-
-    Raises
-    ------
-    ValueError
-        With the first field that breaks the rule and its value.
-    """
+    """Refuse a record in which a number is not finite and above zero."""
     require_positive(ValueError, **{one.name: getattr(record, one.name) for one in fields(record)})
 
 
 def require_within(refusal: type[ValueError], low: float, high: float, /, **values: float) -> None:
     """Refuse every value outside the closed interval from `low` to `high`.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
     """
     for name, value in values.items():
         require_number(refusal, name, value)
@@ -78,13 +51,7 @@ def require_within(refusal: type[ValueError], low: float, high: float, /, **valu
 
 
 def require_kind(kind: type, remedy: str, /, **values: Any) -> None:
-    """Refuse every argument of another kind, at the doors that users call.
-
-    Raises
-    ------
-    TypeError
-        With the name of the argument, its value and the remedy.
-    """
+    """Refuse every argument of another kind, at the doors that users call."""
     for name, value in values.items():
         if not isinstance(value, kind):
             raise TypeError(f"{name} must be a {kind.__name__}, {remedy}; it is {shown(value)}")

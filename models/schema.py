@@ -35,15 +35,8 @@ LONGEST_NAME = 200  # characters
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:
     """Refuse more than a limit allows, and tell how to raise it.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
     limit : field of `InputLimits`.
-
-    Raises
-    ------
-    ValueError
-        Of that class; a count that is not a number is too many.
     """
     most = getattr(limits(), limit)
     if not count <= most:
@@ -56,8 +49,6 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
 def swells(size: float, packed: float) -> bool:
     """Return whether data unpack to what no log packs to.
 
-    Parameters
-    ----------
     size : unpacked, as memory holds it [bytes].
     packed : as the file holds them [bytes].
     """
@@ -74,14 +65,7 @@ def require_dense(
 ) -> None:
     """Refuse data that swell as no log does.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class.
     """
     if swells(size, packed):
         raise refusal(
@@ -93,17 +77,8 @@ def require_dense(
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
     """Refuse what is no regular file, and files that are too large.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes it may hold.
-
-    Raises
-    ------
-    ValueError
-        Of that class.
-    OSError
-        Where it cannot be looked at.
     """
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
@@ -115,18 +90,9 @@ def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
 def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
     """Read a file.
 
-    Parameters
-    ----------
     path : a regular file: no device, pipe or folder, which may have no end.
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes it may hold.
-
-    Raises
-    ------
-    ValueError
-        Of that class, where it is no such file or too large.
-    OSError
-        Where it cannot be read.
     """
     require_file(path, refusal, limit=limit)
     most = int(min(1e6 * getattr(limits(), limit), 2.0**62))
@@ -139,17 +105,8 @@ def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document"
 def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[bytes]:
     """Yield what a file holds piece by piece, unpacked where it is gzip by its first bytes.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes there may be, unpacked.
-
-    Raises
-    ------
-    ValueError
-        Of that class, where it is no such file, damaged, too large, or swells as no log does.
-    OSError
-        Where it cannot be read.
     """
     require_file(path, refusal, limit=limit)
     with path.open("rb") as raw:
@@ -182,18 +139,9 @@ def read_text(
 ) -> str:
     """Read a text file.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes it may hold.
     encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
-
-    Raises
-    ------
-    ValueError
-        Of that class, where it is no such file, too large, or not UTF-8.
-    OSError
-        Where it cannot be read.
     """
     try:
         return read_bytes(path, refusal, limit=limit).decode(encoding)
@@ -204,16 +152,7 @@ def read_text(
 def read_json(path: Path, refusal: type[ValueError]) -> Any:
     """Read a JSON file.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, where it is not JSON or beyond the limits.
-    OSError
-        Where it cannot be read.
     """
     text = read_text(path, refusal)
 
@@ -275,16 +214,9 @@ def _require_small(path: Path, data: Any, refusal: type[ValueError]) -> None:
 class Table:
     """A table of a document; its values are asked for by name and type.
 
-    Parameters
-    ----------
     where : begins every message, as "car.toml: "; may be empty.
     refusal : class of the errors to raise.
     prefix : of the names of values in messages, as in "chassis.".
-
-    Raises
-    ------
-    ValueError
-        Of that class, where the data are no table.
     """
 
     def __init__(self, data: Any, where: str, refusal: type[ValueError], prefix: str = "") -> None:
@@ -299,8 +231,6 @@ class Table:
     def refuse(self, key: str, rule: str) -> NoReturn:
         """Raise the error of a value.
 
-        Parameters
-        ----------
         rule : that it breaks, as in "must be a number".
         """
         raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
@@ -373,8 +303,6 @@ class Table:
     def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
         """Return the arguments of a dataclass, each of the type that its field declares.
 
-        Parameters
-        ----------
         cls : the dataclass; its fields are the keys that may be there.
         """
         known = self.only_fields(cls, skip=skip)
@@ -415,14 +343,7 @@ class Table:
 def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
     """Refuse what cannot be the name of a car in files, figures and reports.
 
-    Parameters
-    ----------
     refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, where it is no text, longer than 200 characters, or not Unicode.
     """
     if not isinstance(name, str) or len(name) > LONGEST_NAME:
         raise refusal(

@@ -33,16 +33,9 @@ class SensorError(TireidError, ValueError):
 class Sensor:
     """One channel; the signal is delayed, then biased, then noisy, then rounded.
 
-    Parameters
-    ----------
     noise : standard deviation of white Gaussian noise, in the unit of the signal.
     delay : the signal comes this much later [s], by interpolation; before, its first value holds.
     resolution : step of the quantization, in the unit of the signal; 0 for none.
-
-    Raises
-    ------
-    SensorError
-        For a number that is not finite, or negative where it must not be.
     """
 
     noise: float = 0.0
@@ -61,8 +54,6 @@ class Sensor:
     def measure(self, t: Array, signal: Array, rng: np.random.Generator) -> Array:
         """Return what the sensor makes of a signal (n,).
 
-        Parameters
-        ----------
         t : time [s], (n,).
         signal : the exact signal, (n,).
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
@@ -78,8 +69,6 @@ class Sensor:
 class Sensors:
     """The sensors of a car; a channel left out is exact.
 
-    Parameters
-    ----------
     v_x, v_y : speed over ground [m/s].
     r : yaw rate [rad/s].
     delta : steering angle [rad], of each axle that steers.
@@ -93,8 +82,6 @@ class Sensors:
     def apply(self, recording: Recording, rng: np.random.Generator) -> Recording:
         """Return the recording as these sensors would have taken it; its force truth stays exact.
 
-        Parameters
-        ----------
         rng : source of the noise; the same generator state gives the same noise.
         """
         t = recording.t
@@ -112,16 +99,12 @@ class Sensors:
 def is_shown(channel: str, value: float) -> bool:
     """Return whether a channel shows a number.
 
-    Parameters
-    ----------
     channel : one of `LARGEST_SHOWN`.
     value : in its SI unit.
     """
     return abs(value) <= LARGEST_SHOWN[channel]
 
 
-STRAIGHT = 0.2  # median over 90th percentile of second differences, below which lines were drawn
-_MOST_BETWEEN = 10  # samples over which differences are taken
 _NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
 
 
@@ -130,34 +113,7 @@ def white_noise(signal: Array) -> float:
 
     Their median is taken: steps and outliers are not noise.
 
-    Parameters
-    ----------
     signal : samples (n,).
     """
     bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
     return float(np.median(np.abs(bend)) / (_NORMAL_MEDIAN * np.sqrt(6.0)))
-
-
-def noise_in_means(signal: Array) -> float:
-    """Return the standard deviation of white noise that would leave as much in means of a signal.
-
-    Of a signal that was brought from a slower clock by straight lines most second differences
-    vanish, and `white_noise` sees none. Means over 2 k samples are looked at then, for the least k
-    at which differences over k samples are not those of straight lines.
-
-    Parameters
-    ----------
-    signal : samples (n,).
-    """
-    for k in range(1, _MOST_BETWEEN + 1):
-        if len(signal) <= 8 * k:
-            break
-        bend = np.abs(signal[2 * k :] - 2.0 * signal[k:-k] + signal[: -2 * k])
-        usual, large = np.percentile(bend, (50, 90))
-        if usual < STRAIGHT * large:
-            continue
-        if k == 1:
-            break
-        blocks = signal[: len(signal) // (2 * k) * 2 * k].reshape(-1, 2 * k)
-        return math.sqrt(2.0 * k) * white_noise(np.asarray(blocks.mean(axis=1)))
-    return white_noise(signal)

@@ -18,8 +18,6 @@ def window(half: int) -> Array:
 def smoothed(signal: Array, half: int) -> Array:
     """Return a signal under a window without phase, mirrored about its ends (n,).
 
-    Parameters
-    ----------
     signal : samples (n,).
     """
     padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
@@ -31,8 +29,6 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
 
     It is exact for straight lines between samples.
 
-    Parameters
-    ----------
     signal : u, what goes in (n,).
     lag : time constant T of the low pass [s].
     dt : sampling interval [s].
@@ -53,8 +49,6 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
 def without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:
     """Return what went into a low pass, u = y + T ẏ, of y smoothed by a window without phase.
 
-    Parameters
-    ----------
     signal : y, what came out (n,).
     lag : time constant T of the low pass [s].
     dt : sampling interval [s].

@@ -37,8 +37,6 @@ class VehicleError(TireidError, ValueError):
 class Chassis:
     """Parameters of the double-track plant which the linear bicycle does not have.
 
-    Parameters
-    ----------
     track_front, track_rear : distance between the wheels of an axle [m].
     cg_height : height of the center of gravity above the road [m].
     roll_center_height_front, roll_center_height_rear : height of the roll center of the axle above
@@ -57,11 +55,6 @@ class Chassis:
     drive_front_share : share of the front axle in the driving force [-].
     brake_front_share : the same of the braking force [-].
     tire : property file (.tir) of all four tires, or None where a tire object is handed over.
-
-    Raises
-    ------
-    VehicleError
-        For a value that is not positive, outside what any chassis has, or NaN.
     """
 
     track_front: float
@@ -149,8 +142,6 @@ class Chassis:
 def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
     """Return the TOML text of a dataclass and of the one dataclass inside it.
 
-    Parameters
-    ----------
     record : the dataclass to write; fields that are None are left out.
     """
     lines = [
@@ -220,8 +211,6 @@ def load_ratio(downforce: Any, v_x: Any) -> Any:
 
     `Vehicle.load_ratio` is the same of numbers.
 
-    Parameters
-    ----------
     downforce : κ of both axles (2,), or of one, as `Vehicle.downforce` has it [s^2/m^2].
     v_x : longitudinal speed [m/s].
     """
@@ -244,15 +233,8 @@ __all__ = [
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
     """Return yaw inertia and cornering stiffnesses of a car of that size, by `RULES`.
 
-    Parameters
-    ----------
     mass : total mass [kg].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
-
-    Raises
-    ------
-    VehicleError
-        For a value that no car has.
     """
     _require_size(mass, l_f, l_r)
     weight, wheelbase = mass * GRAVITY, l_f + l_r
@@ -437,17 +419,6 @@ class Vehicle:
             for name, load in zip(AREAS, self.axle_loads, strict=True)
         )
         return front, rear
-
-    def downforce_areas(self, downforce: Sequence[float]) -> dict[str, float]:
-        """Return the areas [m^2] of a downforce of the front and the rear axle, by their keys.
-
-        Parameters
-        ----------
-        downforce : κ of both axles [s^2/m^2], as `downforce` has them.
-        """
-        pairs = zip(downforce, self.axle_loads, strict=True)
-        areas = [2.0 * one * load / _AIR_DENSITY for one, load in pairs]
-        return dict(zip(AREAS, areas, strict=True))
 
     @property
     def has_downforce(self) -> bool:

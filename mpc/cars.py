@@ -80,8 +80,6 @@ _HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 class DoubleTrackCar:
     """A car of `models.plant` on a road.
 
-    Parameters
-    ----------
     vehicle : the car; it needs a chassis.
     tire : of all four wheels; None reads the file named by the chassis.
     friction : of the road; None is what the tire was measured on.

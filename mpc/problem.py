@@ -43,8 +43,6 @@ class Cost:
     rate and a quarter on the input, plans became jerky and runs beyond the grip failed; with 8 on
     e_y some did at the grip. With 1 the car stays 1.3 times as far from the path.
 
-    Parameters
-    ----------
     e_y : deviation from the path, at 0.1 m.
     e_psi : heading against that of the path, at 0.05 rad.
     course : direction of travel against the path, e_psi + v_y/v_x, at 0.05 rad.
@@ -114,8 +112,6 @@ def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
 class Limits:
     """Bounds, symmetric, all positive.
 
-    Parameters
-    ----------
     steering : angle of the front road wheels [rad], kept exactly.
     steering_rate : [rad/s], kept exactly.
     e_y : deviation from the path [m], soft.
@@ -151,8 +147,6 @@ class Limits:
 class Problem:
     """The problem; only the horizon is compiled.
 
-    Parameters
-    ----------
     horizon : number of stages N.
     dt : length of a stage [s].
     """
@@ -176,8 +170,6 @@ class Guards:
     hard limits: optimal at each speed for Σ (e_y/`fall_back_e_y`)² + (a/`fall_back_acceleration`)²,
     see `mpc.realtime.fall_back`.
 
-    Parameters
-    ----------
     e_y : |e_y| beyond which the car is off the path [m].
     e_psi : |e_psi| beyond which it is [rad].
     v_y : |v_y| beyond which the tire is not known [m/s].

@@ -20,7 +20,7 @@ SHAPE_OR_UNIT = r"\(.*\)|\[.+\]|`\w[\w.]*`"
 def documented_parameters(docstring: str, *, inner: bool = False) -> dict[str, str]:
     """What is said under "Parameters" of a numpy-style docstring, by name in order.
 
-    Outside the interface entries of a function stand below its summary, three spaces apart.
+    Outside the interface entries stand below the summary, three spaces apart.
     """
     found = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", docstring, re.M | re.S)
     said: dict[str, str] = {}
@@ -122,7 +122,7 @@ def complaints(source: str, offered: set[str]) -> list[str]:
         if docstring is None:
             wrong += [f"{node.name} has no docstring"] * public
             continue
-        inner = isinstance(node, ast.FunctionDef) and not public
+        inner = not (public or describes_itself(node))
         documented = documented_parameters(docstring, inner=inner)
         actual = actual_parameters(node)
         if list(documented) != [name for name in actual if name in documented]:

@@ -33,17 +33,8 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print one line and exit with code 2."""
-        complain(f"{self.prog}: error: {one_line(message)} ({_hint(message, self.prog)})")
+        complain(f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
-
-
-def _hint(message: str, program: str) -> str:
-    """Return what to do about wrong words: the word of today for one of yesterday, or the help."""
-    from tireid.commands.options import RENAMED
-
-    words = set(message.split()) if message.startswith("unrecognized") else set()
-    renamed = [f"{old} is {new} now" for old, new in RENAMED.items() if old in words]
-    return "; ".join(renamed) or f"see {program} --help"
 
 
 def build_parser(words: Sequence[str]) -> _Parser:

@@ -281,14 +281,15 @@ def write_json(path: Path, data: Any) -> None:
 
     data : dictionaries, lists, numbers, strings and None.
     """
-    write_file(path, json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
+    write_file(path, json.dumps(finite(data), indent=2, allow_nan=False) + "\n")
 
 
-def _finite(data: Any) -> Any:
+def finite(data: Any) -> Any:
+    """Return data with null for numbers that are not finite, which JSON cannot say."""
     if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
+        return {key: finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
+        return [finite(value) for value in data]
     if isinstance(data, float | np.floating):
         return float(data) if np.isfinite(data) else None
     return data

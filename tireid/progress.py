@@ -10,9 +10,8 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from itertools import accumulate
 from typing import TextIO
 
 
@@ -146,8 +145,6 @@ class Progress:
 
     Use it as a context: the changing line goes away at its end.
 
-    Parameters
-    ----------
     parts : names of its parts in order, and about how long each takes beside the others; None has
         one.
     long : whether it is known to last, so that the beginning of each part is told at once.
@@ -186,15 +183,6 @@ class Progress:
         """Count one of several equal steps of the part."""
         self._done += 1
         self(min(self._done / max(of, 1), 1.0), text)
-
-    def along(self, lengths: Sequence[float]) -> Callable[[str], None]:
-        """Return who is told in words of each of several steps of the part, when it is done."""
-        ends, whole = iter(accumulate(lengths)), sum(lengths)
-
-        def told(text: str) -> None:
-            self(next(ends, whole) / whole if whole > 0.0 else 1.0, text)
-
-        return told
 
     def within(self, first: float, last: float) -> Callable[[float], None]:
         """Return who is told the share that is done of a piece of the part.

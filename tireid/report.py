@@ -83,8 +83,6 @@ class Paragraph:
 class Table:
     """A table with a caption; units belong into the header.
 
-    Parameters
-    ----------
     rows : cells by row; numbers are given four digits, None and what is not finite becomes a dash.
     verbatim : whether cells are to be read letter by letter, as commands are.
     """
@@ -107,8 +105,6 @@ class Table:
 class Picture:
     """A picture with a caption.
 
-    Parameters
-    ----------
     image : the SVG, PNG, GIF or WebP itself, or the path of its file.
     """
 
@@ -137,8 +133,6 @@ Block = Paragraph | Table | Picture | Subheading
 class Section:
     """A part of a report under one heading.
 
-    Parameters
-    ----------
     blocks : paragraphs, tables, pictures and smaller headings in order.
     folded : whether only the heading is seen until a reader opens it.
     """
@@ -152,8 +146,6 @@ class Section:
 class Report:
     """All that a page says.
 
-    Parameters
-    ----------
     summary : what a hurried reader should know, plain text.
     numbers : what stands at the top, with units; none where there is nothing to count.
     lead : what is looked at first, above the warnings.

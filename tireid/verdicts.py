@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from codegen.escape import visible
-from identifier.measured import NOT_IDENTIFIABLE, printed_unit
-from identifier.tire_model import AXLES, Axle, stored_verdict
+from identifier.measured import NOT_IDENTIFIABLE, printed_unit, with_doubt
+from identifier.tire_model import AXLES, Axle, TireModel, stored_verdict
 from identifier.verdict import Number, Verdict
 from identifier.verdict.verdict import MOST_MISSED, PERCENT
 from tireid.output import text_table
@@ -123,21 +125,24 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
     ]
 
 
-def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
-    """Return on how many recordings the default is valid, as a number of a report, if any.
+def verdicts_headline(
+    verdicts: Mapping[str, Verdict], meaning: str, fine: Tone = ""
+) -> list[Headline]:
+    """Return how many of several verdicts are valid, as a number of a report, if there are any.
 
-    verdicts : on the default method, by the name of the recording that it learnt on.
+    fine : what it is worth where all are.
     """
-    if not verdicts:
-        return []
     valid = sum(verdict.valid for verdict in verdicts.values())
-    return [
-        Headline(
-            f"{valid} of {len(verdicts)}",
-            "recordings on which what the default learnt is valid",
-            "good" if valid == len(verdicts) else "bad",
-        )
-    ]
+    tone: Tone = fine if valid == len(verdicts) else "bad"
+    return [Headline(f"{valid} of {len(verdicts)}", meaning, tone)] * bool(verdicts)
+
+
+def known_headline(model: TireModel) -> list[Headline]:
+    """Return up to which slip a model knows the tires, as a number of a report, if it can tell."""
+    if model.known_slip is None:
+        return []
+    front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
+    return [Headline(f"{front} / {rear}°", "known up to this slip, front / rear")]
 
 
 def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:

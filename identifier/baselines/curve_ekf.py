@@ -65,8 +65,6 @@ def _filtered_tire(textbook: bool) -> FilteredTire:
 
     Prior: friction [-], then those of `_OWN_PRIOR` where it is not the textbook's.
 
-    Parameters
-    ----------
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
     n = len(KINDS)
@@ -105,8 +103,6 @@ class CurveEkf(Method):
 
     With them the lag of the tire and the zeros of both sensors, which the default learns too.
 
-    Parameters
-    ----------
     walk : of every parameter [1/√s].
     v_y_noise : standard deviation of measured v_y [m/s].
     r_noise : standard deviation of the measured yaw rate [rad/s].
@@ -125,11 +121,6 @@ class CurveEkf(Method):
     dt : sampling interval [s].
     learning_speed : below this speed [m/s] learning rests.
     min_speed : below this speed [m/s] forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive.
     """
 
     walk: float
@@ -164,8 +155,6 @@ class CurveEkf(Method):
         lag and offsets, half of it with them. The parameters may walk by one percent in a second.
         Both were chosen on 32 random cars of our plant, from a compact to 1:10.
 
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -250,8 +239,6 @@ class CurveEkf(Method):
     def model(self, vehicle: Vehicle, theta: Array) -> CurveModel:
         """Return the curve, its lag and its offsets that unknowns make.
 
-        Parameters
-        ----------
         theta : unknowns, (n,).
         """
         n, loads = len(KINDS), ca.DM(vehicle.axle_loads)
@@ -288,8 +275,6 @@ class CurveEkf(Method):
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
     """Return the method for a car.
 
-    Parameters
-    ----------
     vehicle : the car; its stiffness B C D is the prior.
     dt : sampling interval [s].
     """

@@ -58,8 +58,6 @@ class Curve(NamedTuple):
 def _small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - (v_y ± l r)/v_x of (3), (2,) [rad].
 
-    Parameters
-    ----------
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
@@ -70,8 +68,6 @@ def _small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 def _wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - atan((v_y ± l r)/v_x) (2,) [rad].
 
-    Parameters
-    ----------
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
@@ -82,8 +78,6 @@ def _wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 def linear(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """Return F = C α of (3), (2,) [N].
 
-    Parameters
-    ----------
     q : C [N/rad] (2, 1).
     alpha : slip angles (2,) [rad].
     """
@@ -96,8 +90,6 @@ def magic_formula(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
 
     Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49) with E = 0.
 
-    Parameters
-    ----------
     q : B [1/rad], C [-], D [N] (2, 3).
     alpha : slip angles (2,) [rad].
     u : [δ_f, δ_r] (2,).
@@ -113,8 +105,6 @@ def dugoff(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     F = C tan α f(λ), λ = μ F_z/(2 C |tan α|), f = λ (2 - λ) for λ < 1, else 1.
     Source: Dugoff, Fancher and Segel, SAE 700377 (1970).
 
-    Parameters
-    ----------
     q : C [N/rad], μ [-] (2, 2).
     loads : F_z (2,) [N].
     alpha : slip angles (2,) [rad].
@@ -136,8 +126,6 @@ CURVES: Mapping[str, Curve] = {
 def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: Any, u: Any) -> Any:
     """Return the slip angles of a curve, the offsets of the sensors taken off, (2,) [rad].
 
-    Parameters
-    ----------
     offset : zero of the front steering δ₀ [rad], which is added, and bias b of v_y [m/s], (2,).
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] as the sensors read them (2,).
@@ -155,8 +143,6 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
     Carried: `LaggedSlip` where it lags, else nothing. Constant: parameters of the curve (2, n),
     offset (2,) = δ₀ [rad] and b [m/s], and where it lags lag (2,) = σ [m].
 
-    Parameters
-    ----------
     name : one of `CURVES`.
     lagged : whether the slip lags.
     """
@@ -187,8 +173,6 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
 def _curve_scan(name: str, *, lagged: bool) -> Scan:
     """Return the compiled loop of `_build_curve`.
 
-    Parameters
-    ----------
     name : one of `CURVES`.
     lagged : whether the slip lags.
     """
@@ -204,19 +188,11 @@ def unlagged() -> dict[str, Array]:
 class CurveModel(TireModel):
     """Axle forces of a curve with parameters that no longer change.
 
-    Parameters
-    ----------
     curve : one of `CURVES`.
     parameters : of the curve, front and rear (2, n), SI.
     min_speed : below this speed [m/s] the forces read zero.
     relaxation_length : σ by which the slip lags (2,) [m]; 0 is no lag.
     offset : zero of the front steering δ₀ [rad] and bias b of v_y [m/s], (2,).
-
-    Raises
-    ------
-    ValueError
-        Where the curve is unknown, a parameter not positive and finite, their shape wrong, or a
-        lag or an offset impossible.
     """
 
     kind = "curve"
@@ -284,8 +260,6 @@ class CurveModel(TireModel):
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip, (2,) or none [rad/s].
 
-        Parameters
-        ----------
         x : [v_y, r] (2,), as the sensors read them while learning.
         """
         p, u = self.vehicle.bicycle, ca.vertcat(delta, 0)

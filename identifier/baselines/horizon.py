@@ -215,8 +215,6 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     slides by more than `MOST_SLIDING`, the window is empty, and x begins anew in a steady turn;
     θ and its covariance are kept.
 
-    Parameters
-    ----------
     samples : N of the window.
     """
     stage, constants = build_stage(), ("vehicle", "sampling", "numbers")
@@ -282,15 +280,11 @@ def _scan(samples: int, iterations: int) -> Scan:
 class HorizonEstimator(Method):
     """Lateral velocity and two numbers per tire by moving-horizon estimation; v_y is not read.
 
-    Parameters
-    ----------
     window : how long what was measured is looked at again [s].
-
-    Raises
-    ------
-    ValueError
-        Where the filter learns no tire, or the window is none or too long.
     """
+
+    needs_v_y = False  # it tells one
+    needs_a_y = True
 
     filter: SlipFilter
     window: float
@@ -337,16 +331,6 @@ class HorizonEstimator(Method):
             ),
             window=window,
         )
-
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it needs a lateral velocity: it tells one."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer: so it is."""
-        return True
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -71,8 +71,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     the tire needs. Below that speed θ and its covariance are kept, and x and α' begin anew from
     the measurement.
 
-    Parameters
-    ----------
     tire : forces by θ.
     """
     s = sample_ports()
@@ -140,8 +138,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 def midpoint(estimate: Any, rate: Any, dt: Any) -> Any:
     """Return what moves of an estimate a step later, by the linearly implicit midpoint rule.
 
-    Parameters
-    ----------
     estimate : symbols; what moves comes first.
     rate : of what moves (n,).
     dt : sampling interval [s].
@@ -156,8 +152,6 @@ def correct(
 ) -> tuple[Any, Any]:
     """Return estimate and covariance after the measurement of the first two states.
 
-    Parameters
-    ----------
     estimate : before, (n,).
     P : its covariance (n, n).
     R : covariance of the measurement (2, 2).

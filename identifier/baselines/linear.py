@@ -19,8 +19,6 @@ from models.vehicle import Vehicle
 class LinearBaseline(Method):
     """F = C α of (3) with the stiffness that the vehicle states.
 
-    Parameters
-    ----------
     dt : sampling interval [s].
     min_speed : below this speed [m/s] forces read zero.
     """

@@ -110,8 +110,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     speed, and after an estimate that slides by more than `MOST_SLIDING`, x begins anew in a steady
     turn; θ and its covariance are kept.
 
-    Parameters
-    ----------
     tire : forces by θ.
     """
     heard, n = heard_ports(), 2 + tire.unknowns
@@ -173,8 +171,6 @@ def _scan(tire: str) -> Scan:
 class SlipFilter(Method):
     """Lateral velocity by a Kalman filter that hears r and a_y; a recording's v_y is not read.
 
-    Parameters
-    ----------
     tire : "linear", that of the vehicle file, or "dugoff", which is learnt.
     r_noise : standard deviation of the measured yaw rate [rad/s].
     a_y_noise : standard deviation of the measured a_y [m/s²].
@@ -189,14 +185,11 @@ class SlipFilter(Method):
     dt : sampling interval [s].
     learning_speed : below this speed [m/s] the filter rests.
     min_speed : below this speed [m/s] forces and v_y read zero.
-
-    Raises
-    ------
-    ValueError
-        Where the tire is unknown or a number not positive.
     """
 
     estimates = "lateral velocity"
+    needs_v_y = False  # it tells one
+    needs_a_y = True
 
     tire: str
     r_noise: float
@@ -226,8 +219,6 @@ class SlipFilter(Method):
         So that the joint filter errs least, and 95 % of its errors lie within two standard
         deviations there; the linear one has the same, and does not know that stiffnesses are wrong.
 
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -242,16 +233,6 @@ class SlipFilter(Method):
             learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
         )
-
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it needs a lateral velocity: it tells one."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer: so it is."""
-        return True
 
     @property
     def learns(self) -> bool:
@@ -296,13 +277,7 @@ class SlipFilter(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters.
-
-        Raises
-        ------
-        CannotFreezeError
-            Where no tire is learnt.
-        """
+        """Return the curve of Dugoff with the carried parameters."""
         if not self.learns:
             Method.frozen(self, vehicle, state)
         theta = state["estimate"].ravel()[2:].reshape(2, 2)
@@ -321,8 +296,6 @@ class SlipFilter(Method):
 def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the linear filter of v_y and r on the stiffnesses of the vehicle file.
 
-    Parameters
-    ----------
     dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="linear", dt=dt)
@@ -331,8 +304,6 @@ def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
 def joint_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the naive joint filter of v_y, r and a tire of Dugoff per axle.
 
-    Parameters
-    ----------
     vehicle : the car; its stiffness is the prior.
     dt : sampling interval [s].
     """

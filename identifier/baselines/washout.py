@@ -77,14 +77,14 @@ def _scan() -> Scan:
 class Washout(Method):
     """Lateral velocity by integration, with what is slow taken from the linear tires.
 
-    Parameters
-    ----------
     cutoff : ω, below which the linear model counts [1/s].
     dt : sampling interval [s].
     min_speed : below this speed [m/s] forces and v_y read zero.
     """
 
     estimates = "lateral velocity"
+    needs_v_y = False  # it tells one
+    needs_a_y = True
 
     cutoff: float
     dt: float = 0.01
@@ -101,16 +101,6 @@ class Washout(Method):
         one errs less there by a tenth at most, and is the linear model alone.
         """
         return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
-
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it needs a lateral velocity: it tells one."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it tells nothing from a recording without an accelerometer: so it is."""
-        return True
 
     @property
     def ports(self) -> tuple[Port, ...]:

@@ -55,8 +55,6 @@ def heard_ports() -> _Heard:
 def steady_v_y(p: BicycleParameters, v_x: Any, r: Any, u: Any) -> Any:
     """Return v_y of a steady turn on the linear rear tire [m/s].
 
-    Parameters
-    ----------
     v_x : longitudinal speed [m/s].
     r : yaw rate [rad/s].
     u : [δ_f, δ_r] (2,).
@@ -70,8 +68,6 @@ def axle_force(
 ) -> Any:
     """Return the axle forces of an estimate, (2,) [N].
 
-    Parameters
-    ----------
     tire : forces by θ, without lag.
     known : whatever else the tire reads.
     estimate : [v_y, r, θ].
@@ -87,8 +83,6 @@ def predicted(
 ) -> Any:
     """Return the estimate a step later, θ as it is.
 
-    Parameters
-    ----------
     estimate : [v_y, r, θ], symbols.
     v_x, u : means over the step.
     dt : sampling interval [s].
@@ -122,8 +116,6 @@ class _Corrected(NamedTuple):
 def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> _Corrected:
     """Return what a measurement of two numbers makes of an estimate, in Joseph's form.
 
-    Parameters
-    ----------
     P : covariance before (n, n).
     H : what the numbers are of the estimate (2, n); a row of zeros hears nothing.
     R : covariance of the numbers (2, 2).

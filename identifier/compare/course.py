@@ -8,7 +8,7 @@ noise of the sensors taken off.
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -38,14 +38,7 @@ INFINITE = AxleRmse(front=np.inf, rear=np.inf)
 class Course:
     """What methods are compared on.
 
-    Parameters
-    ----------
     min_speed : samples below this speed [m/s] do not count, for any method.
-
-    Raises
-    ------
-    ValueError
-        Where there is no recording, two have the same name, or one shows no force to learn.
     """
 
     vehicle: Vehicle
@@ -90,8 +83,6 @@ class Course:
     def error(self, recording: Recording, force: Array) -> AxleRmse:
         """Return the RMSE of forces over the samples that count; infinite where not finite.
 
-        Parameters
-        ----------
         force : (n, 2) [N].
         """
         if self.by_motion:
@@ -116,8 +107,6 @@ class Course:
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].
 
-        Parameters
-        ----------
         error : over it [N].
         """
         (recording,) = (rec for rec in self.recordings if rec.name == name)
@@ -128,8 +117,6 @@ class Course:
 class Trial:
     """One method on a course.
 
-    Parameters
-    ----------
     online : by recording, error of what was identified online [N].
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
@@ -159,8 +146,12 @@ def _shown_to(method: Method, recording: Recording) -> Recording:
     return recording if method.needs_v_y else replace(recording, v_y=None)
 
 
-def cross_replay(method: Method, course: Course) -> Trial:
+def cross_replay(
+    method: Method, course: Course, seen: Callable[[History], None] | None = None
+) -> Trial:
     """Learn on each recording afresh, freeze at its end and replay on all.
+
+    seen : called with each run.
 
     A method that tells lateral velocity learns without that of the recording; the frozen tires of
     all are asked at the same slip.
@@ -170,6 +161,8 @@ def cross_replay(method: Method, course: Course) -> Trial:
     for recording in course.recordings:
         history = identify(_shown_to(method, recording), course.vehicle, method)
         end = float(recording.t[-1])
+        if seen is not None:
+            seen(history)
         online[recording.name] = course.error(recording, history.axle_force)
         found = side_slip(history, course.min_speed, recording.v_y)
         told |= {} if found is None else {recording.name: found}
@@ -197,8 +190,6 @@ SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie
 class SideSlip:
     """What a method told of lateral velocity over a recording, and how far it was off.
 
-    Parameters
-    ----------
     v_y : told at each sample (n,) [m/s].
     v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.
     rms : of the error of side slip, from the first sample at a speed that counts [deg], infinite
@@ -215,8 +206,6 @@ class SideSlip:
 def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSlip | None:
     """Return what a run told of lateral velocity; None of a method that reads it.
 
-    Parameters
-    ----------
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """
@@ -257,8 +246,6 @@ def frozen_shares(
 ) -> tuple[float | None, float | None]:
     """Return the mean errors of frozen models where they learnt and elsewhere [%].
 
-    Parameters
-    ----------
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on, other = where_learnt_and_elsewhere(frozen)
@@ -273,8 +260,6 @@ def where_learnt_and_elsewhere(
 ) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
     """Return name and error of replays of the drive that was learnt, and of every other drive.
 
-    Parameters
-    ----------
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on: list[tuple[str, AxleRmse]] = []
@@ -306,8 +291,6 @@ def step_times(
     busy machine does not count, and the methods take turns. A short recording is run forward and
     backward in time until it is long enough, of a long one the first 100 000 samples count.
 
-    Parameters
-    ----------
     repeats : turns; the shortest counts.
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}

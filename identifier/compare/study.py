@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
 from identifier.method import Method
 from identifier.methods import REFERENCE, make_method
 from identifier.reproducibility import AxleRmse
+from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -17,8 +19,6 @@ Frozen = Mapping[str, Mapping[str, AxleRmse]]
 class Comparison:
     """Methods side by side.
 
-    Parameters
-    ----------
     trials : by method, its errors with the numbers that follow from the vehicle.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them, a method
         that learns from whole logs never.
@@ -62,19 +62,12 @@ def run_comparison(
     progress: Callable[[str], None],
     others: Mapping[str, Method] | None = None,
     left_out: Mapping[str, str] | None = None,
+    seen: Callable[[str, History], None] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
 
-    Parameters
-    ----------
     recordings : with true forces, or judged by the motion.
-    others : further methods by name.
-
-    Raises
-    ------
-    ValueError
-        Where a method is unknown, or the recordings cannot be compared on; a RecordingError where
-        one cannot learn on them, as `cannot_learn` tells.
+    others : further methods by name.   seen : called with each method's name and run.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
     methods |= others or {}
@@ -82,7 +75,7 @@ def run_comparison(
     course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
     trials = {}
     for name, method in methods.items():
-        trials[name] = cross_replay(method, course)
+        trials[name] = cross_replay(method, course, None if seen is None else partial(seen, name))
         lost = "".join(f", diverged on {rec}" for rec in trials[name].diverged_at)
         progress(f"{name}: learnt on {len(recordings)} recordings, replayed on all{lost}")
     timed = {REFERENCE: make_method(REFERENCE, vehicle, seed)} | methods

@@ -122,8 +122,6 @@ class _Taken(NamedTuple):
 class Search:
     """The search for what is wrong with some stretches of a drive.
 
-    Parameters
-    ----------
     problem : of them, with slopes over all parameters.
     accelerometer : None where there is none.
     wide, mean : standard deviations and means of what was taken in, by parameter.
@@ -386,8 +384,6 @@ class Search:
 
         The model of a half is one Gauss-Newton step from that of the whole.
 
-        Parameters
-        ----------
         parts : which residuals are of each half, (m,) each.
         zero : a suspect that is held at zero.
         """
@@ -440,8 +436,6 @@ class Search:
     ) -> Finding:
         """Return a candidate as a finding.
 
-        Parameters
-        ----------
         likely : that it is this, and that it is this or one of those that are alike.
         """
         suspect, vehicle, deviation = one.suspect, self.vehicle, self.deviation(one)
@@ -482,8 +476,6 @@ def _all_move(priors: Priors) -> Priors:
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
 
-    Parameters
-    ----------
     recording : as it was logged, of one drive or of several joined; of a long one lively stretches
         are looked at.
     vehicle : as it was told; its cornering stiffnesses are not looked at.

@@ -14,8 +14,6 @@ _MATTERS = 0.5  # confidence that something is wrong, from which it is told as s
 class Finding:
     """A fault of a log or of what is told of its car, or something that the log cannot tell.
 
-    Parameters
-    ----------
     code : for machines, as "delay" or "velocity_sensor_x".
     channel : that is concerned, "" where it is the car, the road or the whole log.
     size : of the fault in SI, NaN where it has none: an offset, a delay [s], a factor over the
@@ -29,11 +27,6 @@ class Finding:
     repair : what takes it out, None where nothing can.
     sure : whether the repair may be applied without being asked.
     note : whether it is a number of the car that the drive says otherwise, which is no alarm.
-
-    Raises
-    ------
-    ValueError
-        For a confidence beyond 0 to 1, or what is sure and has no repair.
 
     Notes
     -----

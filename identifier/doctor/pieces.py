@@ -58,8 +58,6 @@ def stretches_of(
 ) -> tuple[Recording, ...]:
     """Return the recording, or of a long one the liveliest stretch of each of its parts.
 
-    Parameters
-    ----------
     longest : that is looked at as a whole [s]; the stretches have it together.
     """
     n, dt = len(recording), recording.dt

@@ -51,8 +51,6 @@ _ALONE, _UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one tha
 class Change:
     """One thing that may be wrong with a log, or with what is told of its car.
 
-    Parameters
-    ----------
     code : for machines: "unit", "sign", "sideslip", or one of `FREE`.
     channels : concerned; none where it is the car.
     unit : in which they are logged, "" where that is right.
@@ -140,8 +138,6 @@ _ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y
 class _Explanation:
     """A reading of a log, the changes that make it, and what it leaves.
 
-    Parameters
-    ----------
     left : what it leaves unexplained, as `unexplained` returns it.
     """
 
@@ -166,8 +162,6 @@ class _Explanation:
 class Read:
     """How a log is best read, and what else it could be.
 
-    Parameters
-    ----------
     other : the next best that means something else.
     without : the same with the velocity sensor where it should be, if elsewhere it makes a reading
         the best that nothing gross is in; None else.
@@ -186,8 +180,6 @@ class Read:
 def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...]], bool]) -> Read:
     """Return how a log is best read as the motion of a car.
 
-    Parameters
-    ----------
     possible : whether the log breaks no law with some changes; of the best readings those that do
         are left out, unless all do.
     """

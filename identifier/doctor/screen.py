@@ -43,8 +43,6 @@ SLOW = 1.0  # s between samples, from which a clock is in ms
 class Screened:
     """What is grossly wrong.
 
-    Parameters
-    ----------
     findings : the most certain first.
     repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
         of no number of the car.
@@ -159,8 +157,6 @@ def before_sizes(findings: Iterable[Finding]) -> Repair:
 def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Finding]:
     """Return findings, none of them sure where one that they stand on is not.
 
-    Parameters
-    ----------
     earlier : all of them; those without a repair say nothing that is taken out.
     """
     firm = all(one.sure for one in earlier if one.repair is not None)
@@ -306,8 +302,6 @@ def steering_finding(
 ) -> Finding:
     """Return what a steering angle is that must be multiplied by a factor.
 
-    Parameters
-    ----------
     doubt : what else it may be, in words.
     deviation : of the factor over the factor, NaN where nobody knows it.
     """
@@ -350,8 +344,6 @@ def steering_finding(
 def words(changes: tuple[Change, ...]) -> str:
     """Return changes in words.
 
-    Parameters
-    ----------
     changes : of a reading; none is a log that is right.
     """
     said = []

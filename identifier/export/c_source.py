@@ -58,16 +58,7 @@ ORDER = (
 def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> dict[str, str]:
     """Return the C files of the library by their path in the package.
 
-    Parameters
-    ----------
     single : whether float is the default precision.
-
-    Raises
-    ------
-    UnknownOperationError
-        Where the method needs an operation that has no plain C.
-    ValueError
-        Where nothing is carried from step to step, or a carried value is not finite.
     """
     if not specialized.carry:
         kind = type(specialized.method).__name__

@@ -55,19 +55,8 @@ class ShippedRun(NamedTuple):
 class CompiledPackage:
     """One instance of the shipped C; attributes name, single, dt, inputs.
 
-    Parameters
-    ----------
     manifest : content of <name>.json.
     single : whether to compute in float; None takes the package's default.
-
-    Raises
-    ------
-    NoCompilerError
-        Where there is no C compiler.
-    CompilationError
-        Where the compiler refuses the package.
-    PackageFileError
-        Where the manifest is none, or the name that it gives is not one of C.
     """
 
     def __init__(
@@ -101,8 +90,6 @@ class CompiledPackage:
     def of(cls, package: Package, *, single: bool | None = None) -> "CompiledPackage":
         """Return an instance of a package that was just built.
 
-        Parameters
-        ----------
         single : whether to compute in float; None takes the package's default.
         """
         manifest = json.loads(package.files[f"{package.specialized.name}.json"])
@@ -112,15 +99,8 @@ class CompiledPackage:
     def from_folder(cls, folder: Path, *, single: bool | None = None) -> "CompiledPackage":
         """Return an instance of a package that was exported.
 
-        Parameters
-        ----------
         folder : what `tireid export` wrote.
         single : whether to compute in float; None takes the package's default.
-
-        Raises
-        ------
-        PackageFileError
-            Where the folder holds no package, or one of its files is none of a package.
         """
         for path in sorted(folder.glob("*.json")):
             manifest = read_json(path, PackageFileError)
@@ -177,8 +157,6 @@ class CompiledPackage:
     ) -> tuple[Status, Array]:
         """Take one sample; return its status and the axle forces (2,) [N].
 
-        Parameters
-        ----------
         v_x : longitudinal speed [m/s].
         v_y : lateral velocity [m/s].
         r : yaw rate [rad/s].
@@ -194,11 +172,6 @@ class CompiledPackage:
         """Run a whole recording, from the state that the instance is in.
 
         Between stretches of it samples are missing, as they are on a car.
-
-        Raises
-        ------
-        ValueError
-            Where the sampling intervals differ.
         """
         if abs(recording.dt - self.dt) > 1e-6 * self.dt:
             raise ValueError(
@@ -215,14 +188,7 @@ class CompiledPackage:
     def run_samples(self, samples: Array) -> ShippedRun:
         """Run samples, from the state that the instance is in.
 
-        Parameters
-        ----------
         samples : (n, k): v_x, v_y, r, delta_f, delta_r and, where it is one of `inputs`, a_y, SI.
-
-        Raises
-        ------
-        ValueError
-            Where the shape is another.
         """
         rows = np.ascontiguousarray(samples, dtype=np.float64)
         if rows.ndim != 2 or rows.shape[1] != len(self.inputs):
@@ -254,14 +220,7 @@ class CompiledPackage:
     def set_weights(self, weights: Mapping[str, Array]) -> None:
         """Go on with other weights.
 
-        Parameters
-        ----------
         weights : by name, in the shapes of `weights`.
-
-        Raises
-        ------
-        ValueError
-            Where a name or shape is another, a number not finite, or a covariance negative.
         """
         shapes = {name: np.shape(value) for name, value in weights.items()}
         if shapes != self._weights:
@@ -275,14 +234,7 @@ class CompiledPackage:
     def set_adaptation(self, adapts: bool) -> None:
         """Learn, or hold what is learnt.
 
-        Parameters
-        ----------
         adapts : False freezes.
-
-        Raises
-        ------
-        ValueError
-            For a method that has no weights.
         """
         if not self._weights:
             raise ValueError(f"{self.name} estimates a signal: there is nothing to freeze")

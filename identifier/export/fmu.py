@@ -67,15 +67,8 @@ def build_binary(
 ) -> bytes:
     """Compile sources to a shared library and return its content.
 
-    Parameters
-    ----------
     model : content by name of C files and headers that need no other: compiled once for both
         versions of FMI, since the equations take longest.
-
-    Raises
-    ------
-    CompilationError
-        Where the compiler refuses them.
     """
     built = _objects(target, tuple(sorted(model.items())))
     with _folder_of({**model, **around, **dict(built)}) as folder:
@@ -128,8 +121,6 @@ TOKEN = "token.h"
 def token_header(token: str, version: int) -> str:
     """Return token.h, which tells this FMU from every other one.
 
-    Parameters
-    ----------
     token : GUID of FMI 2.0, instantiation token of FMI 3.0.
     version : of FMI, 2 or 3.
     """
@@ -138,15 +129,7 @@ def token_header(token: str, version: int) -> str:
 
 
 def model_files(specialized: SpecializedStep) -> dict[str, str]:
-    """Return header and sources of the C package by file name.
-
-    Raises
-    ------
-    UnknownOperationError
-        Where the method needs an operation that has no plain C.
-    ValueError
-        Where nothing is carried from step to step, or a carried value is not finite.
-    """
+    """Return header and sources of the C package by file name."""
     about = summary(specialized, ingredients(specialized, single=False))
     sources = c_sources(specialized, single=False, about=about)
     return {PurePosixPath(path).name: text for path, text in sources.items()}
@@ -285,8 +268,6 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 def element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
     """Return an element; attributes that are empty strings are left out.
 
-    Parameters
-    ----------
     attributes : by name; True and False become true and false.
     """
     words = {name: _text(value) for name, value in attributes.items() if value != ""}
@@ -313,8 +294,6 @@ TOOL = "tireid"
 def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
     """Return modelDescription.xml of FMI 2.0.
 
-    Parameters
-    ----------
     sources : names of the C files.
     """
     table = variables(specialized)
@@ -323,38 +302,20 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
         for i, variable in enumerate(table, start=1)
         if variable.causality == "output"
     ]
-    model = element(
-        "fmiModelDescription",
+    simulation = element(
+        "CoSimulation",
         {
-            "fmiVersion": "2.0",
-            "modelName": specialized.name,
-            "guid": token,
-            "description": _sentence(specialized),
-            "generationTool": TOOL,
-            "variableNamingConvention": "flat",
+            "modelIdentifier": specialized.name,
+            "canHandleVariableCommunicationStepSize": True,
+            "canNotUseMemoryManagementFunctions": True,
+            "canGetAndSetFMUstate": True,
+            "canSerializeFMUstate": True,
         },
-        element(
-            "CoSimulation",
-            {
-                "modelIdentifier": specialized.name,
-                "canHandleVariableCommunicationStepSize": True,
-                "canNotUseMemoryManagementFunctions": True,
-                "canGetAndSetFMUstate": True,
-                "canSerializeFMUstate": True,
-            },
-            element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
-        ),
-        _units(table),
-        _experiment(specialized),
-        element("ModelVariables", {}, *(_variable_2(variable) for variable in table)),
-        element(
-            "ModelStructure",
-            {},
-            element("Outputs", {}, *unknowns),
-            element("InitialUnknowns", {}, *unknowns),
-        ),
+        element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
     )
-    return document(model)
+    structure = element("Outputs", {}, *unknowns), element("InitialUnknowns", {}, *unknowns)
+    listed = map(_variable_2, table)
+    return _description(specialized, ("2.0", "guid", token), simulation, listed, structure)
 
 
 def description_3(specialized: SpecializedStep, token: str) -> str:
@@ -366,37 +327,54 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
         {"name": "time", "valueReference": 0, "causality": "independent", "unit": "s"}
         | {"variability": "continuous", "description": "simulation time"},
     )
+    simulation = element(
+        "CoSimulation",
+        {
+            "modelIdentifier": specialized.name,
+            "canGetAndSetFMUState": True,
+            "canSerializeFMUState": True,
+            "canHandleVariableCommunicationStepSize": True,
+        },
+    )
+    structure = [
+        element(tag, {"valueReference": variable.reference})
+        for tag in ("Output", "InitialUnknown")
+        for variable in outputs
+    ]
+    said, listed = ("3.0", "instantiationToken", token), [time, *map(_variable_3, table)]
+    return _description(specialized, said, simulation, listed, structure)
+
+
+def _description(
+    specialized: SpecializedStep,
+    said: tuple[str, str, str],
+    simulation: Element,
+    listed: Iterable[Element],
+    structure: Iterable[Element],
+) -> str:
+    """Return modelDescription.xml.
+
+    said : version, what it calls the token, the token.
+    """
+    version, key, token = said
+    table = variables(specialized)
+    about = {
+        "fmiVersion": version,
+        "modelName": specialized.name,
+        key: token,
+        "description": _sentence(specialized),
+        "generationTool": TOOL,
+        "variableNamingConvention": "flat",
+    }
+    experiment = {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
     model = element(
         "fmiModelDescription",
-        {
-            "fmiVersion": "3.0",
-            "modelName": specialized.name,
-            "instantiationToken": token,
-            "description": _sentence(specialized),
-            "generationTool": TOOL,
-            "variableNamingConvention": "flat",
-        },
-        element(
-            "CoSimulation",
-            {
-                "modelIdentifier": specialized.name,
-                "canGetAndSetFMUState": True,
-                "canSerializeFMUState": True,
-                "canHandleVariableCommunicationStepSize": True,
-            },
-        ),
+        about,
+        simulation,
         _units(table),
-        _experiment(specialized),
-        element("ModelVariables", {}, time, *(_variable_3(variable) for variable in table)),
-        element(
-            "ModelStructure",
-            {},
-            *(
-                element(tag, {"valueReference": variable.reference})
-                for tag in ("Output", "InitialUnknown")
-                for variable in outputs
-            ),
-        ),
+        element("DefaultExperiment", experiment),
+        element("ModelVariables", {}, *listed),
+        element("ModelStructure", {}, *structure),
     )
     return document(model)
 
@@ -404,8 +382,6 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
 def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
     """Return sources/buildDescription.xml of FMI 3.0.
 
-    Parameters
-    ----------
     sources : names of the C files.
     """
     files = (element("SourceFile", {"name": name}) for name in sources)
@@ -444,43 +420,26 @@ def _units(table: Sequence[Variable]) -> Element:
     return element("UnitDefinitions", {}, *units)
 
 
-def _experiment(specialized: SpecializedStep) -> Element:
-    return element(
-        "DefaultExperiment", {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
-    )
+def _about(variable: Variable) -> dict[str, object]:
+    return {
+        "name": variable.name,
+        "valueReference": variable.reference,
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": _initial(variable),
+    }
 
 
 def _variable_2(variable: Variable) -> Element:
     tag = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}[variable.kind]
-    return element(
-        "ScalarVariable",
-        {
-            "name": variable.name,
-            "valueReference": variable.reference,
-            "description": variable.description,
-            "causality": variable.causality,
-            "variability": variable.variability,
-            "initial": _initial(variable),
-        },
-        element(tag, {"unit": variable.unit, "start": variable.start}),
-    )
+    kind = element(tag, {"unit": variable.unit, "start": variable.start})
+    return element("ScalarVariable", _about(variable), kind)
 
 
 def _variable_3(variable: Variable) -> Element:
     tag = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}[variable.kind]
-    return element(
-        tag,
-        {
-            "name": variable.name,
-            "valueReference": variable.reference,
-            "description": variable.description,
-            "causality": variable.causality,
-            "variability": variable.variability,
-            "initial": _initial(variable),
-            "unit": variable.unit,
-            "start": variable.start,
-        },
-    )
+    return element(tag, {**_about(variable), "unit": variable.unit, "start": variable.start})
 
 
 def _initial(variable: Variable) -> str:
@@ -508,19 +467,8 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     interval after the start, whatever the communication step; a step from t to t + h takes those in
     [t, t + h).
 
-    Parameters
-    ----------
     specialized : the step; its name is the model identifier.
     version : of FMI, 2 or 3.
-
-    Raises
-    ------
-    ValueError
-        Where the version is another, nothing is carried, or a carried value is not finite.
-    CompilationError
-        Where a compiler refuses the sources.
-    OSError
-        Where the file cannot be written.
     """
     if version not in OF_VERSION:
         raise ValueError(f"version must be 2 or 3, it is {version}")
@@ -546,8 +494,6 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
 def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
     """Return the text files of an FMU by their path inside it.
 
-    Parameters
-    ----------
     version : of FMI, 2 or 3.
     """
     shared = model_files(specialized)

@@ -45,8 +45,6 @@ class Member(NamedTuple):
     def element(self, entry: int) -> str:
         """Return the C index of an entry.
 
-        Parameters
-        ----------
         entry : counted by columns, as CasADi does.
         """
         row, column = entry % self.shape[0], entry // self.shape[0]
@@ -73,8 +71,6 @@ def output_members(specialized: SpecializedStep) -> list[Member]:
 def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
     """Return the C expression of an entry of an input of the step.
 
-    Parameters
-    ----------
     port : number of the input.
     """
     name = specialized.function.name_in(port)
@@ -88,8 +84,6 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
 def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
     """Return the C lvalue of an entry of an output of the step.
 
-    Parameters
-    ----------
     port : number of the output.
     """
     state = carried_members(specialized)
@@ -103,8 +97,6 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
 def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
     """Return a nested initializer by rows.
 
-    Parameters
-    ----------
     value : the numbers (of any shape).
     dimensions : of the C array.
     """
@@ -132,8 +124,6 @@ class Rule(NamedTuple):
 def rules(members: Sequence[Member]) -> list[Rule]:
     """Return what numbers of the weights must keep to be taken over.
 
-    Parameters
-    ----------
     members : of the weights, in the order in which they lie in memory.
     """
     found, first = list[Rule](), 0

@@ -46,13 +46,7 @@ class MissingOnnxError(TireidError, ImportError):
 
 
 def onnx_package() -> Any:
-    """Return the package onnx, which is an extra.
-
-    Raises
-    ------
-    MissingOnnxError
-        Where it is not installed.
-    """
+    """Return the package onnx, which is an extra."""
     try:
         import onnx
     except ImportError as error:
@@ -64,8 +58,6 @@ def onnx_package() -> Any:
 class Graph:
     """Nodes and constants of a graph that is being written.
 
-    Parameters
-    ----------
     single : whether numbers are float32; else they are float64.
     """
 
@@ -76,8 +68,6 @@ class Graph:
     def constant(self, name: str, value: ArrayLike) -> str:
         """Store a matrix and return its name.
 
-        Parameters
-        ----------
         value : its numbers (of any shape).
         """
         number = np.float32 if self.single else np.float64
@@ -88,8 +78,6 @@ class Graph:
     def apply(self, operator: str, inputs: Sequence[str], result: str, **attributes: Any) -> str:
         """Add a node and return the name of its result.
 
-        Parameters
-        ----------
         operator : of ONNX, such as "MatMul".
         """
         node = onnx_package().helper.make_node(
@@ -108,8 +96,6 @@ class Graph:
     ) -> bytes:
         """Return the finished, checked model as the content of its file.
 
-        Parameters
-        ----------
         outputs : what it gives; results of nodes have their names.
         """
         onnx = onnx_package()
@@ -156,8 +142,6 @@ OUTPUTS = (
 def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
     """Return a frozen network as ONNX: v_x, v_y, r, delta_f, delta_r to F_yf, F_yr, (batch, 1).
 
-    Parameters
-    ----------
     single : whether numbers are float32; else they are float64.
     """
     graph = Graph(single)
@@ -231,8 +215,6 @@ def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | No
 
     Of a car with downforce those of the static loads.
 
-    Parameters
-    ----------
     single : whether numbers are float32; else they are float64.
     add_band : adds half the width of their bands, at the speed of the drive that taught the model.
     """
@@ -318,8 +300,6 @@ def _band_of_fit(source: FittedModel, graph: Graph, axle: int, units: str, force
 def _band_of_axle(model: AxleModel, graph: Graph, axle: int, units: str, force: str) -> None:
     """Add half the width of the band of an axle; the formula of `identifier.axle.band`.
 
-    Parameters
-    ----------
     axle : 0 in front, 1 at the rear.
     units, force : names of t (batch, n) and of the force [N] (batch, 1).
     """
@@ -379,20 +359,11 @@ class NoOnnxError(TireidError, ValueError):
 def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
 
-    Parameters
-    ----------
     model : the whole model for a network, the static force curves for an axle model and, in hidden
         units, for a fit, the network itself for one that came from an ONNX file.
     single : whether numbers are float32; else they are float64.
     with_band : whether half the width of the band is told, too, which axle models and
         fits have.
-
-    Raises
-    ------
-    NoOnnxError
-        For any other kind of model, or one that has no band where it is asked for.
-    MissingOnnxError
-        Where the package onnx is not installed.
     """
     if model.kind not in GRAPHS:
         raise NoOnnxError(
@@ -410,15 +381,6 @@ def export_onnx(
 ) -> None:
     """Write a frozen model as an ONNX file.
 
-    Parameters
-    ----------
     single : whether numbers are float32; else they are float64.
-
-    Raises
-    ------
-    NoOnnxError
-        For a kind of model that has no ONNX form.
-    MissingOnnxError
-        Where the package onnx is not installed.
     """
     write_atomically(path, onnx_bytes(model, single=single, with_band=with_band))

@@ -44,8 +44,6 @@ FLAGS = ("-ffp-contract=off", "-fno-math-errno")  # of the library
 def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]:
     """Return everything that a package is made of, ready for JSON.
 
-    Parameters
-    ----------
     single : whether float is the default precision.
     """
     method = specialized.method
@@ -93,8 +91,6 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
     """Return what texts say about a package: title, method, versions, hash, names and numbers.
 
-    Parameters
-    ----------
     content : what `ingredients` returned.
     """
     return {
@@ -164,8 +160,6 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
 
     Where v_y is told it is measured at the end alone; a_y is that of the motion, with a gap.
 
-    Parameters
-    ----------
     n : number of samples.
     """
     k = np.arange(n, dtype=np.float64)
@@ -195,8 +189,6 @@ def run_in_virtual_machine(
 
     Samples that are refused count as time, as `identifier.refused` says.
 
-    Parameters
-    ----------
     samples : (n, k) in the order of the inputs.
     """
     limits, method = specialized.limits, specialized.method
@@ -307,22 +299,10 @@ def build_package(
 ) -> Package:
     """Return the package of a method for a car; the same input gives the same bytes.
 
-    Parameters
-    ----------
     start : weights to begin with; None begins with those of the method.
     single : whether float is the default precision.
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.
-
-    Raises
-    ------
-    PackageNameError
-        Where the name is not one of C in lower case.
-    UnknownOperationError
-        Where the method needs an operation that has no plain C.
-    ValueError
-        Where stored weights are those of another structure, or the method has no use for a_y or
-        no band.
     """
     check_name(name)
     specialized = specialize(method, vehicle, start, name, with_a_y=with_a_y, with_band=with_band)
@@ -350,8 +330,6 @@ def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
 def readme(package: Package, about_figures: str) -> str:
     """Return the README of a package.
 
-    Parameters
-    ----------
     about_figures : flash, RAM, stack and instructions, as Markdown.
     """
     specialized = package.specialized

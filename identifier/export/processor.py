@@ -16,8 +16,6 @@ REPLAYED = Path(__file__).parent / "target" / "replayed.h"
 def recording_program(name: str, files: Mapping[str, str], samples: Array) -> Program:
     """Return a recording that is replayed through a package.
 
-    Parameters
-    ----------
     samples : (n, k) in the order of the inputs, SI.
     """
     rows = np.ascontiguousarray(samples, dtype="<f8").tobytes()
@@ -27,8 +25,6 @@ def recording_program(name: str, files: Mapping[str, str], samples: Array) -> Pr
 def measure(package: Package, progress: Callable[[float], None] | None = None) -> list[Cost]:
     """Return what a package costs on every processor, float and double; empty without the tools.
 
-    Parameters
-    ----------
     progress : called with the share that is done.
     """
     if missing_tools():

@@ -125,18 +125,10 @@ def specialize(
 ) -> SpecializedStep:
     """Return the step of a method for a car, ready to be exported.
 
-    Parameters
-    ----------
     start : weights to begin with; None begins with those of the method.
     name : C identifier.
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.
-
-    Raises
-    ------
-    ValueError
-        Where stored weights are those of another structure, the method has no use for a_y or no
-        band, or its step is not straight-line code.
     """
     setup = (method.setup_with_band if with_band else method.setup)(vehicle, start)
     if not setup.scan.step.is_a("SXFunction"):

@@ -51,8 +51,6 @@ class _Variant(NamedTuple):
     def gains(self, found: Gains) -> Gains:
         """Return the gains.
 
-        Parameters
-        ----------
         found : for the law `gains_of`.
         """
         return found.scaled_by_forgetting() if self.scaled else found
@@ -277,8 +275,6 @@ def _observed(vehicle: Vehicle, force_unit: float, x: Array) -> dict[str, Array]
 def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
     """Return ξ = K⁻¹ x of (7), (2,) [N s].
 
-    Parameters
-    ----------
     x : [v_y, r] (2,).
     vehicle : the car, which gives K.
     """
@@ -297,8 +293,6 @@ def _natural_force_unit(mass: float) -> float:
     The gains are well scaled where forces are of order one: 1 kN for a passenger car, 1 N for a
     1:10 model.
 
-    Parameters
-    ----------
     mass : mass of the car [kg].
     """
     return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
@@ -323,8 +317,6 @@ def design_for(
 ) -> PaperIdentifier:
     """Return a design whose learning loop has the wanted phase margin at the worst regressor.
 
-    Parameters
-    ----------
     driving : how hard it is driven; it is stored with the design.
     law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
     network : structure; None takes `natural_network`.
@@ -332,11 +324,6 @@ def design_for(
     input_source : "measured" or "estimated".
     integrator : "euler" or "rk4".
     dt : sampling interval [s].
-
-    Raises
-    ------
-    DesignError
-        Where the bandwidth is too high for the sampling, or the margin cannot be had.
     """
     network = network or natural_network(vehicle)
     frame = PaperIdentifier(
@@ -379,16 +366,9 @@ def _placeholder() -> Gains:
 def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
     """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
 
-    Parameters
-    ----------
     design : of the paper's leakage, as `design_for` finds it.
     known : where it runs, `PaperIdentifier.operation`.
     keeping : one of `KEEPINGS`.
-
-    Raises
-    ------
-    ValueError
-        Where the name is unknown, or the design has a dead zone or a projection already.
     """
     if keeping not in KEEPINGS:
         raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")
@@ -447,15 +427,8 @@ class DesignFileError(TireidError, ValueError):
 def read_design(path: Path) -> PaperIdentifier:
     """Read a design.
 
-    Parameters
-    ----------
     path : TOML with the keys of `PaperIdentifier`, and tables [gains], [network] and, where the
         conditions of driving are declared, [driving].
-
-    Raises
-    ------
-    DesignFileError
-        One line with file, key and rule.
     """
     try:
         data = read_toml(path, DesignFileError)

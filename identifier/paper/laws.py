@@ -30,8 +30,6 @@ _Direction = Callable[[Any, Any], Any]
 def _static_direction(A_d: Any, drive: Any) -> Any:
     """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
 
-    Parameters
-    ----------
     A_d : Hurwitz matrix (2, 2) [1/s].
     drive : the error that drives the laws (2,).
     """
@@ -44,8 +42,6 @@ def lyapunov_direction(A_d: Any, drive: Any) -> Any:
     P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
     2x2 matrix in closed form.
 
-    Parameters
-    ----------
     A_d : Hurwitz matrix (2, 2) [1/s].
     drive : the error that drives the laws (2,).
     """
@@ -67,8 +63,6 @@ class DrivingError(NamedTuple):
     def drive(self, z: Any, xi_tilde: Any) -> Any:
         """Return the driving error.
 
-        Parameters
-        ----------
         z : filtered error.
         """
         return self.z * z + self.xi_tilde * xi_tilde
@@ -78,17 +72,10 @@ class DrivingError(NamedTuple):
 class Law:
     """A law: the error z z + (xi + lead τ) ξ̃ drives (11)-(12) along a direction.
 
-    Parameters
-    ----------
     z : share of the filtered error.
     xi : share of the error.
     lead : share of the lead time τ of the gains in what multiplies the error.
     direction : of the descent, from A_d and the driving error.
-
-    Raises
-    ------
-    ValueError
-        Where a share is negative, or all of them are zero.
     """
 
     name: str
@@ -105,8 +92,6 @@ class Law:
     def error(self, lead: Any = 0.0) -> DrivingError:
         """Return the coefficients of the driving error.
 
-        Parameters
-        ----------
         lead : lead time τ of the gains [s], a number or a symbol.
         """
         return DrivingError(self.z, self.xi + self.lead * lead)
@@ -129,8 +114,6 @@ LAWS: Mapping[str, Law] = {
 def unbounded(weights: Any, radius: Any) -> Any:
     """Return the weights as they are: the leakage alone bounds them.
 
-    Parameters
-    ----------
     radius : ignored.
     """
     del radius
@@ -140,8 +123,6 @@ def unbounded(weights: Any, radius: Any) -> Any:
 def ball(weights: Any, radius: Any) -> Any:
     """Return the weights, projected on the ball |weights|_F <= radius.
 
-    Parameters
-    ----------
     radius : Frobenius norm that is kept, positive.
     """
     return weights * ca.fmin(1, radius / ca.fmax(ca.norm_fro(weights), 1e-300))
@@ -150,8 +131,6 @@ def ball(weights: Any, radius: Any) -> Any:
 def whole(weights: Any, radius: Any) -> Any:
     """Return the weights as they are: all of them leak, as in (11)-(12).
 
-    Parameters
-    ----------
     radius : ignored.
     """
     del radius
@@ -161,8 +140,6 @@ def whole(weights: Any, radius: Any) -> Any:
 def beyond_ball(weights: Any, radius: Any) -> Any:
     """Return what of the weights lies beyond the ball: zero within it, and continuous.
 
-    Parameters
-    ----------
     radius : Frobenius norm within which nothing leaks, not negative.
     """
     return weights - ball(weights, radius)
@@ -195,8 +172,6 @@ def weight_rates(
 ) -> _WeightRates:
     """Return (11)-(12), each a descent along the static gradient with a leakage.
 
-    Parameters
-    ----------
     drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
     xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.
     W : weights (2, n_h).
@@ -232,8 +207,6 @@ _InputSource = Callable[[Any, Any], Any]
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
 
-    Parameters
-    ----------
     A_d : Hurwitz matrix (2, 2) [1/s].
     A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
     B_xi : B_ξ of (7) (2, 2) [U/rad].
@@ -248,8 +221,6 @@ def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, 
 def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
     """Return dz/dt of (10), (2,) [U s].
 
-    Parameters
-    ----------
     forgetting : λ [1/s].
     z : filtered error (2,) [U s²].
     xi_tilde : error (2,) [U s].
@@ -260,8 +231,6 @@ def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
 def measured(xi: Any, xi_hat: Any) -> Any:
     """Read the network's input from the measured state, which opens the loop through x̂.
 
-    Parameters
-    ----------
     xi : measured axle impulse (2,).
     xi_hat : estimated axle impulse (2,).
     """
@@ -274,8 +243,6 @@ def estimated(xi: Any, xi_hat: Any) -> Any:
 
     It closes a loop: A_d must then be fast against the slope of the tire.
 
-    Parameters
-    ----------
     xi : measured axle impulse (2,).
     xi_hat : estimated axle impulse (2,).
     """
@@ -306,8 +273,6 @@ def euler(
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
 
-    Parameters
-    ----------
     derivative : time derivative of each part of the state.
     dt : step [s].
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
@@ -322,8 +287,6 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
     The inner stages are projected: else a high gain leaves the bounds within the step, and the
     slopes there carry it beyond them.
 
-    Parameters
-    ----------
     derivative : time derivative of each part of the state.
     dt : step [s].
     """
@@ -353,8 +316,6 @@ class NotHurwitzError(TireidError, ValueError):
 class Gains:
     """Gains of the observer (8), the filter (10) and the laws (11)-(12).
 
-    Parameters
-    ----------
     A_d : Hurwitz matrix of the prescribed error dynamics (2x2), by rows [1/s].
     forgetting : λ of (9)-(10) [1/s].
     eta_W : learning rate of W: η1 [1/s⁴], or [1/s³] for the instantaneous law.
@@ -367,14 +328,6 @@ class Gains:
         leaks, beyond it what lies beyond; 0, the paper's: all of W leaks.
     V_free : radius of the dead zone of the leakage of V, Frobenius norm [-]; 0, the paper's.
     lead : τ of the PI-lead law z + τ ξ̃ [s]; the other laws do not read it.
-
-    Raises
-    ------
-    NotHurwitzError
-        Where A_d is not Hurwitz.
-    ValueError
-        Where a gain is negative, not a number, above `LARGEST` or below `LEAST`, λ or a radius not
-        positive, a dead zone without a leakage, or A_d not 2x2.
     """
 
     A_d: tuple[tuple[float, float], tuple[float, float]]
@@ -433,8 +386,6 @@ class Gains:
 def diagonal(a: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return A_d = -a I by rows.
 
-    Parameters
-    ----------
     a : rate of the error dynamics [1/s].
     """
     return ((-a, 0.0), (0.0, -a))

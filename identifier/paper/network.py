@@ -54,16 +54,9 @@ class Weights(NamedTuple):
 class Network:
     """Structure of the network: size, inputs and their scales.
 
-    Parameters
-    ----------
     hidden : number of hidden units n_h.
     inputs : signals of x̄, chosen among `SIGNALS`, each at most once.
     scale : divisor of each input in its own unit (m/s, rad/s, rad); None takes those of `SIGNALS`.
-
-    Raises
-    ------
-    ValueError
-        Where the size is not positive, an input unknown or repeated, or a scale not positive.
     """
 
     hidden: int = 10
@@ -93,8 +86,6 @@ class Network:
     def initial_weights(self, rng: np.random.Generator) -> Weights:
         """Return W = 0, which starts at the linear tire, and random V.
 
-        Parameters
-        ----------
         rng : generator of V, drawn from a normal distribution of standard deviation 1.
         """
         return Weights(
@@ -104,8 +95,6 @@ class Network:
     def normalized_input(self, signals: Mapping[str, Any]) -> Any:
         """Return x̄ (n_in,), without unit.
 
-        Parameters
-        ----------
         signals : the CasADi expression of every signal of `inputs`, SI.
         """
         assert self.scale is not None
@@ -118,8 +107,6 @@ def natural_network(
 ) -> Network:
     """Return a network whose input scales fit the size of the car.
 
-    Parameters
-    ----------
     vehicle : its wheelbase sets the scales of speeds and yaw rate.
     hidden : number of hidden units.
     """
@@ -132,8 +119,6 @@ def natural_network(
 def hidden_layer(V: Any, x_bar: Any) -> Any:
     """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
 
-    Parameters
-    ----------
     V : weights (n_h, n_in).
     x_bar : scaled input (n_in,).
     """
@@ -143,8 +128,6 @@ def hidden_layer(V: Any, x_bar: Any) -> Any:
 def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> dict[str, Any]:
     """Return every signal that a network may read, by name, SI.
 
-    Parameters
-    ----------
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
@@ -220,16 +203,9 @@ def _replay_scan(network: Network) -> Scan:
 class NetworkModel(TireModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
 
-    Parameters
-    ----------
     weights : W (2, n_h) in the force unit and V (n_h, n_in).
     force_unit : U [N].
     min_speed : below this speed [m/s] the forces read zero.
-
-    Raises
-    ------
-    ValueError
-        Where a weight has the wrong shape or is not finite.
     """
 
     kind = "network"
@@ -281,8 +257,6 @@ class NetworkModel(TireModel):
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
 
-        Parameters
-        ----------
         slip : empty.
         """
         del slip, least_lag
@@ -329,15 +303,8 @@ def first_weights(
 ) -> Weights:
     """Return the weights that learning begins with.
 
-    Parameters
-    ----------
     start : stored weights to begin with; None draws them.
     force_unit : U of what learns [N].
-
-    Raises
-    ------
-    ValueError
-        Where stored weights are those of another structure.
     """
     if start is None:
         return network.initial_weights(np.random.default_rng(seed))

@@ -26,8 +26,6 @@ _MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array:
     """Return the covariance of weights and own after a maneuver, (m, k, 2, q, q).
 
-    Parameters
-    ----------
     tires : k pairs of axles; their covariance is that before.
     v_x : speed [m/s].
     """
@@ -66,8 +64,6 @@ class Doubt(NamedTuple):
 def asked(tires: PlausibleTires, v_x: float) -> Doubt:
     """Return where the curves are asked: evenly up to where the first one is flat.
 
-    Parameters
-    ----------
     v_x : speed [m/s].
     """
     ladder = np.array(tires.method.ladder)
@@ -80,8 +76,6 @@ def asked(tires: PlausibleTires, v_x: float) -> Doubt:
 def deviation(doubt: Doubt, P: Array) -> Array:
     """Return the standard deviation of the force at the slips asked [static loads], (..., 2, s).
 
-    Parameters
-    ----------
     P : covariances (..., 2, q, q).
     """
     n = doubt.units.shape[-1]
@@ -93,8 +87,6 @@ def deviation(doubt: Doubt, P: Array) -> Array:
 def expected_error(tires: PlausibleTires, doubt: Doubt, P: Array) -> Array:
     """Return the expected root mean square error of the forces over the grip [-], (...,).
 
-    Parameters
-    ----------
     P : covariances (..., 2, q, q).
     """
     relative = deviation(doubt, P) / tires.grip[0][:, None]

@@ -35,8 +35,6 @@ class Hold(NamedTuple):
     def steering(self, reference: tuple[Any, Any, Any], now: tuple[Any, Any, Any]) -> Any:
         """Return what is added to the planned angle [rad].
 
-        Parameters
-        ----------
         reference, now : X, Y [m] and heading [rad], as planned and as they are.
         """
         (X, Y, psi), (X_now, Y_now, psi_now) = reference, now
@@ -63,8 +61,6 @@ class Guide(NamedTuple):
 def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
     """Return how the course is held by the first tires.
 
-    Parameters
-    ----------
     v_x : speed [m/s].
     """
     car, omega = tires.vehicle, HOLD / tires.vehicle.froude_time
@@ -121,8 +117,6 @@ def simulate(
 ) -> Motion:
     """Return the motion of all tires under all steerings.
 
-    Parameters
-    ----------
     planned : angles asked of the front wheels at steps of `time_step` [rad], (n, m).
     v_x : speed [m/s].
     guide : what is planned follows it; None plans the angles as they are.
@@ -200,8 +194,6 @@ def simulate(
 def steps_of(tires: PlausibleTires, duration: float) -> Array:
     """Return the times of a simulation [s], (n,).
 
-    Parameters
-    ----------
     duration : [s].
     """
     dt = time_step(tires)

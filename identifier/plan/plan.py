@@ -109,13 +109,7 @@ class Plan:
         return min(float(edge_distance(self.space, body, *way).min()) for way in ways)
 
     def rehearsed(self, plant: Plant) -> tuple[Rehearsal, ...]:
-        """Return how another car drives each pass: one whose tires need not be as planned.
-
-        Raises
-        ------
-        PlantError
-            Where it leaves the range of its equations.
-        """
+        """Return how another car drives each pass: one whose tires need not be as planned."""
         hold = hold_of(self.tires, self.space.speed) if self.space.held else NO_HOLD
         body = body_of(self.tires)
         driven = []
@@ -159,16 +153,9 @@ def make_plan(
 ) -> Plan:
     """Return the passes that teach most.
 
-    Parameters
-    ----------
     tires : that the car may have, under static loads; the plan's are those under the loads of its
         speed.
     time : of all passes together [s].
-
-    Raises
-    ------
-    PlanError
-        Where the area is too small for the speed, or the time is none to learn in.
     """
     if not _LEAST_TIME <= time <= _MOST_TIME:
         raise PlanError(f"the time must be {_LEAST_TIME:g} to {_MOST_TIME:g} s, it is {time:g}")
@@ -233,8 +220,6 @@ Steering = Callable[[float], Maneuver]  # of an amplitude [rad]
 def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
     """Return the hardest of maneuvers that keeps the share of the grip, with the likely tires.
 
-    Parameters
-    ----------
     space : speed and share; its sides are not looked at.
     of : the maneuver by its amplitude.
     """
@@ -250,8 +235,6 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
 def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None) -> Steering:
     """Return slaloms by their amplitude.
 
-    Parameters
-    ----------
     duration : [s].
     frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
     """
@@ -268,8 +251,6 @@ def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None)
 def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
     """Return random steerings by their amplitude, swings half as fast again as those of a slalom.
 
-    Parameters
-    ----------
     duration : [s].
     """
     f = 1.5 * SLALOM / vehicle.froude_time
@@ -314,8 +295,6 @@ def _rated(
 def free_motion(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
     """Return the motion on an open field, from the origin along X.
 
-    Parameters
-    ----------
     delta : angles of the front wheels at steps of the simulation [rad], (n, m).
     v_x : speed [m/s].
     """
@@ -326,8 +305,6 @@ def free_motion(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
 def extent(X: Array, Y: Array) -> tuple[float, float]:
     """Return length and width [m] of the least rectangle, however turned, around a way.
 
-    Parameters
-    ----------
     X, Y : of the way [m], (n,).
     """
     angles = np.linspace(0.0, math.pi, 361)[:-1]

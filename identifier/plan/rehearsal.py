@@ -23,19 +23,12 @@ def rehearse(
 ) -> tuple[Recording, Array]:
     """Return what exact sensors see of a maneuver, and the way of the center of gravity.
 
-    Parameters
-    ----------
     speed : [m/s].
 
     Returns
     -------
     The recording, from `LEAD` seconds before the maneuver on, with true forces; X, Y [m] and
     heading [rad] of each of its samples (n, 3).
-
-    Raises
-    ------
-    PlantError
-        Where the car leaves the range of its equations.
     """
     stepwise, before = StepwisePlant(plant, period=PERIOD), round(LEAD / PERIOD)
     X, Y, psi = map(float, course(np.zeros(1))[0])

@@ -51,8 +51,6 @@ class PlanError(TireidError, ValueError):
 class Space:
     """Where, how fast and how hard it is driven.
 
-    Parameters
-    ----------
     length, width : of the area [m], the longer side first.
     speed : that is held [m/s].
     share : of the grip that the likely tires take at most, at both axles [-].
@@ -60,11 +58,6 @@ class Space:
     rate_limit : largest steering rate of the front wheels [rad/s].
     max_angle : of the front wheels [rad].
     held : whether who drives holds the planned course, or steers blindly.
-
-    Raises
-    ------
-    PlanError
-        Where a number is not positive, or the share not between 0.2 and 0.97.
     """
 
     length: float
@@ -108,8 +101,6 @@ def body_of(tires: PlausibleTires) -> Body:
 def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> Array:
     """Return the least distance of a body on its way to the edge of the area [m], (...).
 
-    Parameters
-    ----------
     X, Y, psi : center of gravity [m] and heading [rad] over time, (n, ...).
     """
     c, s = np.cos(psi), np.sin(psi)
@@ -142,8 +133,6 @@ class Steerings(NamedTuple):
     def delta(self, t: Array) -> Array:
         """Return the angles of the front wheels over time [rad], (n, m).
 
-        Parameters
-        ----------
         t : [s], (n,).
         """
         lines = []
@@ -172,8 +161,6 @@ class Pass(NamedTuple):
     def course(self, t: Array) -> Array:
         """Return X, Y [m] and heading [rad] of the likely tires, (n, 3).
 
-        Parameters
-        ----------
         t : since the entry [s], (n,).
         """
         lines = (one[:, 0, 0] for one in (self.motion.X, self.motion.Y, self.motion.psi))
@@ -184,8 +171,6 @@ class Pass(NamedTuple):
 class Search:
     """A pass of a given duration that is looked for.
 
-    Parameters
-    ----------
     duration : of the pass [s].
     guided : along the middle of the area; else the way is free, as where a car can turn inside.
     """
@@ -217,8 +202,6 @@ class Search:
     def steerings(self, numbers: Array) -> Steerings:
         """Return the steerings that numbers between -1 and 1 stand for; rates are kept.
 
-        Parameters
-        ----------
         numbers : N - 1 angles, ratio of durations, place and heading of the entry, (m, N + 2).
         """
         N, space = self.swings, self.space
@@ -306,14 +289,7 @@ class Search:
     ) -> Pass:
         """Return the pass that teaches most.
 
-        Parameters
-        ----------
         progress : called with the share of the generations.
-
-        Raises
-        ------
-        PlanError
-            Where no pass is possible.
         """
         least: list[float] = []  # cost, after each generation
 

@@ -31,8 +31,6 @@ FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it 
 def _steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
     """Return the time constant from the angle asked for to that of the front wheels [s].
 
-    Parameters
-    ----------
     told : of the steering that drives it; None takes that of its chassis, or else 0.04.
     """
     if told is not None:
@@ -44,8 +42,6 @@ def _steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
 class PlausibleTires:
     """k cars, the first of which is taken for the truth until more is known.
 
-    Parameters
-    ----------
     W : weights [static axle loads], (k, 2, n).
     steering_lag : of the front wheels behind what is asked of them [s], (k,).
     own : compliance [m per load], sway share [-], offset (2, 3), of all.
@@ -65,8 +61,6 @@ class PlausibleTires:
     def told(cls, vehicle: Vehicle, friction: float, *, steering_lag: float | None = None) -> Self:
         """Return the tires that a car may have that was never identified.
 
-        Parameters
-        ----------
         friction : believed of tires and road [-].
         """
         method = AxleIdentifier.for_vehicle(vehicle)
@@ -127,8 +121,6 @@ class PlausibleTires:
     def slip_at(self, share: float) -> Array:
         """Return the least slip at which the curves reach a share of their grip [rad], (k, 2).
 
-        Parameters
-        ----------
         share : of the largest force, at most 1.
         """
         reached = self._curves >= share * self.grip
@@ -148,8 +140,6 @@ class PlausibleTires:
         Weights, and what is not known of them, are those of the static loads times λ; of a car
         without downforce they stay as they are.
 
-        Parameters
-        ----------
         v_x : speed [m/s].
         """
         load, n = self.vehicle.load_ratio(v_x), len(self.method.ladder)
@@ -166,8 +156,6 @@ class PlausibleTires:
     def after(self, covariance: Array) -> Self:
         """Return the same tires when more is known of them.
 
-        Parameters
-        ----------
         covariance : of weights and own, (2, n + 3, n + 3).
         """
         return replace(self, covariance=covariance)

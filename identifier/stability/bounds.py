@@ -42,8 +42,6 @@ def small_gain(
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
     eta_W : learning rate of (11).
@@ -72,8 +70,6 @@ def steady_capacity(
     In steady state learning balances leakage, η_W |s|² |A_d⁻¹| (c_z/λ + c_ξ) |ξ̃| = ρ_W |ξ̃| |f_hat|:
     a residual above it leaves an error however long one learns. It shrinks with |s|²/n_h.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
     eta_W : learning rate of (11).
@@ -89,8 +85,6 @@ def steady_capacity(
 def transient_peak(A_d: ArrayLike) -> float:
     """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     matrix = require_hurwitz(A_d)

@@ -26,8 +26,6 @@ from identifier.stability.operation import Operation, proven_bounds, worst_loop
 def certify(gains: Gains, law: Law, operation: Operation) -> Certificate:
     """Return every property of the design.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     law : of `identifier.paper.laws.LAWS`; the PI-lead law takes its τ from the gains.
     """
@@ -52,8 +50,6 @@ def judged_loop(
 
     It is the proven bound, or where the margins do not hold up to it `W_large`.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     direction : (2, 2) D [s].
     kept : |W_hat| that is proven [U].

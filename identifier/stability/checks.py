@@ -29,8 +29,6 @@ _CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, 
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     """
     A_d = gains.matrix
@@ -121,8 +119,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
     Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
     the weights at which the margins were judged.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     kept : |W_hat| that is proven [U].
     judged : |W_hat| at which the margins were judged [U].
@@ -150,8 +146,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
 def _state_space_poles(A_d: Array) -> ComplexArray:
     """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
     """
     import control  # takes a second to import, so only where it is needed
@@ -166,8 +160,6 @@ def drift_check(
 ) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     direction : (2, 2) D [s].
     """
@@ -261,8 +253,6 @@ def bound_checks(
 ) -> list[Property]:
     """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     direction : (2, 2) D [s].
     proven : of `proven_bounds`.

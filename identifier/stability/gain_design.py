@@ -44,8 +44,6 @@ class DesignError(TireidError, ValueError):
 class GainDesign:
     """Gains and what is proved of them.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     bounds : proven bounds of |ξ̃| and |W_hat|.
     V_max : bound on |V_hat|, kept by ρ_V.
@@ -65,17 +63,10 @@ def gain_for_phase_margin(
     The loop is (g/a) (c_ξ + c_z/(s + λ))/((s + a) s); the frequency where its phase is PM - 180° is
     found by bisection, g is the inverse of its magnitude there.
 
-    Parameters
-    ----------
     a : decay rate [1/s].
     lam : forgetting factor λ [1/s].
     phase_margin : wanted [deg], above 0 and below 90.
     dt : step of explicit Euler [s]; None for continuous time (RK4 at a dt <= 0.2 comes to it).
-
-    Raises
-    ------
-    DesignError
-        If every gain has a larger phase margin.
     """
     require_positive(ValueError, a=a, lam=lam)
     if not 0.0 < phase_margin < 90.0:
@@ -105,8 +96,6 @@ def gain_for_phase_margin(
 def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
     """Return a = λ of rule 1 [1/s].
 
-    Parameters
-    ----------
     bandwidth : highest frequency of steering that matters [Hz].
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
@@ -130,8 +119,6 @@ def design_gains(
 ) -> GainDesign:
     """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
 
-    Parameters
-    ----------
     bandwidth : highest frequency of steering that matters [Hz].
     dt : sampling interval T_s [s].
     disturbance : what acts on the error, for the proven bounds.
@@ -141,12 +128,6 @@ def design_gains(
     capacity : force that W can hold at |s|² = n_h, in units of needed_force.
     integrator : "euler" or "rk4", as in the step.
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
-
-    Raises
-    ------
-    DesignError
-        If a dt would pass 0.2, or the phase margin is too small for a proven bound (below about
-        22 deg for the integral law).
     """
     require_positive(
         ValueError,
@@ -238,8 +219,6 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
 def leakage(gains: Gains, known: Operation) -> Gains:
     """Return the gains as they are: the paper's leakage alone.
 
-    Parameters
-    ----------
     gains : of `design_gains`.
     """
     del known
@@ -249,8 +228,6 @@ def leakage(gains: Gains, known: Operation) -> Gains:
 def dead_zone(gains: Gains, known: Operation) -> Gains:
     """Return the gains with a leakage of what lies beyond the balls.
 
-    Parameters
-    ----------
     gains : of `design_gains`.
     """
     return replace(gains, W_free=known.W_large, V_free=known.V_start)
@@ -259,8 +236,6 @@ def dead_zone(gains: Gains, known: Operation) -> Gains:
 def projection(gains: Gains, known: Operation) -> Gains:
     """Return the gains with a projection on the balls, and no leakage.
 
-    Parameters
-    ----------
     gains : of `design_gains`.
     """
     return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)

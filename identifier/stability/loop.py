@@ -33,8 +33,6 @@ Integrator = Callable[[ComplexArray], ComplexArray]
 def exact(mu: ComplexArray) -> ComplexArray:
     """Continuous time: exp(μ dt).
 
-    Parameters
-    ----------
     mu : eigenvalues times the step [-].
     """
     return np.exp(mu)
@@ -43,8 +41,6 @@ def exact(mu: ComplexArray) -> ComplexArray:
 def euler(mu: ComplexArray) -> ComplexArray:
     """Explicit Euler: 1 + μ dt.
 
-    Parameters
-    ----------
     mu : eigenvalues times the step [-].
     """
     return 1.0 + mu
@@ -53,8 +49,6 @@ def euler(mu: ComplexArray) -> ComplexArray:
 def rk4(mu: ComplexArray) -> ComplexArray:
     """Runge-Kutta of order 4: 1 + μ + μ²/2 + μ³/6 + μ⁴/24, with μ times dt.
 
-    Parameters
-    ----------
     mu : eigenvalues times the step [-].
     """
     return 1.0 + mu * (1.0 + mu / 2.0 * (1.0 + mu / 3.0 * (1.0 + mu / 4.0)))
@@ -70,8 +64,6 @@ INSTANTANEOUS = DrivingError(0.0, 1.0)
 def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
 
-    Parameters
-    ----------
     law : of `identifier.paper.laws.LAWS`.
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
@@ -83,8 +75,6 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
 class Loop:
     """The loop at one frozen regressor.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
     forgetting : λ of (9) and (10) [1/s].
     law : coefficients of z and ξ̃ in the driving error.
@@ -129,8 +119,6 @@ class Loop:
     def scaled(self, factor: float) -> "Loop":
         """Return the same loop with eta_W and eta_V multiplied by the factor.
 
-        Parameters
-        ----------
         factor : multiplier of the loop gain [-].
         """
         return replace(self, G=factor * self.G)
@@ -139,8 +127,6 @@ class Loop:
 def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
     """Stack the loop's matrices for many (complex) factors on the loop gain, (n, 6, 6).
 
-    Parameters
-    ----------
     factors : (n,) multipliers of G; complex ones turn the phase.
     """
     base = loop.matrix().astype(np.complex128)
@@ -152,8 +138,6 @@ def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
 def eigenvalues(matrices: ArrayLike) -> ComplexArray:
     """Eigenvalues as complex numbers, (..., n) [1/s].
 
-    Parameters
-    ----------
     matrices : (..., n, n).
     """
     return np.asarray(np.linalg.eigvals(np.asarray(matrices)), dtype=np.complex128)
@@ -162,8 +146,6 @@ def eigenvalues(matrices: ArrayLike) -> ComplexArray:
 def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
     """Eigenvalues of the loop for many factors on the gain, (n, 6) [1/s], unsorted.
 
-    Parameters
-    ----------
     factors : (n,) multipliers of G.
     """
     return eigenvalues(scaled_matrices(loop, factors))
@@ -172,8 +154,6 @@ def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
 def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float = 1.0) -> Array:
     """Log max|R(μ dt)| / dt [1/s]: negative is stable; the spectral abscissa for `exact`.
 
-    Parameters
-    ----------
     matrices : (..., n, n) loop matrices.
     dt : step [s]; irrelevant for `exact`.
     """
@@ -187,8 +167,6 @@ def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float =
 def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> Array:
     """max|R(μ dt)|: below one the sampled loop is stable.
 
-    Parameters
-    ----------
     matrices : (..., n, n) loop matrices.
     dt : step [s].
     """
@@ -212,17 +190,10 @@ def worst_gain(
     W: the worst is at a corner, where every unit is saturated but perhaps the one that holds all
     of W. So V learns at no cost in margin while η_V x_bar_max² W_max² <= η_W.
 
-    Parameters
-    ----------
     eta_W : learning rate of (11).
     eta_V : learning rate of (12).
     n_h : hidden units; |s|² <= n_h.
     W_max : bound on |W| (Frobenius) [U]; needed where V learns.
-
-    Raises
-    ------
-    ValueError
-        If a value is negative, or V learns and x_bar_max or W_max is missing or infinite.
     """
     if not (eta_W >= 0.0 and eta_V >= 0.0 and n_h >= 1):
         raise ValueError(f"eta_W, eta_V >= 0 and n_h >= 1, they are {(eta_W, eta_V, n_h)}")
@@ -244,18 +215,11 @@ def regressor_gains(
 ) -> Array:
     """G along a run, (n, 2, 2).
 
-    Parameters
-    ----------
     eta_W : learning rate of (11).
     eta_V : learning rate of (12).
     s : (n, n_h) hidden units tanh(V x_bar).
     x_bar : (n, n_in) network input.
     W : (n, 2, n_h) or (2, n_h) output weights [U].
-
-    Raises
-    ------
-    ValueError
-        If the shapes disagree.
     """
     s, x_bar, W = np.atleast_2d(s), np.atleast_2d(x_bar), np.asarray(W, dtype=np.float64)
     n, n_h = s.shape
@@ -271,8 +235,6 @@ def regressor_gains(
 def strongest(gains: ArrayLike) -> tuple[int, float]:
     """Index of the sample with the largest λ_max(G), and that value.
 
-    Parameters
-    ----------
     gains : (n, 2, 2) loop gains along a run.
     """
     largest = np.linalg.eigvalsh(np.asarray(gains))[:, -1]
@@ -293,15 +255,8 @@ def root(
 ) -> float:
     """Return x between two ends at which f is zero, by Brent's method.
 
-    Parameters
-    ----------
     f : continuous, of other sign at either end.
     xtol, rtol : how near it must be, absolute and over its size.
-
-    Raises
-    ------
-    ValueError
-        Where both ends have one sign.
     """
     from scipy.optimize import brentq  # takes longer to import than a log of a minute to learn from
 

@@ -22,8 +22,6 @@ class LyapunovError(TireidError, ValueError):
 class LyapunovPair:
     """P and Q of A_dᵀ P + P A_d = -Q, with the residual found by substitution.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
     P : (2, 2) solution [s, for Q without unit].
     Q : (2, 2) right-hand side [-].
@@ -39,14 +37,7 @@ class LyapunovPair:
 def require_square(A_d: ArrayLike) -> Array:
     """Return A_d as a finite (2, 2) array.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
-
-    Raises
-    ------
-    ValueError
-        If the shape is not (2, 2) or an entry is not finite.
     """
     matrix = np.array(A_d, dtype=np.float64)
     if matrix.shape != (2, 2) or not np.all(np.isfinite(matrix)):
@@ -57,14 +48,7 @@ def require_square(A_d: ArrayLike) -> Array:
 def require_hurwitz(A_d: ArrayLike) -> Array:
     """Return A_d as an array after checking that all its eigenvalues have Re < 0.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
-
-    Raises
-    ------
-    NotHurwitzError
-        If an eigenvalue has a real part that is not negative.
     """
     matrix = require_square(A_d)
     poles = np.linalg.eigvals(matrix)
@@ -77,8 +61,6 @@ def require_hurwitz(A_d: ArrayLike) -> Array:
 def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
     """Substitute P back: |A_dᵀ P + P A_d + Q| / |Q|.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
     P : (2, 2) candidate solution.
     Q : (2, 2) right-hand side.
@@ -90,17 +72,8 @@ def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
 def lyapunov(A_d: ArrayLike, Q: ArrayLike) -> LyapunovPair:
     """Solve A_dᵀ P + P A_d = -Q (the P and Q of (14)) and check the answer by substitution.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     Q : (2, 2) symmetric positive definite matrix.
-
-    Raises
-    ------
-    NotHurwitzError
-        If A_d is not Hurwitz.
-    LyapunovError
-        If Q is not symmetric positive definite, or P fails the substitution.
     """
     A_d, Q = require_hurwitz(A_d), require_square(Q)
     if not np.allclose(Q, Q.T, rtol=1e-12) or not np.linalg.eigvalsh(Q)[0] > 0.0:
@@ -122,14 +95,7 @@ def peak_gain(A_d: ArrayLike) -> float:
     rotation); otherwise Gauss-Legendre quadrature, refined until it agrees with itself to 1e-10.
     With complex poles exp(A_d T) = -exp(m T) I after T = π/|Im|: one such period is enough.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
-
-    Raises
-    ------
-    NotHurwitzError
-        If A_d is not Hurwitz.
     """
     A_d = require_hurwitz(A_d)
     poles = np.linalg.eigvals(A_d)
@@ -158,8 +124,6 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
     m = tr A_d/2, k = |the symmetric part of A_d - m I|, S = sinh(q t)/q, q² = m² - det A_d: the
     singular values of C I + S (A_d - m I) are sqrt(1 + k² S²) ± k |S|.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
     t : times [s], positive; within half a turn where the poles are complex.
     """
@@ -180,15 +144,8 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
 def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
     """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s].
     dt : step [s].
-
-    Raises
-    ------
-    NotHurwitzError
-        If I + dt A_d has an eigenvalue on or outside the unit circle.
     """
     step = np.eye(2) + dt * require_hurwitz(A_d)
     radius = float(np.max(np.abs(np.linalg.eigvals(step))))
@@ -200,8 +157,6 @@ def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
 def power_norms(step: Array, entry: Array) -> tuple[float, float]:
     """Largest and sum of |step^k entry| over k = 0, 1, ...
 
-    Parameters
-    ----------
     step : (2, 2) with every eigenvalue inside the unit circle.
     entry : (2, 2).
     """

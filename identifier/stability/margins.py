@@ -37,8 +37,6 @@ AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 class _GainMargin:
     """Where the loop turns unstable.
 
-    Parameters
-    ----------
     factor : multiplier of the loop gain [-]; inf if none up to 1e6, 0 if unstable without gain.
     frequency : of the oscillation at the margin [rad/s]; nan if there is no margin to reach.
     """
@@ -53,8 +51,6 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
     Any A_d, any law, any input source: factors from 1e-6 to 1e6 are searched (150 a decade) for
     the first unstable one, and the crossing is refined to round-off.
 
-    Parameters
-    ----------
     integrator : `exact` for continuous time, or the integrator of the step.
     dt : step [s]; irrelevant for `exact`.
     """
@@ -78,8 +74,6 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
     0 if the loop is already unstable, 180 if no lag below half a turn does it. Defined for any
     A_d: the gain G is turned to G exp(-jθ) on both channels at once.
 
-    Parameters
-    ----------
     integrator : `exact` for continuous time, or the integrator of the step.
     dt : step [s]; irrelevant for `exact`.
     """
@@ -154,8 +148,6 @@ def passivity(
 ) -> Array:
     """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
 
-    Parameters
-    ----------
     frequency : (n,) ω [rad/s].
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
@@ -180,8 +172,6 @@ def drift_frequency(
     For A_d = -a I: sqrt(a λ) for the integral law, inf for the instantaneous law and for the
     PI-lead law with τ >= 1/a.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
     direction : (2, 2) D, None for -A_d⁻ᵀ.
@@ -216,8 +206,6 @@ def passivity_shortage(
     For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²). The other
     arguments are those of `drift_frequency`, `direction` (2, 2) [s].
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
 
@@ -252,8 +240,6 @@ def sufficient_leakage(
 
     The leakage ρ |ξ̃| of (11) reaches it where |ξ̃| = s0/ρ: about the error at which a drift ends.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     forgetting : λ [1/s].
     eta_W : learning rate of (11).

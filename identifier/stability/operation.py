@@ -56,8 +56,6 @@ class Sampled(Protocol):
 class Operation:
     """Where and how the identifier runs: what the certificate must know besides the gains.
 
-    Parameters
-    ----------
     n_h : hidden units.
     dt : sampling interval T_s [s].
     integrator : "euler", "rk4" or "exact".
@@ -115,8 +113,6 @@ class Operation:
     def resolves(self, A_d: Array) -> bool:
         """Whether the step keeps the error dynamics stable.
 
-        Parameters
-        ----------
         A_d : (2, 2) error dynamics [1/s].
         """
         return bool(spectral_radius(A_d, self.step, self.dt) < 1.0)
@@ -126,8 +122,6 @@ class Operation:
 class Proven:
     """What is proven of a design; None and inf where nothing is.
 
-    Parameters
-    ----------
     leakage : bounds that the leakage of W gives.
     projection : bounds that the projection of W gives.
     V : bound on |V_hat| [-].
@@ -169,8 +163,6 @@ def proven_bounds(
 ) -> Proven:
     """Return all bounds that are proven, for the start of `sampled_bound.py`.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     direction : (2, 2) D [s], of `direction_matrix`.
     """
@@ -229,8 +221,6 @@ def worst_loop(
 
     Where W is infinite, the V layer cannot be counted and is left out.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
@@ -264,8 +254,6 @@ def worst_loop(
 def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
     """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
 
-    Parameters
-    ----------
     m : mass [kg].
     I_z : yaw inertia [kg m²].
     l_f : center of gravity to front axle [m].
@@ -289,8 +277,6 @@ def estimated_input_feedback(
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
 
-    Parameters
-    ----------
     m : mass [kg].
     I_z : yaw inertia [kg m²].
     l_f : center of gravity to front axle [m].
@@ -308,8 +294,6 @@ def estimated_input_feedback(
 def minimal_decay(feedback: ArrayLike) -> float:
     """Smallest a [1/s] with -a I + J_f K Hurwitz.
 
-    Parameters
-    ----------
     feedback : (2, 2) J_f K [1/s].
     """
     return float(np.max(np.linalg.eigvals(np.asarray(feedback)).real))
@@ -333,8 +317,6 @@ def largest_signals(
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI.
 
-    Parameters
-    ----------
     v_x : speed [m/s].
     slip : largest slip angle [rad].
     friction : μ [-].
@@ -370,8 +352,6 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
 def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
 
-    Parameters
-    ----------
     vehicle : the car; its stiffness is at least half that of the tires.
     slip : largest slip angle [rad].
     """
@@ -384,8 +364,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
     No bound, but what the network must be able to hold where both axles are at the slip [N].
 
-    Parameters
-    ----------
     slip : largest slip angle [rad].
     friction : μ [-].
     """
@@ -399,8 +377,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -> Disturbance:
     """Return bounds of all that acts on the error dynamics, proven for the declared driving.
 
-    Parameters
-    ----------
     dt : sampling interval [s].
     unit : force unit U [N].
     """
@@ -458,8 +434,6 @@ def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float
 def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
     """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
 
-    Parameters
-    ----------
     driving : how hard it is driven; the slowest speed counts.
     """
     slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x

@@ -31,8 +31,6 @@ from models.rules import require_positive
 def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h (|P| + (η/ρ) |A_d⁻¹|)]/2, the one that gives (14) as printed [U].
 
-    Parameters
-    ----------
     W_M : bound on the ideal weights (Frobenius) [U].
     n_h : hidden units; |s| <= √n_h.
     eta_W : learning rate of (11).
@@ -58,16 +56,9 @@ def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: 
 def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
-
-    Raises
-    ------
-    LyapunovError
-        If A_d is so far from symmetric that Q is not positive definite.
     """
     require_positive(ValueError, eta_W=eta_W, rho_W=rho_W)
     matrix = require_hurwitz(A_d)
@@ -97,8 +88,6 @@ def k_b_with_V(
     layer costs nothing, because w_bar already holds what V_hat does to the force, and V_hat itself
     is bounded by its leakage.
 
-    Parameters
-    ----------
     k_b : K1, of `printed_k_b` or `tight_k_b` [U].
     A_d : (2, 2) error dynamics [1/s].
     W_M : bound on the ideal W (Frobenius) [U].
@@ -106,11 +95,6 @@ def k_b_with_V(
     eta_V : learning rate of (12).
     rho_V : leakage gain of (12) [1/(U s²)].
     weight : c > 0.
-
-    Raises
-    ------
-    ValueError
-        If c l2² is not below 4: then this Lyapunov function proves nothing.
     """
     require_positive(ValueError, rho_V=rho_V, weight=weight)
     inverse = float(np.linalg.norm(np.linalg.inv(np.asarray(A_d, dtype=np.float64)), 2))
@@ -125,8 +109,6 @@ def k_b_with_V(
 def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     """B = 2 (|P| w_bar + k_b²)/λ_min(Q) of (14) [U s]: where L' < 0, not yet an ultimate bound.
 
-    Parameters
-    ----------
     w_bar : bound on the approximation error [U].
     k_b : of `printed_k_b`, `tight_k_b` or `k_b_with_V` [U].
     """
@@ -138,8 +120,6 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
 
     A bound above this one says nothing about learning.
 
-    Parameters
-    ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     residual_bound : sup|f| [U].
     """
@@ -150,8 +130,6 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
 class _UltimateBound:
     """The largest |ξ̃| of the sublevel set of L that contains the whole set L' >= 0.
 
-    Parameters
-    ----------
     xi_tilde : limsup |ξ̃| does not exceed it [U s].
     worst_y : |W_t| at which the maximum is taken [U].
     """
@@ -167,8 +145,6 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     x(y) = max(0, b - (2/λ_min(Q)) (y - k_b)²) and w_b = k_b + sqrt(k_b² + |P| w_bar). The objective
     is a quartic where x > 0: its stationary points are roots of a cubic, none is missed.
 
-    Parameters
-    ----------
     w_bar : bound on the approximation error [U].
     k_b : of `printed_k_b` or `tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
@@ -203,8 +179,6 @@ def printed_bounds(
 ) -> list[Property]:
     """State b of (14) by the printed and the tight route, with the V layer, and b_UUB [U s].
 
-    Parameters
-    ----------
     gains : of (8) to (12), with leakage.
     trivial : bound of an identifier without a network [U s].
     """
@@ -239,8 +213,6 @@ def printed_bounds(
 def _best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
     """Return P and Q = q I with |P| = W_M/√n_h + (η/ρ) |A_d⁻¹|, where the printed b is smallest.
 
-    Parameters
-    ----------
     gains : of (8) to (12), with leakage.
     """
     unit = lyapunov(gains.matrix, np.eye(2))

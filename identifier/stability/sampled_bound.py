@@ -46,8 +46,6 @@ from models.rules import require_positive
 class Disturbance:
     """Bounds of the residual, of the noise, and of what a held input leaves out.
 
-    Parameters
-    ----------
     residual : sup|f|, the force the linear tire misses as the samples show it, with what sensors
         add to A_ξ ξ + B_ξ u [U].
     noise : sup of the sensors' error of ξ, which is in every measured ξ̃ [U s].
@@ -75,8 +73,6 @@ _NEWTON_STEPS = 100
 class SampledBounds:
     """What the state of the running identifier never exceeds.
 
-    Parameters
-    ----------
     xi_tilde : bound on |ξ̃| at every sample [U s].
     stage : bound on |ξ̃| at the inner stages too [U s]; leakage acts with it.
     W : bound on |W_hat| [U].
@@ -91,8 +87,6 @@ class SampledBounds:
 class ErrorGains:
     """How large an error what acts on it can hold.
 
-    Parameters
-    ----------
     start : τ, largest growth of an error that is left alone [-].
     force : γ_f of the residual [s].
     rate : γ_ξ of ξ' [s].
@@ -110,8 +104,6 @@ class ErrorGains:
 def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
     """Return the gains of the error dynamics.
 
-    Parameters
-    ----------
     A_d : (2, 2) error dynamics [1/s], which the step keeps stable.
     integrator : "euler", "rk4" or "exact" (continuous time).
     dt : sampling interval [s].
@@ -156,8 +148,6 @@ def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
 class Learning:
     """How the weights of one layer are driven and leak.
 
-    Parameters
-    ----------
     law : coefficients of z and ξ̃ in the driving error.
     forgetting : λ [1/s].
     leakage : ρ [1/(U s²)].
@@ -178,8 +168,6 @@ class Learning:
     def kept(self, X: float) -> float:
         """Bound on the weights while |ξ̃| <= X; inf where the leakage of a step is too large.
 
-        Parameters
-        ----------
         X : bound on |ξ̃| at every stage [U s].
         """
         (c_z, c_xi), lam = self.law, self.forgetting
@@ -196,8 +184,6 @@ class Learning:
     def beyond(self, X: float) -> tuple[float, ...]:
         """What inner stages may lie beyond the weights of the sample, one for each stage.
 
-        Parameters
-        ----------
         X : bound on |ξ̃| at every stage [U s].
         """
         if not self.staged:
@@ -215,8 +201,6 @@ def output_layer(
 ) -> Learning:
     """Return how W is driven: g' = η_W |D| √n_h.
 
-    Parameters
-    ----------
     gains : of (8) to (12).
     direction : (2, 2) D [s].
     integrator : "euler", "rk4" or "exact".
@@ -240,8 +224,6 @@ def by_leakage(
 
     The smallest X >= F(X), F increasing and convex, by Newton from below.
 
-    Parameters
-    ----------
     error : of `error_gains`.
     learning : of `output_layer`.
     A_d : (2, 2) error dynamics [1/s].
@@ -278,8 +260,6 @@ def by_projection(
 ) -> SampledBounds:
     """Return the bounds while |W_hat| <= W_max at every stage: for any law and any gain.
 
-    Parameters
-    ----------
     error : of `error_gains`.
     A_d : (2, 2) error dynamics [1/s].
     W_max : radius of the projection (Frobenius) [U].

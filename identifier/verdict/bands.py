@@ -87,19 +87,8 @@ def calibrated(
 
     It cannot where the model has no band, or too little is driven.
 
-    Parameters
-    ----------
     t : time of the freeze in the recording's own clock [s]; None is the end.
     verdict : what `judge` said of that time; None asks it where it is needed.
-
-    Raises
-    ------
-    DivergedError
-        Where the law had diverged by then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
-    ValueError
-        Where the recording begins after that time.
     """
     if history.design.whole:
         share = (verdict or judge(history, t)).force_missed
@@ -146,8 +135,6 @@ def calibration(
 ) -> BandCalibration | None:
     """Return factors and color of errors on stretches that did not teach; None: too few windows.
 
-    Parameters
-    ----------
     noise : variance of the sensors' white noise in them (2,).
     told : what else is kept of the drive, and factors of an axle that has too few windows.
     """
@@ -187,8 +174,6 @@ def _shared(values: Array, share: Array, everywhere: float) -> float:
 def quantile(values: Array, share: Array) -> float:
     """Return what the next value stays below in a share `LEVEL` of cases; inf: too few to tell.
 
-    Parameters
-    ----------
     values : of windows that overlap by half (m,).
     share : of each that counts (m,).
     """
@@ -206,8 +191,6 @@ def color_of(error: Array, windows: Windows) -> float:
     The sum of their autocorrelation, over windows that do not overlap, until it is first not
     positive.
 
-    Parameters
-    ----------
     error : of the windows, nan where nothing was asked (m,).
     """
     step = max(1, windows.n // 2)

@@ -69,8 +69,6 @@ class Road(NamedTuple):
 class RoadFriction(NamedTuple):
     """Friction over that of the drive that taught, window by window of 0.3 s.
 
-    Parameters
-    ----------
     t : end of the windows, in the recording's own clock [s], (m,).
     ratio : friction, mean of its logarithm [-], (m,).
     sd : standard deviation of the logarithm [-], (m,).
@@ -117,8 +115,6 @@ def road_friction(
     windows. More friction is told of a model alone that learnt its grip. Of a long drive those
     parts are asked that the verdict asks.
 
-    Parameters
-    ----------
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """
@@ -149,8 +145,6 @@ def road_friction(
 def filtered(t: Array, grid: Array, away: Array, slope: Array, variance: Array) -> RoadFriction:
     """Return the friction that windows tell one after the other.
 
-    Parameters
-    ----------
     t : end of the windows [s], rising, (m,).
     grid : ln μ of the frictions that are held for possible, rising, one of them 0, (k,).
     away : what each of them leaves of the force that was shown [static axle loads], (k, m, 2).

@@ -49,8 +49,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     None without a lateral velocity that was measured: slip would be what the model makes of it.
     None of a model whose forces are no curves of slip.
 
-    Parameters
-    ----------
     model : frozen; its lag, sway and offsets make the slip.
     road : what a banked road pushes to the left at each sample [weights], (n,); None unknown.
     """
@@ -83,8 +81,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
 def triangle(n: int, dt: float) -> tuple[Array, Array]:
     """Return g (n + 1,), and the weights whose product with ξ is Σ g dξ/dt [1/s].
 
-    Parameters
-    ----------
     n : steps of a moment.
     dt : sampling interval [s].
     """
@@ -105,23 +101,10 @@ def guaranteed(
     There is none where the method learns no curve of slip, no lateral velocity was measured, or too
     little is driven.
 
-    Parameters
-    ----------
     bound : of the errors: their size [static axle loads] of both axles, or a `ForceBound`; None
         estimates it from the drive.
     t : time of the freeze in the recording's own clock [s]; None is the end.
     model : frozen at that time, which is to carry it, as of `calibrated`; None freezes one.
-
-    Raises
-    ------
-    BoundViolatedError
-        Where no curve keeps a bound that was told; with the least one that any does.
-    DivergedError
-        Where the law had diverged by then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
-    ValueError
-        Where the recording begins after that time, or the bound is impossible.
     """
     told = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)

@@ -45,8 +45,6 @@ ROADS = 3  # segments of another friction that are listed one by one
 class Rules:
     """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
 
-    Parameters
-    ----------
     missed : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
     doubt : standard deviation of the curve over the prior's, where the force is [-].
@@ -95,16 +93,7 @@ class Asked(NamedTuple):
 def judge(history: History, t: float | None = None) -> Verdict:
     """Return the verdict on a run: on the model that was frozen, over all of its recording.
 
-    Parameters
-    ----------
     t : time of the freeze in the recording's own clock [s]; None is the end.
-
-    Raises
-    ------
-    DivergedError
-        Where the law had diverged by then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
@@ -121,8 +110,6 @@ def judge_taught(
 ) -> Verdict:
     """Return the verdict on a model over the drive that taught it.
 
-    Parameters
-    ----------
     frozen : samples that taught; None is all of them.
     reached : numbers that rest at their bounds; None asks the model.
     """
@@ -139,8 +126,6 @@ def judge_prediction(
 ) -> Verdict:
     """Return the verdict on a stored model over a drive: does it give back the drive's motion?
 
-    Parameters
-    ----------
     another_road : whether the road may be another one than that which taught, and its friction is
         reported; of a drive that taught the model it is not.
     """

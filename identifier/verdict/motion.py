@@ -30,8 +30,6 @@ _CONFINED = 0.6  # and of what is missed with the piece
 class Windows:
     """Where means are taken: half-overlapping windows of n samples in which the car drives.
 
-    Parameters
-    ----------
     starts : index of the first sample of each window (m,).
     n : steps in a window.
     duration : T [s].
@@ -45,8 +43,6 @@ class Windows:
     def of(cls, recording: Recording, min_speed: float) -> "Windows":
         """Return the windows of a recording.
 
-        Parameters
-        ----------
         min_speed : a window counts where the car is never slower [m/s], in one stretch.
         """
         return cls.where(recording.v_x >= min_speed, recording, WINDOW)
@@ -61,8 +57,6 @@ class Windows:
     ) -> "Windows":
         """Return the windows of a length in one stretch of which every sample counts.
 
-        Parameters
-        ----------
         counts : which samples do (n,).
         length : of a window [s].
         """
@@ -80,8 +74,6 @@ class Windows:
     def mean(self, signal: Array) -> Array:
         """Return means over the windows by the trapezoidal rule, (m,) or (m, k).
 
-        Parameters
-        ----------
         signal : samples (n,) or (n, k).
         """
         steps = 0.5 * (signal[1:] + signal[:-1])
@@ -92,8 +84,6 @@ class Windows:
     def rate(self, signal: Array) -> Array:
         """Return rates of change over the windows, (m,) or (m, k).
 
-        Parameters
-        ----------
         signal : samples (n,) or (n, k).
         """
         change: Array = signal[self.starts + self.n] - signal[self.starts]
@@ -105,8 +95,6 @@ def measured_force(
 ) -> Array:
     """Return mean axle forces that the motion shows [static axle loads], (m, 2).
 
-    Parameters
-    ----------
     recording : v_x, v_y and r; where no v_y was logged, a_y and r.
     road : what a banked road pushes to the left at each sample, taken off [weights], (n,); without
         v_y what the accelerometer shows beside forces; None where nobody knows of it.
@@ -158,8 +146,6 @@ def lateral_noise(recording: Recording, windows: Windows) -> tuple[float, float]
 class Evidence:
     """Measured and modelled mean forces over the windows of a drive.
 
-    Parameters
-    ----------
     measured, modelled : [static axle loads], (m, 2).
     noise : variance of white sensor noise in `measured` (2,).
     """
@@ -226,8 +212,6 @@ class Evidence:
 def clean_rms(signal: Array, noise: Array) -> Array:
     """Return the root mean square of a signal whose noise has a known variance, (2,).
 
-    Parameters
-    ----------
     signal : (m, 2).
     noise : its variance (2,).
     """
@@ -238,8 +222,6 @@ def clean_rms(signal: Array, noise: Array) -> Array:
 def clean_share(missed: Array, force: Array, noise: Array) -> Array:
     """Return the rms of what is missed over that of the force, (2,); one where there is no force.
 
-    Parameters
-    ----------
     missed, force : (m, 2).
     noise : variance in `missed` (2,).
     """
@@ -280,8 +262,6 @@ class MotionError:
     The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
     small the forces are right, where it is large they need not be wrong.
 
-    Parameters
-    ----------
     lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
     """
 
@@ -303,8 +283,6 @@ def motion_error(
 ) -> MotionError | None:
     """Return what axle forces miss of the measured motion; None where no window counts.
 
-    Parameters
-    ----------
     force : lateral axle forces (n, 2) [N], frame of the body.
     counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """

@@ -43,16 +43,7 @@ class _AskedRun(NamedTuple):
 def asked_run(history: History, t: float | None = None) -> _AskedRun:
     """Return what of a run is asked.
 
-    Parameters
-    ----------
     t : time of the freeze in the recording's own clock [s]; None is the end.
-
-    Raises
-    ------
-    DivergedError
-        Where the law had diverged by then.
-    CannotFreezeError
-        Where the method estimates a signal, not a model.
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t

@@ -29,8 +29,6 @@ PLACED = ("velocity", "accelerometer")
 class Misaligned:
     """A velocity sensor that does not look straight ahead.
 
-    Parameters
-    ----------
     angle : by which it is turned to the left [rad]: v_y reads v_y cos - v_x sin of it.
     """
 
@@ -57,8 +55,6 @@ class SensorElsewhere:
     Of velocity it shows v_x - y r and v_y + x r, of acceleration a_y + x dr/dt - y r^2, with the
     slope of r between neighboring samples.
 
-    Parameters
-    ----------
     sensor : one of `PLACED`.
     x, y : where it is from the center of gravity, ahead and to the left [m].
     """
@@ -100,8 +96,6 @@ class Bank:
     acceleration without a moment and l_r dΔr/dt a lateral one without a force. An accelerometer
     feels the tires alone, so a_y stays. Below the car's lowest speed Δr fades to zero.
 
-    Parameters
-    ----------
     vehicle : the car that drives; its l_f and l_r are what is needed.
     angle : of the road across the car, largest [rad].
     period : of the crown [s], a cosine; infinite for a constant angle.
@@ -125,8 +119,6 @@ class Bank:
     def angle_at(self, t: Array) -> Array:
         """Return the angle [rad], (n,).
 
-        Parameters
-        ----------
         t : times [s], (n,).
         """
         angle: Array = self.angle * np.cos(2.0 * math.pi * t / self.period)
@@ -168,8 +160,6 @@ class Together:
 class Passing:
     """A fault of the beginning that fades away: a sensor that warms up, a road that levels out.
 
-    Parameters
-    ----------
     until : time until which it is there in full [s], on the recording's clock.
     fade : how long it then takes to vanish, in a straight line [s].
     """
@@ -211,8 +201,6 @@ class Passing:
 class WrongNumber:
     """A number of the car that is told wrongly by a factor.
 
-    Parameters
-    ----------
     field : name of the number in `Vehicle`.
     """
 
@@ -251,8 +239,6 @@ class SwappedAxles:
 class ShiftedCenter:
     """A center of gravity told farther back than it is, at the same wheelbase.
 
-    Parameters
-    ----------
     share : of the wheelbase, by which l_f is told too long; negative where too short [-].
     """
 
@@ -285,8 +271,6 @@ class AnotherCar:
     def tell(self, vehicle: Vehicle) -> Vehicle:
         """Return that other car, whatever car drove.
 
-        Parameters
-        ----------
         vehicle : that drove; not looked at.
         """
         del vehicle

@@ -74,8 +74,6 @@ def _named(channels: tuple[str, ...]) -> str:
 class SensorFault:
     """One broken channel, for some time or throughout.
 
-    Parameters
-    ----------
     kind : one of `KINDS`: holds its value; shows 0; shows no number (NaN); has the other sign; is
         multiplied by the size; is off by the size; runs away by the size each second; has white
         noise of the size; shows the size beside the truth for one sample in `_SPIKE_EVERY`.
@@ -113,8 +111,6 @@ class SensorFault:
     def active(self, t: Any) -> Any:
         """Return whether the channel is broken at a time.
 
-        Parameters
-        ----------
         t : time [s], a number or (n,).
         """
         return (t >= self.start) & (t < self.start + self.duration)
@@ -122,8 +118,6 @@ class SensorFault:
     def shown(self, t: Any, value: Any, stuck_at: float, noise: Any) -> Any:
         """Return what the broken channel shows.
 
-        Parameters
-        ----------
         t : time [s], a number or (n,).
         value : what a good sensor would show, like t.
         """
@@ -150,8 +144,6 @@ class SensorFault:
     def apply(self, recording: Recording) -> Recording:
         """Return what the log of the same drive holds with the fault.
 
-        Parameters
-        ----------
         recording : the drive without it; the fault's times are on its clock.
         """
         if self.kind == "lost":
@@ -167,8 +159,6 @@ class SensorFault:
 class WrongUnit:
     """A channel in another unit than it is said to have: deg for rad, km/h for m/s, g for m/s^2.
 
-    Parameters
-    ----------
     unit : one of `UNITS`.
     """
 
@@ -192,8 +182,6 @@ class WrongUnit:
 class Mirrored:
     """Channels in mirrored axes: y to the right, or z down, for these and not for the others.
 
-    Parameters
-    ----------
     channels : that have the other sign.
     """
 
@@ -215,8 +203,6 @@ class Mirrored:
 class Late:
     """Channels that come some time after the others; before, their first value holds.
 
-    Parameters
-    ----------
     channels : that come late; empty for all.
     delay : by this [s], between samples by straight lines.
     """
@@ -241,8 +227,6 @@ class Late:
 class Lagging:
     """Channels behind a low pass of first order that began at rest on the first value.
 
-    Parameters
-    ----------
     channels : that lag; empty for all.
     time_constant : of the low pass [s]; exact for straight lines between samples.
     """
@@ -267,8 +251,6 @@ class Lagging:
 class Held:
     """Channels that repeat an old value for some time, again and again: drop-outs, a slow sensor.
 
-    Parameters
-    ----------
     channels : that are held; empty for all.
     every : time from one hold to the next [s].
     lasts : how long each is [s]; equal to `every` for a sensor that samples so slowly.
@@ -302,8 +284,6 @@ class Held:
 class Jitter:
     """Samples that were taken up to some time before their stamp, each by its own time.
 
-    Parameters
-    ----------
     size : longest time that a sample is old [s]; uniform from zero.
     channels : concerned; empty for all, which then are late together.
     """
@@ -330,8 +310,6 @@ class Jitter:
 class ClockJump:
     """The logger's clock jumps: time goes by that is not logged, or is logged twice.
 
-    Parameters
-    ----------
     at : when [s], on the recording's clock.
     size : time that is missing [s]; negative where samples before are logged once more.
     """

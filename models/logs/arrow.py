@@ -54,8 +54,6 @@ def _of_arrow(block: bytes) -> Any:
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
 
-    Parameters
-    ----------
     block : whole lines in UTF-8.
     wanted : column from 0 -> how its cells are read.
     """
@@ -109,8 +107,6 @@ def words(cells: Any) -> Words:
 
     What a dictionary keeps once is never written out row by row.
 
-    Parameters
-    ----------
     cells : array of pyarrow, (n,).
     """
     import pyarrow
@@ -127,8 +123,6 @@ def words(cells: Any) -> Words:
 def doubles(cells: Any) -> NDArray[np.float64]:
     """Return numbers of any type as float64, (n,), NaN where one is missing.
 
-    Parameters
-    ----------
     cells : array of pyarrow, (n,).
     """
     import pyarrow
@@ -142,14 +136,7 @@ def doubles(cells: Any) -> NDArray[np.float64]:
 def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
     """Return whole numbers or instants [ns] as int64, (n,).
 
-    Parameters
-    ----------
     cells : array of pyarrow, (n,).
-
-    Raises
-    ------
-    pyarrow.ArrowInvalid
-        Where an instant does not fit.
     """
     import pyarrow
 

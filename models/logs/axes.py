@@ -64,8 +64,6 @@ class Found(NamedTuple):
 def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z.
 
-    Parameters
-    ----------
     words : of each channel's name.
     units : of each channel, "" where none is told.
     """
@@ -151,8 +149,6 @@ def along_axes(
 ) -> Found:
     """Return what the channels of triads are by their numbers, where their letters mislead.
 
-    Parameters
-    ----------
     found : the triads of a log.
     seen : channels that were read.
     speed, yaw_rate, lateral, steering : channels of the forward speed, r, a_y and δ by their names;

@@ -61,13 +61,7 @@ class Layout(NamedTuple):
 def fields_of(
     definitions: Definitions, kind: str, prefix: str = "", owners: tuple[tuple[str, str], ...] = ()
 ) -> Iterator[Field]:
-    """Yield the numbers of a message, without those in arrays and sequences.
-
-    Raises
-    ------
-    CdrError
-        Where a type has no definition.
-    """
+    """Yield the numbers of a message, without those in arrays and sequences."""
     _require_shallow(len(owners))
     for name, node in _fields(definitions, kind):
         inner = (*owners, (kind, name))
@@ -82,13 +76,7 @@ def fields_of(
 
 
 def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
-    """Return the layout of a message.
-
-    Raises
-    ------
-    CdrError
-        Where it is not as its type says.
-    """
+    """Return the layout of a message."""
     order = ORDERS.get(bytes(raw[:2]))
     if order is None:
         raise CdrError("a message is not plain CDR")
@@ -102,8 +90,6 @@ def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
 def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return which messages have a layout.
 
-    Parameters
-    ----------
     messages : (n, size).
     """
     order = next(word for word, one in ORDERS.items() if one == layout.order)
@@ -117,8 +103,6 @@ def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
 def numbers(layout: Layout, messages: NDArray[np.uint8], field: Field) -> NDArray[Any]:
     """Return a number of each message, (n,), as it is stored.
 
-    Parameters
-    ----------
     messages : (n, size).
     """
     place, kind = layout.places[field.path], np.dtype(layout.order + field.kind)

@@ -60,8 +60,6 @@ def holes(channel: Channel) -> NDArray[np.intp]:
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     """Return a channel without the empty cells that a slower channel has in a table.
 
-    Parameters
-    ----------
     cut : whether `holes` are left out too; else they stay, and are refused.
     """
     kept = ~np.isnan(channel.values)
@@ -80,8 +78,6 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
 
-    Parameters
-    ----------
     t : rising time stamps [s], (n,).
     longest : time without a sample that is none yet [s].
     """
@@ -93,8 +89,6 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
 def typical_step(t: Array) -> float:
     """Return the median time between samples [s], of all of them; NaN of one.
 
-    Parameters
-    ----------
     t : rising time stamps [s], (n,).
     """
     steps = large((max(t.size - 1, 0),))
@@ -116,8 +110,6 @@ def _steps(t: Array) -> Iterator[tuple[slice, Array]]:
 def are_one_clock(raws: Sequence[Raw]) -> bool:
     """Whether all signals are sampled at the same instants.
 
-    Parameters
-    ----------
     raws : at least one.
     """
     first = raws[0].t
@@ -129,8 +121,6 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
 
     Clocks of the calendar are compared since their first instant, to the microsecond.
 
-    Parameters
-    ----------
     raws : by signal; times rise.
     dt : step of the clock [s].
     longest : time without a sample that is no gap yet [s].
@@ -198,8 +188,6 @@ def _intersection(
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:
     """Return a signal at the instants of a clock, of samples that were there by then.
 
-    Parameters
-    ----------
     raw : the signal; a sample lies at or before the first instant.
     grid : instants [s], (m,).
     dt : step of the clock [s].

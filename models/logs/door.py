@@ -43,8 +43,6 @@ def open_log(
 ) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
 
-    Parameters
-    ----------
     path : of a file; of a folder, where a format keeps a log in one.
     dbc : of the file that tells the signals in the frames of a CAN bus.
     mend : whether stamps that do not rise are mended, and not refused.

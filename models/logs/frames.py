@@ -56,8 +56,6 @@ def group_of(identifier: int) -> int:
 class Known:
     """The frames of a database.
 
-    Parameters
-    ----------
     widths : how many bytes they have, by identifier with `EXTENDED`.
     groups : parameter group of J1939 -> identifier of it in the database.
     """
@@ -101,8 +99,6 @@ class _Gathered:
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
         """Take the next frames.
 
-        Parameters
-        ----------
         times : (n,) [s].
         data : (n, bytes).
         """

@@ -49,8 +49,6 @@ class Samples(NamedTuple):
 class GroupedLog(Generic[P]):
     """A log of groups of channels, as `LogFile` says.
 
-    Parameters
-    ----------
     place : what a sample is in the file: "message" or "sample".
     channels : as listed, each with where the format finds it.
     said : what is left out or taken for granted.
@@ -88,8 +86,6 @@ class GroupedLog(Generic[P]):
     ) -> "GroupedLog[P]":
         """Return the log of channels whose names may repeat.
 
-        Parameters
-        ----------
         missing : what the file does not hold where there are none, for the message.
         """
         if not found:
@@ -145,8 +141,6 @@ class GroupedLog(Generic[P]):
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names; those of one clock share its times.
 
-        Parameters
-        ----------
         run : None.
         """
         one_run(self.path, self.runs(), run)
@@ -224,8 +218,6 @@ def unique(names: Iterable[tuple[str, str]]) -> list[str]:
 def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
     """Return a note of names, none where there are none.
 
-    Parameters
-    ----------
     names : all of them; the first few are listed.
     """
     if not names:

@@ -36,8 +36,6 @@ def _told(file: IO[bytes] | None) -> Iterator[None]:
 class Growing:
     """A column of unknown length.
 
-    Parameters
-    ----------
     in_memory : how many it holds before it goes to disk; None takes `LONGEST_IN_MEMORY`.
     """
 
@@ -55,8 +53,6 @@ class Growing:
     def extend(self, values: NDArray[Any]) -> None:
         """Add numbers at the end.
 
-        Parameters
-        ----------
         values : (n,), which are copied.
         """
         part = np.array(values, dtype=self._dtype)

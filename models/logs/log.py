@@ -52,8 +52,6 @@ class Clock(NamedTuple):
 class Listed:
     """A channel as a file lists it.
 
-    Parameters
-    ----------
     name : as in the file, unique in it; a message's field has its topic before it.
     unit : as in the file, "" where it tells none.
     rate : typical samples per second [Hz], NaN where it is not known without reading them.
@@ -69,8 +67,6 @@ class Listed:
 class Channel:
     """One signal as it was written.
 
-    Parameters
-    ----------
     t : time of each sample [s], (n,), on the clock of the log; channels of one clock share it.
     values : (n,) float64 as in the file, NaN for an empty cell.
     place : what a sample is in the file, for messages: "line", "row", "message" or "sample".
@@ -124,8 +120,6 @@ class LogFile(Protocol):
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
 
-        Parameters
-        ----------
         run : one of `runs`; None where there are none.
         """
 

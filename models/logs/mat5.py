@@ -68,15 +68,7 @@ class _Beginning(NamedTuple):
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
-    """Return the variables of a file; numbers are read when they are asked for.
-
-    Raises
-    ------
-    RecordingError
-        Where it holds more than is allowed.
-    DamagedError
-        Where it is not what it says.
-    """
+    """Return the variables of a file; numbers are read when they are asked for."""
     with path.open("rb") as file:
         header = file.read(HEADER)
         order = {b"IM": "<", b"MI": ">"}.get(header[126:128])

@@ -41,8 +41,6 @@ class _Form(NamedTuple):
 def opened(path: Path, format: str) -> Iterator[Any]:
     """Open a file by asammdf.
 
-    Parameters
-    ----------
     format : that it is read as, for the message where the library is missing.
     """
     asammdf = need(path, "asammdf", format, "mdf")

@@ -22,8 +22,6 @@ _NANOSECONDS = 1e9  # of a second
 class ArrayLog:
     """Columns of one length, of which one is the time.
 
-    Parameters
-    ----------
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
@@ -119,8 +117,6 @@ class ArrayLog:
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return columns as channels.
 
-        Parameters
-        ----------
         run : one of `runs`; None where there are none, or one.
         """
         run = one_run(self.path, self.runs(), run)

@@ -140,8 +140,6 @@ def _with_corner(word: str) -> tuple[str, ...]:
 def wheel_words(signal: str, words: Sequence[str]) -> bool:
     """Return whether a name is that of the speed of a wheel.
 
-    Parameters
-    ----------
     signal : one of `WHEELS`.
     """
     listed = frozenset(part for word in words for part in _with_corner(word))
@@ -165,8 +163,6 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
 class Guess:
     """A channel, or the channels of two wheels, that may be a signal.
 
-    Parameters
-    ----------
     confidence : from 0 to 1.
     hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
@@ -187,8 +183,6 @@ class Guess:
 class Proposal:
     """What the channels of a log probably are.
 
-    Parameters
-    ----------
     rivals : by signal, all that are as good as the best, it included, where there are several.
     """
 
@@ -264,8 +258,6 @@ def _matches(group: str, words: frozenset[str]) -> bool:
 def name_confidence(signal: str, name: str) -> float:
     """Return how sure a name alone says that a channel is a signal, 0 where it does not.
 
-    Parameters
-    ----------
     signal : one of `RULES`, or a wheel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
@@ -309,8 +301,6 @@ def propose(
 ) -> Proposal:
     """Return what the channels of a log probably are.
 
-    Parameters
-    ----------
     log : as a format reads it; numbers are read of the channels that are in question.
     headings : names and units to choose from; None all of the log.
     run : which of its runs is looked at; None the only one, or the first.

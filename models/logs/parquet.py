@@ -45,8 +45,6 @@ def open_parquet(path: Path) -> TableLog:
 class _ParquetTable:
     """A table in a Parquet file.
 
-    Parameters
-    ----------
     schema : of its columns, as pyarrow gives it.
     """
 
@@ -81,8 +79,6 @@ class _ParquetTable:
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column as text, "" where one is missing.
 
-        Parameters
-        ----------
         column : from 0.
         """
         with one_line(self.path, WHAT):
@@ -100,8 +96,6 @@ class _ParquetTable:
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
 
-        Parameters
-        ----------
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """

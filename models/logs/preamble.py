@@ -67,8 +67,6 @@ _LONGEST_CELL = csv.field_size_limit()  # characters
 class Layout:
     """Where the table of a text file is, and how its cells are written.
 
-    Parameters
-    ----------
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
     delimiter : one character, " " for any number of blanks and tabs.
     decimal : "." or ",".
@@ -122,8 +120,6 @@ class _Way(NamedTuple):
 def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     """Return the layout of a text file.
 
-    Parameters
-    ----------
     whole : whether they are all of it.
     """
     encoding = _encoding(path, head)
@@ -211,8 +207,6 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
 def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
     """Return the cells of one line, the line itself where it has none.
 
-    Parameters
-    ----------
     delimiter : one character, " " for any number of blanks and tabs.
     """
     if delimiter == BLANKS:

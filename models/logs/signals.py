@@ -94,8 +94,6 @@ def quantity_of(name: str, unit: str) -> str:
 def signal_name(name: str) -> str | None:
     """Return our name of a signal by its own or by that of its column; None where it has neither.
 
-    Parameters
-    ----------
     name : for example "vy" or "v_y".
     """
     by_column = {column: ours for ours, column in COLUMNS.items()}
@@ -110,8 +108,6 @@ class Signal:
     In SI it is (mean or sum of the channels) · factor - offset; by `ratio` or `table` the angle of
     the road wheels, where that of the hand wheel was logged.
 
-    Parameters
-    ----------
     channel : names in the file; of several, forces are added and anything else is averaged.
     unit : as users write units; empty takes that of the file, SI where it tells none.
     factor : the numbers are multiplied by it [-]; -1 turns a sign.
@@ -162,8 +158,6 @@ class Signal:
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
         """Return the signal of its channels.
 
-        Parameters
-        ----------
         parts : each channel in SI, on one clock (n,).
         """
         plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
@@ -199,8 +193,6 @@ class Signal:
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
     """Return amounts with the sign that another channel has then, (n,).
 
-    Parameters
-    ----------
     t : times of the amounts [s], (n,).
     sign_t, sign : times and values of the other channel, (m,).
     """

@@ -102,8 +102,6 @@ def find_clock(
     Of several that are called so it is the first whose stamps hardly ever repeat, as one that is
     rounded to seconds does. One that counts samples, or the way, is none.
 
-    Parameters
-    ----------
     head : gives the first cells of a column, with decimal points.
     """
     named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
@@ -190,8 +188,6 @@ def own_clocks(
     on: what a receiver tells of the same rows has another name and the same steps. What stands
     behind a time that is none of its own has the first.
 
-    Parameters
-    ----------
     head : gives the first cells of a column, with decimal points.
     """
     found = {}
@@ -233,8 +229,6 @@ def _is_beside(
 def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
     """Return a column that is said to be the time; None where its cells are none.
 
-    Parameters
-    ----------
     column : from 0.
     """
     found = _clock(column, name, unit, head, _is_any)
@@ -336,8 +330,6 @@ def _number(cell: str) -> float | None:
 def nanoseconds(cell: str) -> int | None:
     """Return a date and time (since 1970), or a time of day, in ns; None where it is neither.
 
-    Parameters
-    ----------
     cell : ISO 8601, or with the day first, or hh:mm:ss, mm:ss, or "0.01 sec" as MATLAB writes a
         duration; "" gives `MISSING`.
     """
@@ -419,8 +411,6 @@ def require_times(
 ) -> None:
     """Refuse a row without a time.
 
-    Parameters
-    ----------
     values, rows : as of `seconds`, (n,) each.
     """
     missing = _first(values, lambda part: part == MISSING if part.dtype.kind == "i" else
@@ -446,8 +436,6 @@ def seconds(
     Dates and times of day count from the first of them; numbers stay as they stand, in seconds,
     those since 1970 too.
 
-    Parameters
-    ----------
     values : (n,) as in the file.
     rows : (n,) where each is in the file.
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
@@ -487,8 +475,6 @@ def risen(
 ) -> Stamps:
     """Return times in seconds as `seconds` does.
 
-    Parameters
-    ----------
     t : times [s], (n,).
     rows : (n,) where each is in the file.
     """
@@ -499,8 +485,6 @@ def risen(
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     """Return stamps that rise and the rows that they are of; None where that is no mending.
 
-    Parameters
-    ----------
     t : stamps [s], some of which are not above the one before, (n,).
     restarts : whether a clock that goes back for long is mended: samples of two runs are not mixed.
     """
@@ -541,8 +525,6 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
 def _starts_again(first: float, before: float, after: float) -> bool:
     """Return whether a clock that fell starts again; else its samples are out of order.
 
-    Parameters
-    ----------
     first : stamp since which it rose [s].
     before, after : stamps between which it fell [s].
     """
@@ -552,8 +534,6 @@ def _starts_again(first: float, before: float, after: float) -> bool:
 def typical_rate(t: Array) -> float:
     """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two.
 
-    Parameters
-    ----------
     t : times [s], (n,).
     """
     steps = np.diff(t[:_MOST_STEPS])
@@ -564,8 +544,6 @@ def typical_rate(t: Array) -> float:
 def since(t: Array, first: float) -> Array:
     """Return times of the calendar since an instant, (n,); doubles hold them to the microsecond.
 
-    Parameters
-    ----------
     t : times since 1970 [s], (n,).
     first : instant since 1970 [s].
     """
@@ -575,8 +553,6 @@ def since(t: Array, first: float) -> Array:
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     """Return stamps in seconds, (n,); those of the calendar from the first on.
 
-    Parameters
-    ----------
     values : (n,) as in the file.
     """
     first = values[0]
@@ -594,8 +570,6 @@ def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
 def started(clock: Clock, cell: str) -> float:
     """Return the instant that a clock of the calendar counts from [s]; 0 of any other.
 
-    Parameters
-    ----------
     cell : its first one.
     """
     if clock.unit == "instant":
@@ -647,8 +621,6 @@ class _Even(NamedTuple):
 def _even_clock(t: Array) -> _Even | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
 
-    Parameters
-    ----------
     t : stamps [s] that never fall, (n,).
     """
     if t.size < 10 or not t[-1] > t[0]:
@@ -757,8 +729,6 @@ def _even_step(t: Array, tick: float) -> float | None:
 def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool = True) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
 
-    Parameters
-    ----------
     t : stamps [s], one of which is not above the one before, (n,).
     rows : (n,) where each is in the file.
     restarts : whether a clock that starts again can be mended.

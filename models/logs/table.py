@@ -124,8 +124,6 @@ class Table(Protocol):
 class Gathered:
     """Columns that are gathered block by block.
 
-    Parameters
-    ----------
     kinds : column from 0 -> how its cells are read.
     run : column and word of the rows to keep; None keeps all.
     """
@@ -156,8 +154,6 @@ class Gathered:
     def extend(self, rows: NDArray[np.int64], columns: Mapping[int, Any]) -> None:
         """Add the rows of a block.
 
-        Parameters
-        ----------
         rows : (n,) where they are in the file.
         columns : column -> (n,) values, or `Words`.
         """
@@ -204,8 +200,6 @@ class Gathered:
 class TableLog:
     """A table as a log: which of its columns is the clock, and which names the runs.
 
-    Parameters
-    ----------
     clock_name, clock_unit : of the column that is the time; empty finds them.
     rate : of all samples [Hz], in place of a time; 0 where none is told.
     mend : whether stamps that do not rise are mended, and not refused.
@@ -377,8 +371,6 @@ class TableLog:
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return columns as channels on the clock of the log.
 
-        Parameters
-        ----------
         run : one of `runs`; None where there are none.
         """
         places, clock = chosen(self.path, names, self._places), self.clock

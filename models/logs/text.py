@@ -52,8 +52,6 @@ def open_text(path: Path) -> TableLog:
 class TextTable:
     """A table in a text file.
 
-    Parameters
-    ----------
     arrow : whether pyarrow is used; None where it is installed and the file is large.
     """
 
@@ -99,8 +97,6 @@ class TextTable:
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column, with decimal points, "" where one is missing.
 
-        Parameters
-        ----------
         column : from 0.
         """
         layout = self.layout
@@ -112,8 +108,6 @@ class TextTable:
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
 
-        Parameters
-        ----------
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
@@ -218,8 +212,6 @@ class _Row(NamedTuple):
 class _Python:
     """Reads blocks of one table.
 
-    Parameters
-    ----------
     wanted : column from 0 -> how its cells are read.
     """
 

@@ -35,8 +35,6 @@ _MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 class Leaf:
     """An array of real numbers that is not read yet.
 
-    Parameters
-    ----------
     load : reads it, (rows, columns) float64.
     """
 
@@ -97,8 +95,6 @@ class Found(NamedTuple):
 def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
     """Return the channels of a tree, in its order; their names may repeat.
 
-    Parameters
-    ----------
     rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
         the like of the tree, if there is one.
     """
@@ -252,8 +248,6 @@ def _lines(
 def line_of(values: Array, signal: Signal) -> Array:
     """Return the values of a channel, (n,).
 
-    Parameters
-    ----------
     values : of its leaf, (rows, columns).
     """
     line = values[:, signal.place] if signal.along == 0 else values[signal.place]

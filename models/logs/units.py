@@ -111,8 +111,6 @@ def is_told(unit: str) -> bool:
 def unit_of_range(quantity: str, largest: float) -> str:
     """Return the unit that numbers without one can have; "" where SI can be.
 
-    Parameters
-    ----------
     quantity : one of `SI`, or `HAND_WHEEL`.
     largest : how far the numbers go from zero.
     """
@@ -125,8 +123,6 @@ def unit_of_range(quantity: str, largest: float) -> str:
 def to_si(unit: str, quantity: str, what: str) -> float:
     """Return the factor to SI.
 
-    Parameters
-    ----------
     unit : as written; where it tells none, SI is meant.
     quantity : of the signal, one of `SI`.
     """

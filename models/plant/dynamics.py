@@ -41,8 +41,6 @@ class Wheel(NamedTuple):
     def velocity(self, v_x: Any, v_y: Any, r: Any) -> tuple[Any, Any]:
         """Velocity of the wheel center [m/s] in the body frame.
 
-        Parameters
-        ----------
         v_x, v_y : velocity of the center of gravity, body frame [m/s].
         r : yaw rate [rad/s].
         """
@@ -64,8 +62,6 @@ def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
 def mounted(tire: Tire, wheel: Wheel) -> Tire:
     """Return the tire for the side of the wheel; only measured tires have sides.
 
-    Parameters
-    ----------
     tire : any of `models.tires`.
     """
     if isinstance(tire, MagicFormula):
@@ -80,8 +76,6 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     of the wheel (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 7.2; no division by speed,
     so it is well posed down to standstill).
 
-    Parameters
-    ----------
     slip : lagged slip tan(α') [-].
     delta : steering angle of the wheel [rad].
     velocity : of the wheel, body frame [m/s].
@@ -96,8 +90,6 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
 def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
     """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
 
-    Parameters
-    ----------
     slip : lagged slip tan(α') [-].
     camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
@@ -121,8 +113,6 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
 def downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
     """Return what the air adds to the loads of front and rear axle [N]; 0 of a car without.
 
-    Parameters
-    ----------
     v_x : longitudinal speed [m/s].
     """
     if not vehicle.has_downforce:
@@ -145,8 +135,6 @@ def wheel_loads(
     moment of its own side force. A wheel that would pull on the road is lifted: its load is zero
     and the other wheel of the axle carries all; the moment beyond that is lost.
 
-    Parameters
-    ----------
     roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
     axle_force : side force of the front and the rear axle, body frame, (2,) [N].
     a_x : longitudinal acceleration [m/s^2].
@@ -177,16 +165,9 @@ def wheel_loads(
 class Driver:
     """Gains of the speed controller; the defaults hold the speed within about 0.1 m/s.
 
-    Parameters
-    ----------
     gain : acceleration per speed error [1/s].
     integral_gain : acceleration per integrated speed error [1/s^2], zero for none.
     acceleration_limit : largest demand, driving and braking [m/s^2].
-
-    Raises
-    ------
-    ValueError
-        For a gain that is negative, zero where it must not be, or NaN.
     """
 
     gain: float = 2.0
@@ -201,8 +182,6 @@ class Driver:
     def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
         """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
 
-        Parameters
-        ----------
         error : wanted minus actual speed [m/s].
         integral : of the error [m].
         """
@@ -221,8 +200,6 @@ OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "accelerat
 def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
     """Return the components of a wheel-frame vector in the body frame.
 
-    Parameters
-    ----------
     x, y : components in the frame of the wheel.
     angle : steering angle of the wheel [rad].
     """
@@ -310,8 +287,6 @@ def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
 
     Its outputs are those of the state before the step.
 
-    Parameters
-    ----------
     car : from `dynamics`.
     dt : step [s].
     """

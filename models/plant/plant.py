@@ -28,8 +28,6 @@ from models.vehicle import GRAVITY, Vehicle, VehicleError
 class PlantRun:
     """The truth of a run: n samples, SI, ISO axes; wheels in the order FL, FR, RL, RR.
 
-    Parameters
-    ----------
     t : time [s], (n,).
     v_x, v_y : velocity of the center of gravity in the body frame [m/s], (n,).
     r : yaw rate [rad/s], (n,).
@@ -74,8 +72,6 @@ class PlantRun:
     ) -> "PlantRun":
         """Name the columns of what the compiled loop recorded.
 
-        Parameters
-        ----------
         t : time [s], (n,).
         command : steering asked for [rad], (n, 2).
         record : state "x" (n, 18) in the order of `models.plant.dynamics`, and its outputs.
@@ -103,15 +99,8 @@ class PlantRun:
     ) -> Recording:
         """Return what a log of this run would hold, with the axle forces as truth.
 
-        Parameters
-        ----------
         sensors : what the signals go through; None measures exactly.
         rng : source of the noise; needed when there are sensors.
-
-        Raises
-        ------
-        ValueError
-            When sensors come without a generator.
         """
         exact = Recording(
             name=self.name,
@@ -160,8 +149,6 @@ def _compiled_loop(
 ) -> _CompiledLoop:
     """Return the compiled loop of a plant over time, built once.
 
-    Parameters
-    ----------
     dt : step of the integration [s].
     """
     car, constants = lifted(dynamics(vehicle, tires, driver))
@@ -176,16 +163,7 @@ _GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 
 def tire_of(vehicle: Vehicle) -> MagicFormula:
-    """Return the tire of the file that a chassis names.
-
-    Raises
-    ------
-    VehicleError
-        When the vehicle has no chassis, or names no tire.
-    TirError
-        When the file cannot be used, or its tire can carry no wheel of this car: a unit that is not
-        told, or another tire.
-    """
+    """Return the tire of the file that a chassis names."""
     file = vehicle.require_chassis().tire
     if file is None:
         raise VehicleError(
@@ -214,18 +192,9 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
 class Plant:
     """A double-track car on its tires.
 
-    Parameters
-    ----------
     vehicle : the car; it needs a chassis.
     tire : of all four wheels, a frozen record; None reads the file named by the chassis.
     rear_tire : of the two rear wheels, where they have another.
-
-    Raises
-    ------
-    VehicleError
-        When the vehicle has no chassis, or names no tire where none is given.
-    TirError
-        When the file that it names is no tire of this car.
     """
 
     def __init__(
@@ -256,8 +225,6 @@ class Plant:
     ) -> PlantRun:
         """Drive a maneuver from straight ahead, with classical Runge-Kutta steps.
 
-        Parameters
-        ----------
         speed : wanted speed [m/s], a number or a function of the times (n,) [s].
         friction : of the road; None is what the tire was measured on.
         bank : slope of the road across the car [rad], positive where it falls to the left; wheel
@@ -270,13 +237,6 @@ class Plant:
         Returns
         -------
         The run at every `sample_time` from 0 to the maneuver's duration.
-
-        Raises
-        ------
-        ValueError
-            For steps that do not fit, or a speed that is not positive at the start.
-        PlantError
-            When a state stops being a finite number.
         """
         every = round(sample_time / dt) if dt > 0.0 else 0
         if not (every >= 1 and abs(every * dt - sample_time) < 1e-9 * sample_time):
@@ -311,8 +271,6 @@ class Plant:
     def loop(self, dt: float) -> _CompiledLoop:
         """Return the compiled loop over time.
 
-        Parameters
-        ----------
         dt : step of the integration [s].
         """
         return _compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
@@ -350,16 +308,9 @@ class PlantState(NamedTuple):
 class StepwisePlant:
     """A plant that is driven period by period.
 
-    Parameters
-    ----------
     friction : of the road; None is what the tire was measured on.
     period : for which command and wanted speed are held [s], a multiple of `dt`.
     dt : step of the integration [s].
-
-    Raises
-    ------
-    ValueError
-        When the period is not a multiple of the step.
     """
 
     def __init__(
@@ -393,8 +344,6 @@ class StepwisePlant:
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
 
-        Parameters
-        ----------
         v_x : speed [m/s].
         X, Y : position of the center of gravity [m].
         psi : heading [rad].
@@ -408,17 +357,8 @@ class StepwisePlant:
     def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
         """Return the plant one period later.
 
-        Parameters
-        ----------
         command : steering angles asked for, [δ_f, δ_r] [rad].
         v_ref : wanted speed [m/s].
-
-        Raises
-        ------
-        ValueError
-            When the inputs are not finite.
-        PlantError
-            When a state stops being a finite number.
         """
         if not np.isfinite([*command, v_ref]).all():
             raise ValueError(f"command and v_ref must be finite, they are {command} and {v_ref}")

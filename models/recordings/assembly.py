@@ -82,8 +82,6 @@ def recording_of(
 ) -> Recording:
     """Return one run of a log on a uniform clock, not yet judged by physics.
 
-    Parameters
-    ----------
     name : of the recording, without its run.
     run : name of the run; None where the map names it, or there is only one.
     dt : sample time T_s of the result [s].
@@ -187,8 +185,6 @@ def _channels(
 def scaled(values: Array, factor: float) -> Array:
     """Return values times a factor; themselves where it is one.
 
-    Parameters
-    ----------
     values : (n,).
     """
     if factor == 1.0:
@@ -363,14 +359,7 @@ def wheel_scales(
 ) -> dict[str, Scale]:
     """Return how wheels roll by the v_x that is logged as well, by name of the wheel.
 
-    Parameters
-    ----------
     signals : v_x, wheels, and r where it is there; others are not looked at.
-
-    Raises
-    ------
-    RecordingError
-        Where a channel of them cannot be read.
     """
     headings = log.headings()
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}

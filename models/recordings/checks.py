@@ -445,8 +445,6 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     angle (correlation above -0.3); the mass that the forces accelerate is a third to three times
     the vehicle's.
 
-    Parameters
-    ----------
     vehicle : anything with l_f and l_r [m] and mass [kg].
     """
     _refuse(recording, vehicle_contradiction(recording, vehicle))
@@ -455,8 +453,6 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
 def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
     """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`.
 
-    Parameters
-    ----------
     vehicle : anything with l_f and l_r [m] and mass [kg].
 
     Returns

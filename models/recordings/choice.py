@@ -52,13 +52,7 @@ def column_of(name: str) -> str:
 def chosen_signals(
     log: LogFile, headings: Sequence[Heading], log_map: LogMap, run: str | None
 ) -> Reading:
-    """Return how each signal is read.
-
-    Raises
-    ------
-    RecordingError
-        Where a signal that is needed is neither told nor there beyond doubt.
-    """
+    """Return how each signal is read."""
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
     lost = _lost_text(log_map.signals, by_map)
@@ -87,11 +81,6 @@ def as_listed(
 
     A channel that is listed with its unit, "Vel Lat [km/h]", may be told without. A v_x that is
     not there is left out where wheels are told.
-
-    Raises
-    ------
-    RecordingError
-        Where there is no such channel, or several.
     """
     bare: dict[str, list[str]] = {}
     for one in names:
@@ -164,13 +153,7 @@ def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:
 
 
 def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
-    """Return the signals that bear the standard names of columns.
-
-    Raises
-    ------
-    RecordingError
-        Where a name is there twice, or one axle alone has a force.
-    """
+    """Return the signals that bear the standard names of columns."""
     found = {}
     for name in QUANTITIES:
         column = column_of(name)

@@ -131,8 +131,6 @@ def windows(recording: Recording) -> Means:
 def least_squares(X: Array, y: Array) -> Fit:
     """Fit y = X theta; standard errors count overlapping windows once.
 
-    Parameters
-    ----------
     X : regressors, shape (k, p).
     y : response, shape (k,).
     """
@@ -152,8 +150,6 @@ def least_squares(X: Array, y: Array) -> Fit:
 def correlation(a: Array, b: Array) -> float:
     """Correlation about zero, from -1 to 1; 0 where one is zero throughout.
 
-    Parameters
-    ----------
     a, b : samples of two signals, shape (k,).
     """
     return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)
@@ -164,8 +160,6 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
 
     So neither a long straight nor a channel that holds noise hides the other.
 
-    Parameters
-    ----------
     a, b : of each window, in any unit (k,).
     """
     some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)
@@ -177,8 +171,6 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
 def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     """Return how two measures of the same bends go together, in the windows where either turns.
 
-    Parameters
-    ----------
     a, b : of each window, in any unit (k,).
     keep : windows that may count (k,).
     """
@@ -236,8 +228,6 @@ def steering(w: Means) -> Steering | None:
     where a driver may countersteer, do not count. Needs 2 s of turning, in which r and the steering
     go together beyond chance.
 
-    Parameters
-    ----------
     w : window means.
     """
     return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
@@ -248,8 +238,6 @@ def proportional(w: Means) -> bool:
 
     Large steering, beyond 0.7 of what is usual at most, is compared with 0.3 to 0.7 of that.
 
-    Parameters
-    ----------
     w : window means.
     """
     size = np.abs(w.v_x * w.delta)
@@ -269,8 +257,6 @@ def onset(w: Means) -> Steering | None:
 
     A car that slides over its front wheels reads long at large steering and normal here.
 
-    Parameters
-    ----------
     w : window means.
     """
     size = np.abs(w.delta)

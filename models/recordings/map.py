@@ -304,11 +304,6 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
     star, an offset in SI behind a minus, a ratio of the steering behind a slash; sign(CHANNEL) of
     an amount whose sign another channel has. Of several channels, with blanks about each plus, the
     mean is taken, of forces the sum.
-
-    Raises
-    ------
-    RecordingError
-        Where a word is none of these.
     """
     found: dict[str, Signal] = {}
     for pair in pairs:

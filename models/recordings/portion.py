@@ -31,8 +31,6 @@ class Portion(NamedTuple):
     def place(self, index: int) -> int:
         """Return how many of its samples lie before a sample of the whole.
 
-        Parameters
-        ----------
         index : of the sample; as many as there are is the end.
         """
         return int(np.searchsorted(self.samples, index))
@@ -44,8 +42,6 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     The recording is divided into parts of one length, and of each the stretch is taken in which the
     car is turned hardest: by the sum of (v_x r)².
 
-    Parameters
-    ----------
     middle : sample before which half of the stretches shall lie; None spreads them over all.
     """
     n = len(recording)

@@ -39,14 +39,7 @@ def with_pose(
 
     A gyro tells how late it, and what else a box has, is against the pose; that is taken out.
 
-    Parameters
-    ----------
     parts : by signal its channels in SI.
-
-    Raises
-    ------
-    RecordingError
-        As `motion_of`; where the pose never leaves its heading, as one of wheels.
     """
     if not set(POSE) <= set(signals):
         return dict(signals), dict(parts), ()
@@ -124,14 +117,7 @@ class Smooth(NamedTuple):
 def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
     """Return how a car moves by its pose.
 
-    Parameters
-    ----------
     parts : by name of `POSE` on one clock or several, SI.
-
-    Raises
-    ------
-    RecordingError
-        Where there is no piece without a gap that is long enough, or the heading is none.
     """
     x = parts["x"]
     t = x.t
@@ -196,8 +182,6 @@ def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
 def smoothed(z: Array) -> Smooth:
     """Return columns of one size, smoothed alike as strongly as they predict themselves best.
 
-    Parameters
-    ----------
     z : (n, k), evenly sampled.
     """
     from scipy.fft import dct  # takes longer than to read a short log

@@ -136,8 +136,6 @@ def repair_text(repair: Repair) -> str:
 def map_of(told: Told) -> LogMap:
     """Return a map that may be given as a path; an empty one where there is none.
 
-    Parameters
-    ----------
     told : a map, the path of a log.toml, or None.
     """
     if told is None:
@@ -188,8 +186,6 @@ def split_log_argument(argument: str) -> tuple[Path, str | None]:
     The whole argument wins when a file has that name. Else the split is after the ending of a log
     and a colon, so that runs and folders may hold colons too.
 
-    Parameters
-    ----------
     argument : what was typed, for example "log.csv.gz:lap2" or "C:\logs\log.csv:lap2".
     """
     if Path(argument).is_file():

@@ -279,16 +279,7 @@ class Recording:
     def __getitem__(self, times: slice) -> "Recording":
         """Return the part between two times [s], both included, as label slices of pandas have it.
 
-        Parameters
-        ----------
         times : `log[5.0:20.0]`, on the recording's own clock; what is left out is the begin or end.
-
-        Raises
-        ------
-        TypeError
-            Where it is no slice of two times.
-        RecordingError
-            If fewer than 10 samples are left.
         """
         if not isinstance(times, slice) or times.step is not None:
             raise TypeError(f"a recording is sliced by time in s, as log[5.0:20.0], not {times!r}")
@@ -384,8 +375,6 @@ class Recording:
 def peak(signal: Array) -> float:
     """Return the largest size of a signal.
 
-    Parameters
-    ----------
     signal : samples, any shape (...).
     """
     return max(abs(float(signal.min())), abs(float(signal.max())))
@@ -401,15 +390,8 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     Each keeps its own time where it begins after the one before; else its time is moved to begin
     `PAUSE` after it. Signals that one lacks are left out of all.
 
-    Parameters
-    ----------
     recordings : sampled alike; at least one.
     name : of the drive; None takes all their names.
-
-    Raises
-    ------
-    RecordingError
-        Where they are sampled at different intervals.
     """
     first = recordings[0]
     name = " + ".join(one.name for one in recordings) if name is None else name
@@ -494,8 +476,6 @@ def _nobody_writes(array: NDArray[Any]) -> bool:
 def side_by_side(first: Array, second: Array) -> Array:
     """Return two signals as columns that nobody may write, (n, 2).
 
-    Parameters
-    ----------
     first, second : signals (n,).
     """
     both = large((first.size, 2))
@@ -528,11 +508,6 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     -------
     Path
         The file written.
-
-    Raises
-    ------
-    RecordingError
-        If the name ends otherwise.
     """
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
@@ -596,8 +571,6 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     Time stamps that are that grid keep their bits. Those that only jitter about it, or drift by
     less than 1 % of a step, are replaced by it, and the values stay.
 
-    Parameters
-    ----------
     t : rising time stamps [s], shape (n,).
     columns : name -> values, shape (n,).
     dt : step of the grid [s].

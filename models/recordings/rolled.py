@@ -55,17 +55,10 @@ def rolled(
 ) -> _Rolled:
     """Return the forward speed at the center of gravity; no sample looks at a later one.
 
-    Parameters
-    ----------
     speeds : at which wheels roll [m/s], by names of `WHEELS`, each (n,); at least one.
     r : yaw rate [rad/s], (n,).
     delta_f, delta_r : angles of the road wheels [rad], (n,).
     dt : sample time [s].
-
-    Raises
-    ------
-    RecordingError
-        Where one wheel of an axle stands alone and the track is not known.
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
     n, v_x = r.size, large((r.size,))
@@ -124,8 +117,6 @@ class Rule(NamedTuple):
 def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
     """Return the speed at the next sample.
 
-    Parameters
-    ----------
     c : speed of the center of gravity by each wheel [m/s], (k,).
     rates : by which each changed lately [m/s²], (k,).
     """
@@ -221,8 +212,6 @@ def _mean(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
 def trust_scan(k: int) -> Scan:
     """Return the compiled loop over samples.
 
-    Parameters
-    ----------
     k : wheels, and axles that count as one.
     """
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)

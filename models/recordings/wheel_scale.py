@@ -41,11 +41,6 @@ def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
     """Return what a wheel in SI, turns or a speed, is multiplied by to be a speed.
 
     Where no unit is written, a radius that is told says that the numbers are turns.
-
-    Raises
-    ------
-    RecordingError
-        Where turns are logged and no radius is told.
     """
     radius = wheels.radius_of(name)
     if not is_told(unit):
@@ -65,8 +60,6 @@ def learnt_scales(
 ) -> dict[str, Scale]:
     """Return the scale of each wheel that v_x tells, by name.
 
-    Parameters
-    ----------
     parts : by signal its channels in SI; v_x, wheels, and r where it is there.
     """
     t = parts["v_x"][0].t
@@ -98,8 +91,6 @@ def learnt_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, f
 
     None where straight and even driving is too short, or does not agree on one number.
 
-    Parameters
-    ----------
     t : time [s], (n,), rising.
     v_x : speed over ground [m/s], (n,).
     r : yaw rate [rad/s], (n,).

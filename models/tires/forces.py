@@ -41,8 +41,6 @@ class Tire(Protocol):
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
 
-        Parameters
-        ----------
         alpha : slip angle, paper's sign [rad].
         kappa : longitudinal slip [-].
         gamma : camber [rad].
@@ -54,8 +52,6 @@ class Tire(Protocol):
     def slip_stiffness(self, F_z: Expression) -> Expression:
         """∂F_x/∂κ at zero slip and camber [N].
 
-        Parameters
-        ----------
         F_z : wheel load [N].
         """
         ...
@@ -63,8 +59,6 @@ class Tire(Protocol):
     def cornering_stiffness(self, F_z: Expression) -> Expression:
         """∂F_y/∂α at zero slip and camber [N/rad].
 
-        Parameters
-        ----------
         F_z : wheel load [N].
         """
         ...
@@ -73,8 +67,6 @@ class Tire(Protocol):
 def positive(x: Expression) -> Expression:
     """The number where it is above 0, else 0; NaN stays NaN, which fmax(x, 0) would hide.
 
-    Parameters
-    ----------
     x : any number; for a wheel load [N], 0 means lifted off: a tire cannot pull.
     """
     return x * (x > 0)
@@ -91,8 +83,6 @@ def folded(alpha: Expression) -> Expression:
     tan α is the sideways over the absolute forward speed, so a wheel that rolls backwards, with
     |α| > π/2, slips by π - α.
 
-    Parameters
-    ----------
     alpha : slip angle [rad], any real number.
     """
     return ca.atan2(ca.sin(alpha), ca.fabs(ca.cos(alpha)))
@@ -126,8 +116,6 @@ class Slips(NamedTuple):
 def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
     """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
 
-    Parameters
-    ----------
     alpha : slip angle, paper's sign [rad].
     kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
     C_alpha : cornering stiffness [N/rad].
@@ -158,8 +146,6 @@ class _ConstantStiffness(Protocol):
 def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
     """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
 
-    Parameters
-    ----------
     F_z : wheel load [N].
     """
     return self.C_kappa * (F_z > 0)
@@ -168,8 +154,6 @@ def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
 def cornering_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
     """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
 
-    Parameters
-    ----------
     F_z : wheel load [N].
     """
     return self.C_alpha * (F_z > 0)

@@ -38,8 +38,6 @@ def _magic_curve(
 ) -> Expression:
     """D sin(C atan(B x - E (B x - atan B x))), (4.49) without shifts.
 
-    Parameters
-    ----------
     x : slip, shifted.
     B, C : stiffness and shape factor.
     D : peak value [N].
@@ -64,8 +62,6 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
 
     G = cos(C atan(B s_S - E (B s_S - atan B s_S))) over the same at S_H, with s_S = s + S_H.
 
-    Parameters
-    ----------
     s : the other slip, not shifted.
     B, C, E : stiffness, shape and curvature factor of the weight.
     """
@@ -87,8 +83,6 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
 def _lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> _Shape:
     """All of the curve that does not depend on slip.
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     gamma : camber [rad].
     F_z : wheel load, not negative [N].
@@ -115,8 +109,6 @@ def _lateral_curvature(
 ) -> Expression:
     """E_y, at most 1.
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     alpha_y : slip angle, ISO sign, shifted [rad].
     gamma : camber [rad].
@@ -132,8 +124,6 @@ def pure_lateral(
 ) -> Expression:
     """F_y0 [N] of a wheel that rolls freely, (4.E19).
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     alpha : slip angle, ISO sign [rad].
     gamma : camber [rad].
@@ -156,8 +146,6 @@ def combined_lateral(
 ) -> Expression:
     """F_y [N] at any slip, (4.E58).
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     alpha : slip angle, ISO sign [rad].
     kappa : longitudinal slip [-].
@@ -181,8 +169,6 @@ def combined_lateral(
 def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0.
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     F_z : wheel load, not negative [N].
     """
@@ -203,8 +189,6 @@ def _longitudinal_shape(
 ) -> _Shape:
     """All of the curve that does not depend on slip.
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     gamma : camber [rad].
     F_z : wheel load, not negative [N].
@@ -226,8 +210,6 @@ def _longitudinal_shape(
 def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:
     """E_x, at most 1.
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     kappa_x : slip, shifted [-].
     F_z : wheel load, not negative [N].
@@ -242,8 +224,6 @@ def _pure_longitudinal(
 ) -> Expression:
     """F_x0 [N] of a wheel that runs straight, (4.E9).
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     kappa : longitudinal slip [-].
     gamma : camber [rad].
@@ -277,8 +257,6 @@ def _combined_longitudinal(
 def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0.
 
-    Parameters
-    ----------
     c : coefficients of the tire file.
     F_z : wheel load, not negative [N].
     """
@@ -291,15 +269,8 @@ def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
 class MagicFormula:
     """Steady-state Magic Formula 5.2 in combined slip with camber.
 
-    Parameters
-    ----------
     side : side of the car this tire belongs to, "left" or "right".
     name : where the tire comes from, for messages and tables.
-
-    Raises
-    ------
-    ValueError
-        The side is neither "left" nor "right".
     """
 
     coefficients: Coefficients
@@ -314,16 +285,7 @@ class MagicFormula:
     def from_tir(cls, path: str | PathLike[str]) -> Self:
         """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).
 
-        Parameters
-        ----------
         path : the `.tir` file.
-
-        Raises
-        ------
-        TirError
-            Another model, missing essential coefficients, or an impossible value.
-        OSError
-            The file cannot be read.
         """
         c, side, valid_range, name = read_magic_formula(path)
         return cls(coefficients=c, side=side, valid_range=valid_range, name=name)
@@ -340,8 +302,6 @@ class MagicFormula:
 
         Outside `valid_range` the formula extrapolates: finite, but nobody measured it.
 
-        Parameters
-        ----------
         alpha : slip angle, paper's sign [rad]; beyond ±π/2 the wheel rolls backwards.
         gamma : camber [rad], > 0 leans the top to the right.
         mu : friction of the road over that of the measurement [-]; multiplies LMUX and LMUY.
@@ -373,14 +333,7 @@ class MagicFormula:
     def mounted(self, side: Literal["left", "right"]) -> Self:
         """The tire for that side: itself where it belongs there, else mirrored.
 
-        Parameters
-        ----------
         side : "left" or "right".
-
-        Raises
-        ------
-        ValueError
-            The side is neither.
         """
         _require_side(side)
         return self if side == self.side else self.mirrored()

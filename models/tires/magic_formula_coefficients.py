@@ -24,19 +24,11 @@ _POSITIVE_SCALES = ("LCX", "LMUX", "LKX", "LCY", "LMUY", "LKY")
 class Coefficients:
     """One tire, as its file has it.
 
-    Parameters
-    ----------
     FNOMIN : nominal wheel load [N], > 0.
     PCX1, PDX1, PKX1 : shape, friction, slip stiffness over load of F_x, > 0.
     PCY1, PDY1 : shape and friction of F_y, > 0.
     PKY1 : greatest cornering stiffness over FNOMIN [1/rad], < 0: ISO axes.
     PKY2 : load of the greatest cornering stiffness over FNOMIN, > 0.
-
-    Raises
-    ------
-    ValueError
-        A value is not finite, beyond what any tire has, or breaks the sign given here; the message
-        names it.
     """
 
     FNOMIN: float
@@ -136,8 +128,6 @@ class Coefficients:
     def load_increment(self, F_z: Expression) -> Expression:
         """df_z = (F_z - F_z0)/F_z0 with F_z0 = LFZO FNOMIN [-], (4.E2).
 
-        Parameters
-        ----------
         F_z : wheel load [N].
         """
         F_z0 = self.FNOMIN * self.LFZO

@@ -13,15 +13,8 @@ class LinearTire:
 
     Load only decides about contact; friction and camber do nothing: no limit, by definition.
 
-    Parameters
-    ----------
     C_alpha : cornering stiffness of one tire [N/rad], > 0.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0.
-
-    Raises
-    ------
-    ValueError
-        A stiffness is not positive and finite.
     """
 
     C_alpha: float
@@ -40,8 +33,6 @@ class LinearTire:
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
 
-        Parameters
-        ----------
         gamma : camber [rad]; without effect.
         mu : friction of the road over that of the measurement [-]; without effect.
         """
@@ -65,16 +56,9 @@ class LinearTire:
 class FialaTire:
     """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
 
-    Parameters
-    ----------
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
-
-    Raises
-    ------
-    ValueError
-        A parameter is not positive and finite.
     """
 
     C_alpha: float
@@ -96,8 +80,6 @@ class FialaTire:
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
 
-        Parameters
-        ----------
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
         """
@@ -124,16 +106,9 @@ class FialaTire:
 class DugoffTire:
     """Friction-limited linear tire: |F| < μ F_z, reached only in the limit; camber does nothing.
 
-    Parameters
-    ----------
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
-
-    Raises
-    ------
-    ValueError
-        A parameter is not positive and finite.
     """
 
     C_alpha: float
@@ -155,8 +130,6 @@ class DugoffTire:
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
 
-        Parameters
-        ----------
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
         """

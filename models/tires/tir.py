@@ -88,14 +88,7 @@ def _unit_in_si(dimension: str, unit: str) -> float:
     Case and a plural s do not matter; from five letters on the beginning of a name will do,
     because some programs cut names after twelve letters.
 
-    Parameters
-    ----------
     dimension : "LENGTH", "FORCE", "ANGLE", "MASS" or "TIME".
-
-    Raises
-    ------
-    ValueError
-        No such unit; the message lists the known ones.
     """
     known = UNITS[dimension]
     word = unit.strip().lower().replace(" ", "_").replace("-", "_")
@@ -139,8 +132,6 @@ class Entry(NamedTuple):
 class TirFile:
     """The entries of one file.
 
-    Parameters
-    ----------
     without_sign : lines that begin with a word but have no "=", by that word in capitals; their
         value is empty.
     """
@@ -155,29 +146,14 @@ class TirFile:
     def text(self, key: str, default: str) -> str:
         """The value as text.
 
-        Parameters
-        ----------
         default : the answer where the file has no such key, or an empty value.
-
-        Raises
-        ------
-        TirError
-            Two lines disagree, by more than the case of letters, or the "=" is missing.
         """
         return self._text(key, default, self.entries.get(key, ()), self.without_sign.get(key, ()))
 
     def number(self, key: str) -> float | None:
         """The value in SI; None where the file has no such key.
 
-        Parameters
-        ----------
         key : in capitals; those of `_DIMENSIONS` are converted from the units of the file.
-
-        Raises
-        ------
-        TirError
-            The value is no finite number, two lines disagree, the "=" is missing, or the unit is
-            unknown.
         """
         if key not in self.entries:
             self._require_sign(key, self.without_sign.get(key, ()))
@@ -238,16 +214,7 @@ class TirFile:
 def read_tir(path: str | PathLike[str]) -> TirFile:
     """Read a tire property file without judging what it describes.
 
-    Parameters
-    ----------
     path : the `.tir` file.
-
-    Raises
-    ------
-    TirError
-        It is no file, or too large.
-    OSError
-        The file cannot be read.
     """
     path = Path(path)
     entries: dict[str, list[Entry]] = {}
@@ -331,8 +298,6 @@ _SIGNED_AS_FRICTION = ("PDY1", "PDY2", "RVY1", "RVY2", "RVY3")
 class ValidRange:
     """What the tire was measured for, as (least, greatest); infinite where the file does not say.
 
-    Parameters
-    ----------
     alpha : slip angle, paper's sign [rad]; the file has the ISO sign, so its limits change places.
     kappa : longitudinal slip [-].
     gamma : camber [rad].
@@ -343,20 +308,6 @@ class ValidRange:
     kappa: tuple[float, float]
     gamma: tuple[float, float]
     F_z: tuple[float, float]
-
-    def covers(self, alpha: float, kappa: float, gamma: float, F_z: float) -> bool:
-        """Whether the formula interpolates there.
-
-        Parameters
-        ----------
-        alpha : slip angle, paper's sign [rad].
-        kappa : longitudinal slip [-].
-        gamma : camber [rad].
-        F_z : wheel load [N].
-        """
-        limits = (self.alpha, self.kappa, self.gamma, self.F_z)
-        values = (alpha, kappa, gamma, F_z)
-        return all(low <= x <= high for (low, high), x in zip(limits, values, strict=True))
 
 
 class _MagicFormulaFile(NamedTuple):
@@ -379,16 +330,7 @@ class _MagicFormulaFile(NamedTuple):
 def read_magic_formula(path: str | PathLike[str]) -> _MagicFormulaFile:
     """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.
 
-    Parameters
-    ----------
     path : the `.tir` file.
-
-    Raises
-    ------
-    TirError
-        Another model, missing essential coefficients (all are named), or an impossible value.
-    OSError
-        The file cannot be read.
     """
     tir = read_tir(path)
     _require_mf52(tir)

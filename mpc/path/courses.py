@@ -26,8 +26,6 @@ _SHORTEST_FREE = 1.0  # m, of a straight that closes a course
 class Straight:
     """A straight.
 
-    Parameters
-    ----------
     length : [m].
     """
 
@@ -54,8 +52,6 @@ class Straight:
 class Turn:
     """A turn at constant radius between two easings.
 
-    Parameters
-    ----------
     radius : of the constant part [m].
     angle : heading gained over all of it [rad], > 0 to the left.
     easing : length over which the curvature rises, and falls again [m].

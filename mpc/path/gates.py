@@ -35,8 +35,6 @@ _OPTIONS: dict[str, Any] = {
 class Gate:
     """A lane between two rows of cones, or beside one row where a side is infinite.
 
-    Parameters
-    ----------
     start : where it begins along x [m].
     end : where it ends [m].
     right : y of the right cones [m].

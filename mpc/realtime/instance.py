@@ -174,8 +174,6 @@ class NoCompilerError(TireidError, RuntimeError):
 class Instance:
     """State, parameters, input and work memory, which the C reads and writes in place.
 
-    Parameters
-    ----------
     horizon : number of stages.
     single : whether numbers are float.
     """

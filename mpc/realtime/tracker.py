@@ -23,8 +23,6 @@ class Tracker:
     The command of a step acts `delay` after its measurement, and is held for a period. What is
     steered is a ramp to the solver, so that it plans from half a period before.
 
-    Parameters
-    ----------
     problem : what to minimize; None takes the default.
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
@@ -39,13 +37,6 @@ class Tracker:
     caution : share of what is not known of the tires that is feared, from 0 to 1: see
         `mpc.realtime.caution`.
     clock : of the solve times [s].
-
-    Raises
-    ------
-    NoCompilerError
-        Where there is no C compiler.
-    CompilationError
-        Where the compiler refuses the code.
     """
 
     def __init__(

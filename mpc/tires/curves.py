@@ -35,8 +35,6 @@ class LimitedAxles(TireStructure):
 
     C [N/rad] and N = μ F_z [N] are of an axle.
 
-    Parameters
-    ----------
     fiala : Fiala's brush, full sliding from C |tan α| = 3 N on; else Dugoff's C tan α f(λ),
         f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1.
     """
@@ -76,8 +74,6 @@ class LaggedAxles(TireStructure):
     σ [m]: relaxation lengths. δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. The tracker
     reads the same sensors as the identifier did.
 
-    Parameters
-    ----------
     lagged : whether the slip lags; else σ does nothing.
     """
 

@@ -42,8 +42,6 @@ class LadderAxles(TireStructure):
     g: relative error of the steering. They were learnt as errors of sensors, and the tracker reads
     the same sensors.
 
-    Parameters
-    ----------
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
     pressed : whether the loads of the axles change with speed.
     mounted : whether v_y is off by more with speed, and the steering by more with its angle.

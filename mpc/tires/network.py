@@ -20,8 +20,6 @@ class NetworkAxles(SmallSlip):
 
     The force unit and the scales of the inputs are in the weights: they cost no operation.
 
-    Parameters
-    ----------
     hidden : number of hidden units n_h.
     inputs : signals of x̄, of `identifier.paper.network.SIGNALS`.
     """
@@ -85,8 +83,6 @@ def network_tire(model: NetworkModel) -> PredictionTire:
 class _OnnxAxles(SmallSlip):
     """Axle forces of a static network of signals; w: its constants, one after another.
 
-    Parameters
-    ----------
     inputs : signals that it reads, of `identifier.paper.network.SIGNALS`.
     slip_sign : 1 where it reads slip angles in the paper's sign, -1 for ISO 8855.
     """

@@ -11,6 +11,7 @@ from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import write_recording
 from models.vehicle import sedan
+from tireid.cli import main
 
 
 @pytest.fixture(scope="session")
@@ -52,3 +53,11 @@ def asked_once(diagnoses):
         for command in ("commands.doctor", "commands.identify", "learning"):
             patch.setattr(f"tireid.{command}.diagnose", answered)
         yield
+
+
+def refusal(capsys, words):
+    """The one line of an error of a command, after checking the exit code."""
+    capsys.readouterr()
+    assert main([str(word) for word in words]) == 2
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
+    return line

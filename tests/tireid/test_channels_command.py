@@ -191,27 +191,6 @@ def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, t
     assert summary["vehicle"]["mass"] == 1400.0
 
 
-def test_channels_of_several_rates_and_a_gap_are_read_from_one_table(log, tmp_path):
-    """A table at 100 Hz in which v_y has a cell in every fifth row, and two seconds are missing."""
-    rows = ["t,vx,vy,r,delta_f"]
-    for k in range(len(log)):
-        if 1000 <= k < 1200:
-            continue
-        vy = repr(float(log.v_y[k])) if k % 5 == 0 else ""
-        numbers = (log.v_x[k], log.r[k], log.delta_f[k])
-        vx, r, delta = (repr(float(x)) for x in numbers)
-        rows.append(f"{k / 100:.2f},{vx},{vy},{r},{delta}")
-    (tmp_path / "slow.csv").write_text("\n".join(rows) + "\n")
-    got = read_recording(tmp_path / "slow.csv")
-    assert len(got.stretches) == 2 and got.dt == 0.01
-    assert "2 stretches" in got.notes[-1]
-    at = np.round(got.t * 100).astype(int)
-    assert np.array_equal(got.r, log.r[at])
-    every = at % 5 == 0
-    assert np.array_equal(got.v_y[every], log.v_y[at][every])
-    assert np.std(got.v_y - log.v_y[at]) < 0.2 * np.std(log.v_y)
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [

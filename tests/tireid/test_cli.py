@@ -25,43 +25,12 @@ def test_wrong_words_are_one_line_with_exit_code_2(capsys, words):
     assert "error:" in said[0]
 
 
-def test_help_lists_the_commands(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["--help"])
-    assert stop.value.code == 0
-    said = capsys.readouterr().out
-    for command in ("demo", "paper", "identify", "check", "drive"):
-        assert command in said
-
-
 def test_without_a_word_it_tells_what_there_is(capsys):
     assert main([]) == 0
     alone = capsys.readouterr().out
     with pytest.raises(SystemExit):
         main(["--help"])
     assert alone == capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("words", "hint"),
-    [
-        (
-            ["identify", "log.csv", "--vehicle", "car.toml", "--law", "axle"],
-            "--law is --method now",
-        ),
-        (
-            ["fleet", "learn", "l.csv", "--vehicle", "c", "--out", "o", "--workers", "2"],
-            "--workers is --jobs now",
-        ),
-        (["check", "--figures", "out"], "--figures is --out now"),
-        (["drive", "--nonsense"], "see tireid --help"),
-    ],
-)
-def test_an_option_that_was_renamed_leads_to_its_new_name(words, hint, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(words)
-    assert stop.value.code == 2
-    assert hint in capsys.readouterr().err
 
 
 def helps(parser):

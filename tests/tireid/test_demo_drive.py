@@ -12,7 +12,7 @@ from tireid.animation import film as frames
 from tireid.animation.known import known_over_time
 from tireid.commands import demo_parts as demo_drive
 from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
-from tireid.commands.demo_story import FREEZE, run_story
+from tireid.commands.demo_story import run_story
 from tireid.report import Picture
 
 
@@ -76,18 +76,16 @@ def test_with_a_compiler_the_learnt_car_drives_both_roads(tmp_path, monkeypatch)
     """The drives themselves are left out: which they are, on which tires, into which folder."""
     asked = []
 
-    def written(folder, runs, *_, **__):
+    def written(folder, _, runs, *__):
         asked.append((folder.relative_to(tmp_path).as_posix(), runs))
 
-    learnt = SimpleNamespace(freeze=lambda t: f"frozen at {t:g} s")
     monkeypatch.setattr(demo_drive, "find_compiler", lambda: "cc")
     monkeypatch.setattr(demo_drive, "run_drive", lambda label, _, tires: (label, tires))
-    monkeypatch.setattr(demo_drive, "known_curves", lambda *_: {})
     monkeypatch.setattr(demo_drive, "inputs_of", lambda *_: {})
     monkeypatch.setattr(demo_drive, "write_drives", written)
-    told = SimpleNamespace(car=sedan(), axle=SimpleNamespace(learnt=learnt))
+    frozen = "frozen"
+    told = SimpleNamespace(car=sedan(), axle=SimpleNamespace(model=frozen))
     driven = drive_story(told, tmp_path)
-    frozen = f"frozen at {FREEZE:g} s"
     assert asked == [
         ("drive", [(label, frozen) for label in ("frozen", "linear", "oracle")]),
         ("drive_slippery", [(label, frozen) for label in ("learning", "frozen", "linear")]),

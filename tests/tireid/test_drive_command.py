@@ -14,9 +14,9 @@ from models.friction import Friction
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import CarSensors, cornering_limit
-from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
 from tests.pages import faults_of, outline
+from tests.tireid.conftest import refusal
 from tireid.animation import film
 from tireid.cli import main
 from tireid.commands.drive_results import steady_curve
@@ -52,15 +52,6 @@ def result(bend, tmp_path_factory):
 
 def summary_of(folder):
     return json.loads((folder / "summary.json").read_text())
-
-
-def refusal(capsys, words):
-    """The one line of an error, after checking the exit code."""
-    capsys.readouterr()
-    assert main(["drive", *(str(word) for word in words)]) == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
-    assert len(lines) == 1
-    return lines[0]
 
 
 def test_summary_has_the_documented_keys_and_the_numbers_of_the_csv(result):
@@ -212,24 +203,8 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
     ],
 )
 def test_wrong_words_are_one_clear_line_and_leave_nothing(bend, tmp_path, capsys, extra, said):
-    words = ["--path", bend, *extra, "--out", tmp_path / "out"]
+    words = ["drive", "--path", bend, *extra, "--out", tmp_path / "out"]
     assert said in refusal(capsys, words)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_car_without_a_chassis_is_refused(bend, tmp_path, capsys):
-    replace(sedan(), chassis=None).to_toml(tmp_path / "flat.toml")
-    words = ["--path", bend, "--vehicle", tmp_path / "flat.toml", "--out", tmp_path / "out"]
-    assert "chassis" in refusal(capsys, words)
-
-
-def test_without_a_compiler_it_says_what_is_missing(bend, tmp_path, capsys, monkeypatch):
-    def none(*_, **__):
-        raise NoCompilerError("no C compiler found: the tracker cannot be built")
-
-    monkeypatch.setattr(drive_runs, "Tracker", none)
-    words = ["--path", bend, "--tires", "linear", "--out", tmp_path / "out"]
-    assert "no C compiler found" in refusal(capsys, words)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -239,7 +214,7 @@ def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, 
 
     monkeypatch.setattr(drive_runs, "find_compiler", lambda: None)
     monkeypatch.setattr("tireid.commands.drive_case.learning_drive", learns)
-    words = ["--path", bend, "--out", tmp_path / "out"]
+    words = ["drive", "--path", bend, "--out", tmp_path / "out"]
     assert "no C compiler found: the tracker cannot be built" in refusal(capsys, words)
     assert list(tmp_path.iterdir()) == []
 
@@ -250,7 +225,15 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     tire = ti.identify(log, car).freeze()
     heavy = replace(tire, vehicle=replace(car, mass=1.1 * car.mass, name="heavy"))
     heavy.save(tmp_path / "heavy.json")
-    words = ["--path", bend, "--weights", tmp_path / "heavy.json", "--out", tmp_path / "out"]
+    words = [
+        "drive",
+        "--path",
+        bend,
+        "--weights",
+        tmp_path / "heavy.json",
+        "--out",
+        tmp_path / "out",
+    ]
     said = refusal(capsys, words)
     masses = f"(mass {1.1 * car.mass:.6g} there, {car.mass:.6g} here)"
     assert f"was learnt on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said
@@ -262,7 +245,7 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
 
 def test_a_car_without_chassis_leads_to_the_table(bend, tmp_path, capsys):
     assert main(["init", str(tmp_path / "car.toml")]) == 0
-    words = ["--path", bend, "--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
+    words = ["drive", "--path", bend, "--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
     said = refusal(capsys, words)
     assert "`tireid init car.toml` writes one" in said
     assert "docs/driving.md (The car that is driven)" in said

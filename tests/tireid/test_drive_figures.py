@@ -24,7 +24,7 @@ from tireid.figures.drive import (
     drive_solve_figure,
     drive_steering_figure,
 )
-from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
+from tireid.figures.tires import TireCurve, drive_tires_figure
 
 CAR = sedan()
 SPEED, PERIOD = 16.0, 0.02
@@ -160,15 +160,6 @@ def test_the_limit_and_the_end_of_the_path_are_drawn_where_they_matter():
     gentle = {"frozen": ON_LANE["frozen"]}
     texts = drive_errors_figure(gentle, off_path=2.0).legends[0].get_texts()
     assert [text.get_text() for text in texts] == ["frozen"]
-
-
-def test_slip_has_the_sign_of_the_force():
-    drive = ON_LANE["frozen"]
-    slip = axle_slip(drive)
-    front = drive.delta - np.arctan2(CAR.l_f * drive.r, drive.v_x)
-    np.testing.assert_allclose(slip[:, 0], front)
-    turning = np.abs(drive.r) > 0.05
-    assert (slip[turning, 1] * drive.axle_force[turning, 1] > 0.0).all()
 
 
 def test_a_car_turned_left_has_its_nose_up_and_its_wheels_turned_further():

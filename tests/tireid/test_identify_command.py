@@ -18,6 +18,7 @@ from identifier.tire_model import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
+from tests.tireid.conftest import refusal
 from tireid.cli import main
 
 METHOD_FILES = {  # figures and tables that belong to a method, and the columns of weights.csv
@@ -49,15 +50,6 @@ def result(ended):
     return ended[0]
 
 
-def refusal(capsys, words):
-    """The one line of an error, after checking the exit code."""
-    capsys.readouterr()
-    assert main([str(word) for word in words]) == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
-    assert len(lines) == 1
-    return lines[0]
-
-
 def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     summary = json.loads((result / "summary.json").read_text())
     assert set(summary["rms_force_N"]) == {"slalom", "quick"}
@@ -85,8 +77,9 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     assert summary["rms_force_N"]["quick"] == pytest.approx({"front": rms[0], "rear": rms[1]})
 
 
-def test_the_summary_has_the_paper_s_measure_of_the_drive_that_was_learnt(result, law):
+def test_the_summary_has_the_paper_s_measure_of_the_drive_that_was_learnt(ended, law):
     """The past, t < T_freeze, against the online output: from the curves that lie beside it."""
+    result, printed = ended
     sides = json.loads((result / "summary.json").read_text())["rmse_N"]["reproducibility"]
     assert {t: set(by_name) for t, by_name in sides.items()} == {"4": {"slalom"}, "8": {"slalom"}}
     if law == "fit":
@@ -105,21 +98,10 @@ def test_the_summary_has_the_paper_s_measure_of_the_drive_that_was_learnt(result
         ):
             rms = np.sqrt(np.mean(missed**2))
             assert sides["4"]["slalom"][key][axle] == pytest.approx(rms, rel=1e-6), key
-
-
-def test_the_table_says_the_paper_s_measure_below_the_drive_that_was_learnt(
-    logs, tmp_path, capsys, undrawn
-):
-    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
-    words += ["--replay", str(logs / "quick.csv"), "--freeze", "4", "--out", str(tmp_path / "out")]
-    words += ["--method", "axle"]
-    assert main(words) == 0
-    lines = capsys.readouterr().out.splitlines()
-    (own,) = (k for k, line in enumerate(lines) if "its past, against online" in line)
-    assert "slalom" in lines[own - 1]  # and none below the drive that was not learnt
-    sides = json.loads((tmp_path / "out" / "summary.json").read_text())["rmse_N"]["reproducibility"]
-    front = sides["4"]["slalom"]["past_against_online"]["front"]
-    assert f"{front:.4g} N" in lines[own]
+    lines = printed.splitlines()
+    own = [k for k, line in enumerate(lines) if "its past, against online" in line]
+    assert [lines[k - 1].split()[2] for k in own] == ["slalom"] * 2  # none below another drive
+    assert f"{sides['4']['slalom']['past_against_online']['front']:.4g} N" in lines[own[0]]
 
 
 def test_a_fit_of_a_whole_log_says_nothing_of_online_learning(ended, law):
@@ -137,7 +119,8 @@ def test_a_fit_of_a_whole_log_says_nothing_of_online_learning(ended, law):
 
 def test_every_curve_is_also_data(result, law):
     files, columns = METHOD_FILES[law]
-    for name in (*files, "forces_quick.csv", "weights_4s.json"):
+    drawn = ("forces.png", "slip.png", "inputs.png", "replay_quick.png")
+    for name in (*files, *drawn, "forces_quick.csv", "weights_4s.json"):
         assert (result / name).is_file()
     forces = np.genfromtxt(result / "forces.csv", delimiter=",", names=True)
     assert "Fyr_frozen_4s_N" in forces.dtype.names
@@ -216,13 +199,6 @@ def test_weights_of_a_row_are_those_in_effect_at_that_sample(result, law):
     np.testing.assert_allclose(written, W, rtol=1e-7, atol=1e-9)
     ahead = told[np.argmin(np.abs(told["t_s"] - 4.0)) + 1]
     assert any(abs(row[name] - ahead[name]) > 1e-6 for name in told.dtype.names if name != "t_s")
-
-
-def test_the_vehicle_is_written_in_the_same_words_everywhere(result):
-    summary = json.loads((result / "summary.json").read_text())
-    weights = json.loads((result / "weights.json").read_text())
-    assert summary["vehicle"].items() <= weights["vehicle"].items()  # a fit keeps the chassis' too
-    assert {"name", "mass", "yaw_inertia", "cornering_stiffness_rear"} <= summary["vehicle"].keys()
 
 
 def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
@@ -311,18 +287,6 @@ def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
         assert model.band_origin in page
 
 
-def test_figures_are_written(result):
-    for name in ("forces", "slip", "inputs", "replay_quick"):
-        assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_nothing_is_overwritten_unasked(result, logs, capsys):
-    words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", "--out", result]
-    before = (result / "summary.json").read_bytes()
-    assert "is not empty" in refusal(capsys, words)
-    assert (result / "summary.json").read_bytes() == before
-
-
 def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path, laid_out):
     lines = (logs / "slalom.csv").read_text().splitlines()
     header = lines[0].split(",")
@@ -388,14 +352,6 @@ def test_samples_at_rest_count_nowhere(logs, tmp_path, capsys, laid_out):
     assert size == pytest.approx({"front": rms[0], "rear": rms[1]}, rel=1e-6)
     (frozen,) = summary["rmse_N"]["frozen"].values()
     assert f"{100 * frozen['halt']['front'] / rms[0]:.0f} %" in printed
-
-
-def test_a_car_that_never_drives_is_refused(logs, tmp_path, capsys):
-    log = rewritten(logs / "slalom.csv", tmp_path / "still.csv", lambda row: row.update(vx="0.1"))
-    words = ["identify", log, "--vehicle", logs / "car.toml", "--no-check"]
-    line = refusal(capsys, [*words, "--out", tmp_path / "out"])
-    assert "still: v_x never reaches 1.0" in line
-    assert not (tmp_path / "out").exists()
 
 
 def written_design(path, **changes):
@@ -480,19 +436,6 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(logs, tmp_path, capsys
     words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", *extra, "--out", out]
     assert said in refusal(capsys, words)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
-    lines = [line.split(",") for line in (logs / "slalom.csv").read_text().splitlines()]
-    k = lines[0].index("r")
-    for row in lines[1:]:
-        row[k] = str(np.degrees(float(row[k])))
-    log = tmp_path / "degrees.csv"
-    log.write_text("\n".join(",".join(row) for row in lines))
-    words = ["identify", log, "--vehicle", logs / "car.toml", "--out", tmp_path / "out"]
-    line = refusal(capsys, words)
-    assert "degrees.csv: r " in line
-    assert not (tmp_path / "out").exists()
 
 
 def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsys, unmade):

@@ -106,34 +106,20 @@ def drive():
 
 def test_what_a_run_recorded_is_drawn_with_its_peaks(drive, monkeypatch):
     history = identify(drive, sedan(), AxleIdentifier.for_vehicle(sedan()), check=False).history
-    ends = (0.0, float(drive.t[-1]))
 
     def tell(block):
         return [track.values for track in history.tracks_over(block)]
 
-    _, whole = shown_of_run(history, ends, tell)
+    _, whole = shown_of_run(history, tell)
     for module in (arrays, thinned):
         monkeypatch.setattr(module, "LONG", 500)
     monkeypatch.setattr(arrays, "BLOCK", 170)
     monkeypatch.setattr(thinned, "COLUMNS", 30)
-    t, some = shown_of_run(history, ends, tell)
+    t, some = shown_of_run(history, tell)
     assert (np.diff(t) > 0.0).all()
     assert t.size < 0.5 * len(drive)
     for one, all_of_it in zip(some, whole, strict=True):
         assert (one.max(), one.min()) == (all_of_it.max(), all_of_it.min())
-
-
-def test_a_window_of_a_long_run_is_drawn_as_finely_as_it_is_long(drive, monkeypatch):
-    for module in (arrays, thinned):
-        monkeypatch.setattr(module, "LONG", 500)
-    monkeypatch.setattr(arrays, "BLOCK", 170)
-    history = identify(drive, sedan(), AxleIdentifier.for_vehicle(sedan()), check=False).history
-
-    def tell(block):
-        return [track.values for track in history.tracks_over(block)]
-
-    t, _ = shown_of_run(history, (10.0, 14.0), tell)  # blocks before and after hold nothing of it
-    np.testing.assert_allclose(t, np.arange(1000, 1401) * 0.01)
 
 
 def test_curves_in_parts_are_the_bytes_of_one_table(tmp_path, rng):

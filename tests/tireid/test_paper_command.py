@@ -73,23 +73,6 @@ def test_by_the_paper_s_measure_the_slalom_keeps_its_pattern_and_the_step_steer_
     assert np.all(step["integral"] > 1.2 * step["instantaneous"])
 
 
-def test_the_reversal_is_an_error_of_the_online_output_not_of_the_frozen_weights(study):
-    """Against truth the same past has the order of the slalom: what was said online was wrong."""
-    past = medians(study, "step_steer", "past_against_truth")
-    assert np.all(past["instantaneous"] > 1.5 * past["integral"])
-    recording = study.recordings["step_steer"]
-    for t_freeze in FREEZES["step_steer"]:
-        counted = (recording.t >= 29.0) & (recording.t < t_freeze)
-        for seed in range(5):
-            history = run_trial(recording, "step_steer", paper_design("integral", seed)).history
-            frozen = history.freeze(t_freeze).axle_force(recording)
-            online, own = (
-                np.sqrt(np.mean((force - recording.axle_force)[counted] ** 2))
-                for force in (history.axle_force, frozen)
-            )
-            assert online > 1.8 * own
-
-
 def test_after_36_s_every_law_misses_more_than_the_linear_tire_it_corrects(study):
     """Half the angle was not learnt: as in the paper, no law predicts outside of what it saw."""
     recording, car = study.recordings["step_steer"], sedan()
@@ -122,12 +105,6 @@ def test_another_angle_is_the_only_new_question_that_a_second_step_can_ask():
     force = model.axle_force(recording)
     np.testing.assert_array_equal(model.axle_force(mirrored), -force)
     assert np.abs(force[recording.t < 28.0]).max() < 1.0  # N
-
-
-def test_no_seed_runs_wild_on_either_maneuver(study):
-    for by_law in study.errors.values():
-        for seeds in by_law.values():
-            assert max(errors["online"] for errors in seeds) < 1.0  # kN
 
 
 def test_the_gains_are_those_that_the_search_prints():

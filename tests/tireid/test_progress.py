@@ -110,20 +110,6 @@ def test_parts_count_by_how_long_they_last(clock, monkeypatch):
     ]
 
 
-def test_steps_of_different_lengths_are_told_in_words(clock, monkeypatch):
-    err, _ = stream(monkeypatch, io.StringIO)
-    with progress.Progress("work") as work:
-        told = work.along([1.0, 3.0])
-        for text, lasts in (("short", 10.0), ("long", 30.0), ("one more", 10.0)):
-            clock[0] += lasts
-            told(text)
-    assert err.getvalue().splitlines() == [
-        "  work: short, 25 %, 30 s left",
-        "  work: long, 100 %, 0 s left",
-        "  work: one more, 100 %, 0 s left",
-    ]
-
-
 def test_what_a_file_is_called_neither_commands_the_terminal_nor_breaks_the_line(
     clock, monkeypatch
 ):

@@ -34,13 +34,6 @@ class _View(NamedTuple):
         seen: Array = (places - self.center) @ np.array([[c, -s], [s, c]])
         return seen
 
-    def turn(self, directions: Array) -> Array:
-        """Return directions on the ground as directions in the picture.
-
-        directions : (..., 2).
-        """
-        return _View(np.zeros(2), self.angle).see(directions)
-
 
 class Instant(NamedTuple):
     """What a frame shows: sample k of the first drive, its time [s], and the view of it."""
@@ -97,8 +90,6 @@ SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
 class Ground:
     """The upper part of the picture.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     """
@@ -116,47 +107,32 @@ class Ground:
         axes.add_collection(self._grid)
         (self._line,) = axes.plot([], [], zorder=_BELOW, **PATH)
         (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
-        self._drops = [
-            (_across(path, s), axes.plot([], [], label=friction_label(mu), **DROP)[0])
-            for s, mu in drops
-        ]
+        across = [(_across(path, s), {**DROP, "label": friction_label(mu)}) for s, mu in drops]
+        self._drops = [(ends, axes.plot([], [], **look)[0]) for ends, look in across]
         self._tracks, self._bodies, self._wheels = [], [], []
         for number, label in enumerate(drives):
             color = tire_look(label)["color"]
             order = CAR if number == 0 else _GHOST - 0.1 * number
-            (track,) = axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, zorder=order)
-            body = PolyCollection(
-                [],
-                facecolors=[(color, 0.5), (color, 0.95)] if number == 0 else [(color, 0.12)],
-                edgecolors=color,
-                linewidths=1.2,
-                zorder=order + 0.04,
-            )
+            self._tracks += axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, zorder=order)
+            faces = [(color, 0.5), (color, 0.95)] if number == 0 else [(color, 0.12)]
+            edge: Mapping[str, Any] = {"edgecolors": color, "linewidths": 1.2}
+            body = PolyCollection([], facecolors=faces, zorder=order + 0.04, **edge)
             over = order + (0.02 if number == 0 else 0.06)
             wheels = PolyCollection([], facecolors="#222222", edgecolors="none", zorder=over)
-            for collection in (body, wheels):
-                axes.add_collection(collection)
-            self._tracks.append(track)
-            self._bodies.append(body)
-            self._wheels.append(wheels)
-        (self._plan,) = axes.plot(
-            [], [], color=PLAN, linewidth=1.3, marker="o", markersize=2.2, zorder=_ABOVE
-        )
+            self._bodies.append(axes.add_collection(body))
+            self._wheels.append(axes.add_collection(wheels))
+        look: Mapping[str, Any] = {"color": PLAN, "linewidth": 1.3, "marker": "o", "ms": 2.2}
+        (self._plan,) = axes.plot([], [], zorder=_ABOVE, **look)
         self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=_ABOVE + 1)
         axes.add_collection(self._forces)
         self._names = ["path", "plan", *drives]
 
     def legend(self) -> tuple[list[Artist], list[str]]:
         """Return what a legend shows, and what it says of it."""
-        marks: list[Artist] = [self._line, self._plan, *self._tracks]
-        names = list(self._names)
-        if len(self._path.cones):
-            marks.append(self._cones)
-            names.append("cones")
-        for _, line in self._drops:
-            marks.append(line)
-            names.append(str(line.get_label()))
-        return [*marks, self._forces], [*names, "forces"]
+        more = [self._cones] * bool(len(self._path.cones)) + [line for _, line in self._drops]
+        names = [*self._names, *(str(line.get_label()) for line in more)]
+        marks = [self._line, self._plan, *self._tracks, *more, self._forces]
+        return marks, [*names, "forces"]
 
     def show(self, now: Instant) -> None:
         """Move everything to where it is."""
@@ -185,10 +161,8 @@ class Ground:
         self._tracks[number].set_data(*view.see(places).T)
         pose = (float(values[k]) for values in (drive.X, drive.Y, drive.psi, drive.delta))
         shape = car_shape(drive.vehicle, *pose)
-        body = [view.see(shape.body), view.see(shape.glass)] if number == 0 else [
-            view.see(shape.body)
-        ]  # fmt: skip
-        self._bodies[number].set_verts(body)
+        body = [shape.body, shape.glass] if number == 0 else [shape.body]
+        self._bodies[number].set_verts([view.see(one) for one in body])
         self._wheels[number].set_verts(list(view.see(shape.wheels)))
 
     def _arrows(self, drive: Drive, k: int, view: _View) -> list[Array]:
@@ -231,8 +205,5 @@ def _across(path: Path, s: float) -> Array:
 
 
 def sample_at(drive: Drive, t: float) -> int:
-    """Return the sample of a drive at a time, or its last one.
-
-    t : time [s].
-    """
+    """Return the sample of a drive at a time [s], or its last one."""
     return min(int(np.searchsorted(drive.t, t)), drive.t.size - 1)

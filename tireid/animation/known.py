@@ -19,8 +19,6 @@ POINTS = 281
 class Curves:
     """Steady axle forces over slip of all tires that have one structure, at one speed.
 
-    Parameters
-    ----------
     v_x : speed [m/s], which a network may look at.
     """
 

@@ -44,8 +44,6 @@ LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "learnt by
 class _ForcePanel:
     """Force of an axle over its slip: the curves as they were known then, and where the tire is.
 
-    Parameters
-    ----------
     axle : 0 is the front axle, 1 the rear.
     known : what was known over time; None where nothing was learnt, so that nothing changes.
     drop : arc length [m] from which the true tire is that of the end; infinite for never.
@@ -72,12 +70,8 @@ class _ForcePanel:
         for curve in curves:
             if curve.label.endswith(AT_THE_END) and not curve.label.startswith(ORACLE):
                 continue  # what was known only then
-            (line,) = axes.plot(
-                np.rad2deg(curve.alpha),
-                self._drawn(curve.force),
-                label=curve.label,
-                **tire_look(curve.label.removesuffix(AT_THE_END)),
-            )
+            look = {**tire_look(curve.label.removesuffix(AT_THE_END)), "label": curve.label}
+            (line,) = axes.plot(np.rad2deg(curve.alpha), self._drawn(curve.force), **look)
             if curve.label.startswith(ORACLE):
                 self._true[curve.label.endswith(AT_THE_END)] = line
         self._moving: list[Any] = []
@@ -85,20 +79,15 @@ class _ForcePanel:
         if known is not None:
             self._moving = [axes.plot([], [], **look)[0] for look in (LEARNT, STEERING)]
             shade: dict[str, Any] = {"facecolor": "#EFE9DD", "edgecolor": "none", "zorder": 0}
-            place = axes.get_xaxis_transform()
-            self._shades = [
-                Rectangle((0.0, 0.0), 0.0, 1.0, transform=place, **shade) for _ in range(2)
-            ]
-            for patch in self._shades:
-                axes.add_patch(patch)
+            shade["transform"] = axes.get_xaxis_transform()
+            empty = (Rectangle((0.0, 0.0), 0.0, 1.0, **shade) for _ in range(2))
+            self._shades = [axes.add_patch(patch) for patch in empty]
         axes.set(xlim=(-self._reach, self._reach), ylim=self._limits)
-        axes.set_title(AXLES[axle], fontsize=SMALL + 0.5)
-        axes.set_xlabel("slip [deg]", fontsize=SMALL, labelpad=1.0)
         if axle == 0:
             axes.set_ylabel(f"force [{self._unit.name}]", fontsize=SMALL, labelpad=1.0)
         else:
             axes.tick_params(labelleft=False)
-        _small(axes)
+        _small(axes, AXLES[axle], "slip [deg]")
         (self._tail,) = axes.plot([], [], color=PURPLE, linewidth=1.0, alpha=0.6)
         (self._now,) = axes.plot([], [], marker="o", markersize=5.0, color=PURPLE, linestyle="")
 
@@ -143,8 +132,6 @@ class _ForcePanel:
 class _DeviationPanel:
     """Deviation over arc length: faint as a whole, strong up to now.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     """
@@ -163,12 +150,9 @@ class _DeviationPanel:
         reach = min(max(largest, 0.05), 2.5)
         axes.axhline(0.0, color="#999999", linewidth=0.6)
         mark_drops(axes, drops)
-        axes.set(
-            xlim=(0.0, max(float(drive.s[-1]) for drive in self._drives)), ylim=(-reach, reach)
-        )
-        axes.set_title("Deviation from the path [m]", fontsize=SMALL + 0.5)
-        axes.set_xlabel("arc length [m]", fontsize=SMALL, labelpad=1.0)
-        _small(axes)
+        last = max(float(drive.s[-1]) for drive in self._drives)
+        axes.set(xlim=(0.0, last), ylim=(-reach, reach))
+        _small(axes, "Deviation from the path [m]", "arc length [m]")
 
     def show(self, now: Instant) -> None:
         """Move everything to where it is."""
@@ -180,8 +164,6 @@ class _DeviationPanel:
 class _Overview:
     """A closed course as a whole, and where the cars are.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     """
 
@@ -189,16 +171,11 @@ class _Overview:
         self._drives = list(drives.values())
         path = self._drives[0].path
         axes.plot(path.X, path.Y, color=GREEN, linewidth=0.9)
-        axes.set(xticks=[], yticks=[], aspect="equal")
-        for side in axes.spines.values():
-            side.set_visible(False)
+        axes.set(aspect="equal")
+        axes.set_axis_off()
         axes.margins(0.08)
-        self._dots = [
-            axes.plot(
-                [], [], marker="o", markersize=4.0, linestyle="", color=tire_look(label)["color"]
-            )[0]
-            for label in drives
-        ]
+        colors = [tire_look(label)["color"] for label in drives]
+        self._dots = [axes.plot([], [], "o", ms=4.0, color=color)[0] for color in colors]
 
     def show(self, now: Instant) -> None:
         """Move everything to where it is."""
@@ -207,12 +184,9 @@ class _Overview:
             dot.set_data([drive.X[k]], [drive.Y[k]])
 
 
-def _columns(entries: int) -> int:
-    """Return how wide a legend is that has one row, or two of one width."""
-    return entries if entries < MANY else (entries + 1) // 2
-
-
-def _small(axes: Axes) -> None:
+def _small(axes: Axes, title: str, label: str) -> None:
+    axes.set_title(title, fontsize=SMALL + 0.5)
+    axes.set_xlabel(label, fontsize=SMALL, labelpad=1.0)
     axes.tick_params(labelsize=SMALL - 0.5, pad=1.5)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
@@ -225,8 +199,6 @@ BEHIND, _AHEAD = 12.0, 36.0  # what is shown along the path [m]
 class Scene:
     """The stage on which a drive is shown.
 
-    Parameters
-    ----------
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     known : of the tires while the first drove; None where nothing was learnt.
@@ -255,36 +227,29 @@ class Scene:
             half = 0.5 * (BEHIND + _AHEAD) * box[3] * height / width
             ground.set(xlim=(-BEHIND, _AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
             self._parts: list[Any] = [Ground(ground, drives, drops)]
+            add = self.figure.add_axes
             if path.closed:
-                self._parts.append(_Overview(self._axes((0.86, 0.69, 0.135, 0.235)), drives))
-            left = self._axes((0.075, 0.11, 0.19, 0.2)), self._axes((0.3, 0.11, 0.19, 0.2))
+                self._parts.append(_Overview(add((0.86, 0.69, 0.135, 0.235)), drives))
             drop = drops[-1][0] if drops else np.inf
-            for axle, axes in enumerate(left):
+            for axle, x in enumerate((0.075, 0.3)):
+                axes = add((x, 0.11, 0.19, 0.2))
                 forces = _ForcePanel(axes, first, curves, axle, known=known, drop=drop)
                 self._parts.append(forces)
             (marks, names), (more, said) = self._parts[0].legend(), forces.legend()
-            self._parts.append(_DeviationPanel(self._axes((0.585, 0.11, 0.39, 0.2)), drives, drops))
+            self._parts.append(_DeviationPanel(add((0.585, 0.11, 0.39, 0.2)), drives, drops))
             self.figure.text(0.012, 0.955, mathtext(title), fontsize=9.0, fontweight="bold")
-            self.figure.legend(
-                [*marks, *more],
-                [*names, *said],
-                loc="center",
-                bbox_to_anchor=(0.5, 0.388),
-                ncols=_columns(len(names) + len(said)),
-                fontsize=7.0,
-                handlelength=1.5,
-                handletextpad=0.5,
-                columnspacing=1.1,
-            )
-            self._says = self.figure.text(
-                0.988, 0.955, "", ha="right", family="DejaVu Sans Mono", fontsize=7.5
-            )
+            entries = len(names) + len(said)
+            look: Mapping[str, Any] = {
+                **{"fontsize": 7.0, "handlelength": 1.5, "handletextpad": 0.5},
+                **{"columnspacing": 1.1, "loc": "center", "bbox_to_anchor": (0.5, 0.388)},
+                "ncols": entries if entries < MANY else (entries + 1) // 2,
+            }
+            self.figure.legend([*marks, *more], [*names, *said], **look)
+            mono: Mapping[str, Any] = {"family": "DejaVu Sans Mono", "fontsize": 7.5}
+            self._says = self.figure.text(0.988, 0.955, "", ha="right", **mono)
 
     def show(self, t: float) -> None:
-        """Move the picture to an instant.
-
-        t : time [s].
-        """
+        """Move the picture to an instant [s]."""
         drive = self._drive
         k = sample_at(drive, t)
         now = Instant(k, float(drive.t[k]), self._camera.at(float(drive.s[k])))
@@ -295,6 +260,3 @@ class Scene:
             f"{t:5.1f} s  {drive.v_x[k]:4.1f} m/s  a_y {drive.a_y[k]:+5.1f} m/s²  "
             f"e_y {drive.e_y[k]:+5.2f} m{pace}"
         )
-
-    def _axes(self, box: tuple[float, float, float, float]) -> Axes:
-        return self.figure.add_axes(box)

@@ -14,14 +14,14 @@ from models.files import write_atomically
 from models.logs.clock import holes
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, told_by
+from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, told_by
 from models.logs.units import SI, is_told
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.options import add_force, add_log_map, told_map
+from tireid.commands.options import add_force, add_log_map, require_toml, told_map
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
@@ -52,8 +52,7 @@ def run(options: argparse.Namespace) -> int:
     path, named = split_log_argument(options.log)
     told = told_map(options)
     if options.write is not None:
-        if options.write.suffix.lower() != ".toml":
-            raise ValueError(f"{options.write}: the name must end in .toml")
+        require_toml(options.write)
         require_free(options.write, force=options.force)
     log = told.opened(path)
     chosen = _run_of(log, options.run_name or named or told.run)
@@ -108,7 +107,8 @@ def _wheels(
         try:
             scales = wheel_scales(log, signals, told, run)
         except RecordingError as error:
-            return f"of the wheels nothing is learnt: {error}", _without_wheels(plain), True
+            kept = replace(plain, signals={n: one for n, one in signals.items() if n not in WHEELS})
+            return f"of the wheels nothing is learnt: {error}", kept, True
         wheels, scaled = with_scales(told.wheels, signals, scales)
         return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
     try:
@@ -117,11 +117,6 @@ def _wheels(
     except RecordingError as error:
         return str(error), plain, False
     return "vx is made of the wheels", plain, True
-
-
-def _without_wheels(told: LogMap) -> LogMap:
-    kept = {name: one for name, one in told.signals.items() if not choice.has_wheels((name,))}
-    return replace(told, signals=kept)
 
 
 def _head(log: LogFile, run: str | None) -> list[str]:

@@ -4,7 +4,6 @@ import argparse
 import json
 import math
 import shlex
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -23,7 +22,7 @@ from identifier.paper.design import (
     with_keeping,
 )
 from identifier.paper.laws import LAWS, Gains
-from identifier.run import identify
+from identifier.run import History, identify
 from identifier.stability import Certificate, DesignError, Operation
 from identifier.stability.along import strongest_along
 from identifier.stability.certificate import judged_loop
@@ -31,7 +30,6 @@ from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import proven_bounds
 from models.files import write_atomically
-from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands import options as shared
@@ -42,11 +40,10 @@ from tireid.commands.certificate_table import (
 )
 from tireid.commands.demo_story import drive_to_learn
 from tireid.figures.paper import error_figure, locus_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import paper_design, save_figures
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
 
-FIGURES = ("locus.png", "bounds.png")
 BOUNDS = {
     "error_bound": "proven bound, leakage",
     "projection_bound": "proven bound, projection",
@@ -56,35 +53,24 @@ BOUNDS = {
 
 
 def draw_check(
-    folder: Path,
-    recording: Recording,
-    vehicle: Vehicle,
-    design: PaperIdentifier,
-    operation: Operation,
-    certificate: Certificate,
-) -> list[Path]:
-    """Draw locus.png and bounds.png; return their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
+    folder: Path, history: History, operation: Operation, certificate: Certificate
+) -> None:
+    """Draw locus.png and bounds.png of a run of the paper's identifier."""
+    design = paper_design(history)
     chosen = LAWS[design.law]
     law = chosen.error(design.gains.lead)
     D = direction_matrix(chosen, design.gains.matrix)
     kept = proven_bounds(design.gains, law, operation, D).W
     _, loop, _ = judged_loop(design.gains, law, operation, D, kept)
-    history = identify(recording, vehicle, design)
-    figures = (
-        locus_figure(loop, integrator=design.integrator, dt=design.dt),
-        error_figure(history, _error_bounds(certificate)),
-    )
-    paths = [folder / name for name in FIGURES]
-    for path, figure in zip(paths, figures, strict=True):
-        save_figure(figure, path)
-    return paths
+    figures = {
+        "locus": locus_figure(loop, integrator=design.integrator, dt=design.dt),
+        "bounds": error_figure(history, _error_bounds(certificate)),
+    }
+    save_figures(folder, figures)
 
 
 def _error_bounds(certificate: Certificate) -> dict[str, float]:
-    """Return the bounds of the error norm that a certificate holds, by the name in a legend [U
-    s].
-    """
+    """Return the bounds of the error norm [U s] in a certificate, by the name in a legend."""
     known = {entry.name: entry.value for entry in certificate.properties}
     return {title: known[name] for name, title in BOUNDS.items() if name in known}
 
@@ -118,32 +104,29 @@ def add_parser(commands: Any) -> None:
     )
     shared.add_vehicle(parser)
     shared.add_method(parser, LIVE)
-    parser.add_argument(
-        "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
-    )
-    parser.add_argument("--speed", type=float, metavar="M/S", help="(4 sqrt(g wheelbase))")
-    parser.add_argument("--slip", type=float, metavar="RAD", help="largest (twice sliding)")
-    parser.add_argument("--friction", type=float, metavar="MU", help="of the road (1)")
-    for signal, unit in (("v-x", "M/S"), ("v-y", "M/S"), ("r", "RAD/S"), ("delta", "RAD")):
-        parser.add_argument(
-            f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
-        )
+    numbers = {
+        "--bandwidth HZ": f"of the steering ({BANDWIDTH:g} Hz)",
+        "--speed M/S": "(4 sqrt(g wheelbase))",
+        "--slip RAD": "largest (twice sliding)",
+        "--friction MU": "of the road (1)",
+        "--noise-v-x M/S": "largest error of v-x",
+        "--noise-v-y M/S": "largest error of v-y",
+        "--noise-r RAD/S": "largest error of r",
+        "--noise-delta RAD": "largest error of delta",
+        "--phase-margin DEG": f"for --tune ({PHASE_MARGIN:g} deg)",
+    }
+    shared.add_options(parser, float, numbers)
     parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
     shared.add_log_map(parser)
-    parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
-    parser.add_argument(
-        "--tune", type=Path, metavar="FILE", help="find gains and write them, for --design FILE"
-    )
-    parser.add_argument(
-        "--phase-margin", type=float, metavar="DEG", help=f"for --tune ({PHASE_MARGIN:g} deg)"
-    )
-    parser.add_argument(
-        "--keep",
-        choices=KEEPINGS,
-        help="for --tune: what keeps the weights over hours, the paper's leakage (which forgets "
+    shared.add_options(parser, bool, {"--json": "print the certificate as JSON"})
+    text = "find gains and write them, for --design FILE"
+    shared.add_options(parser, Path, {"--tune FILE": text})
+    text = (
+        "for --tune: what keeps the weights over hours, the paper's leakage (which forgets "
         "them), a leakage with a dead zone, or a projection in its place "
-        f"({DEFAULT_KEEPING})",
+        f"({DEFAULT_KEEPING})"
     )
+    parser.add_argument("--keep", choices=KEEPINGS, help=text)
     shared.add_output(parser, None)
     parser.set_defaults(run=run)
 
@@ -151,47 +134,53 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 0, or 1 where the design fails."""
     _require_sense(options)
-    _require_drive(options)
     vehicle = shared.read_vehicle(options)
     name, method = _method(options, vehicle)
-    if isinstance(method, PaperIdentifier):
-        return _judge_gains(options, vehicle, method)
-    _refuse_gains(options, name)
-    driving = replace(natural_driving(vehicle), **_overrides(options))
+    paper = method if isinstance(method, PaperIdentifier) else None
+    if paper is None:
+        _refuse_gains(options, name)
+    declared = None if paper is None else paper.driving
+    driving = replace(declared or natural_driving(vehicle), **_overrides(options))
+    if paper is not None and options.design is None:
+        method = paper = replace(paper, driving=driving)
     certificate = certify(method, vehicle, driving)
+    history = None
     if options.along is not None:
         drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=method.dt)
-        along = method.certify_along(identify(drive, vehicle, method))
-        if not along.properties:
-            raise ValueError(f"--along: nothing is proven of {name} along a drive")
-        certificate = replace(certificate, properties=certificate.properties + along.properties)
-    text = method_text(name, certificate, vehicle, driving)
+        history = identify(drive, vehicle, method)
+    if options.tune is not None:
+        require_free(options.tune, force=options.force)
+    if paper is not None:
+        text = _gains_text(options, paper, vehicle, driving, certificate, history)
+    else:
+        if history is not None:
+            along = method.certify_along(history).properties
+            if not along:
+                raise ValueError(f"--along: nothing is proven of {name} along a drive")
+            certificate = replace(certificate, properties=certificate.properties + along)
+        text = method_text(name, certificate, vehicle, driving)
+    conditions = asdict(driving)
     numbers = {
         "method": name,
-        "conditions": {field: getattr(driving, field) for field in _OF_ALL},
+        "conditions": {one: conditions[one] for one in (conditions if paper else _OF_ALL)},
         **certificate.to_dict(),
         "vehicle": vehicle_numbers(vehicle),
     }
-    if options.out is not None:
-        with output_folder(options.out, force=options.force) as folder:
-            _write_certificate(folder, text, numbers)
+    with ExitStack() as stack:  # where a part fails, none is there
+        if options.out is not None:
+            folder = stack.enter_context(output_folder(options.out, force=options.force))
+            write_json(folder / NUMBERS, numbers)
+            write_file(folder / TEXT, f"{text}\n")
+            if paper is not None:
+                learnt = history or identify(drive_to_learn(), vehicle, paper)
+                draw_check(folder, learnt, paper.operation(vehicle, driving), certificate)
+        if paper is not None and options.tune is not None:
+            write_atomically(options.tune, design_text(paper))
     tell(json.dumps(numbers, indent=2) if options.json else text)
-    _say_written(options)
+    for what in (options.tune, None if options.out is None else f"{options.out}/"):
+        if what is not None:
+            say(f"wrote {what}")
     return FAILS if certificate.verdict == "fail" else DONE
-
-
-def _require_drive(options: argparse.Namespace) -> None:
-    """Refuse to be told how a log is read where none is."""
-    told = {
-        "--columns": options.columns,
-        "--dbc": options.dbc,
-        "--rate": options.rate is not None,
-        "--cut-holes": options.cut_holes,
-        "--mend-clock": options.mend_clock,
-    }
-    for option, value in told.items():
-        if value and options.along is None:
-            raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
@@ -221,78 +210,44 @@ def _refuse_gains(options: argparse.Namespace, name: str) -> None:
             )
 
 
-def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIdentifier) -> int:
-    """Judge the gains of a law of the paper, tell and write what is asked for."""
-    driving = _driving(options, design, vehicle)
-    if options.design is None:
-        design = replace(design, driving=driving)
-    certificate = certify(design, vehicle, driving)
-    drive = None
-    if options.along is not None:
-        drive = shared.read_log(options.along, vehicle, shared.told_map(options), dt=design.dt)
-    if options.tune is not None:
-        require_free(options.tune, force=options.force)
-    numbers = {
-        "method": design.law,
-        "conditions": asdict(driving),
-        **certificate.to_dict(),
-        "vehicle": vehicle_numbers(vehicle),
-    }
+def _gains_text(
+    options: argparse.Namespace,
+    design: PaperIdentifier,
+    vehicle: Vehicle,
+    driving: Driving,
+    certificate: Certificate,
+    history: History | None,
+) -> str:
+    """Return what is said of the gains of a law of the paper, and better ones where it helps."""
     texts = [
         _conditions(design, vehicle, driving, _said(options, design, driving)),
         certificate_text(certificate, design.force_unit),
     ]
-    if drive is not None:
-        texts.append(_along(drive, vehicle, design))
+    if history is not None:
+        texts.append(_along(history, design))
     if certificate.verdict != "pass" and options.tune is None and not options.json:
         texts.append(_proposal(options, design, vehicle, driving))
-    text = "\n".join(texts)
-    with ExitStack() as stack:  # where a part fails, none is there
-        if options.out is not None:
-            folder = stack.enter_context(output_folder(options.out, force=options.force))
-            _write_certificate(folder, text, numbers)
-            learnt = drive or drive_to_learn()
-            operation = design.operation(vehicle, driving)
-            draw_check(folder, learnt, vehicle, design, operation, certificate)
-        if options.tune is not None:
-            write_atomically(options.tune, design_text(design))
-    tell(json.dumps(numbers, indent=2) if options.json else text)
-    _say_written(options)
-    return FAILS if certificate.verdict == "fail" else DONE
-
-
-def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
-    write_json(folder / NUMBERS, numbers)
-    write_file(folder / TEXT, f"{text}\n")
-
-
-def _say_written(options: argparse.Namespace) -> None:
-    for what in (options.tune, None if options.out is None else f"{options.out}/"):
-        if what is not None:
-            say(f"wrote {what}")
+    return "\n".join(texts)
 
 
 def _require_sense(options: argparse.Namespace) -> None:
     shared.method_is_given(options)
+    for word in ("columns", "dbc", "rate", "cut_holes", "mend_clock"):  # of how a log is read
+        value = getattr(options, word)
+        if options.along is None and value is not None and value is not False and value != []:
+            option = f"--{word.replace('_', '-')}"
+            raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
     if options.tune is None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
                 raise ValueError("--phase-margin and --keep go with --tune FILE")
-    for name in ("bandwidth", "speed", "slip", "friction", "phase_margin"):
-        value = getattr(options, name)
-        if value is not None and not 0.0 < value < float("inf"):
-            raise ValueError(f"--{name.replace('_', '-')} must be positive, it is {value:g}")
-    for name in ("noise_v_x", "noise_v_y", "noise_r", "noise_delta"):
-        value = getattr(options, name)
-        if value is not None and not 0.0 <= value < float("inf"):
-            raise ValueError(f"--{name.replace('_', '-')} must not be negative, it is {value:g}")
+    for name in (*CONDITIONS.values(), "phase_margin"):
+        value, noise = getattr(options, name), name.startswith("noise")
+        if value is not None and not (0.0 < value < math.inf or (noise and value == 0.0)):
+            rule = "not be negative" if noise else "be positive"
+            raise ValueError(f"--{name.replace('_', '-')} must {rule}, it is {value:g}")
     if options.slip is not None and options.slip > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
-
-
-def _driving(options: argparse.Namespace, design: PaperIdentifier, vehicle: Vehicle) -> Driving:
-    """Return what the design declares, or what is natural for the car, with the options over it."""
-    return replace(design.driving or natural_driving(vehicle), **_overrides(options))
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, float]:
@@ -303,14 +258,12 @@ def _overrides(options: argparse.Namespace) -> dict[str, float]:
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
     """Return where the conditions come from."""
     changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
-    if options.design is None:
-        return "conditions: of the car" + (f", but for {changed}" if changed else "")
-    if design.driving is None:
-        told = "conditions: none stored in the design, those of the car"
-        return told + (f", but for {changed}" if changed else "")
-    if driving == design.driving:
-        return "conditions: as stored in the design"
-    return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
+    stored = options.design is not None and design.driving is not None
+    told = "none stored in the design, those of the car" if options.design else "of the car"
+    said = f"conditions: {'as stored in the design' if stored else told}"
+    if not changed or (stored and driving == design.driving):
+        return said
+    return f"{said}, but for {changed}" + (": not the file's own verdict" if stored else "")
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:
@@ -335,8 +288,8 @@ def _radii(gains: Gains) -> str:
     return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
 
 
-def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> str:
-    history = identify(recording, vehicle, design)
+def _along(history: History, design: PaperIdentifier) -> str:
+    recording = history.recording
     if history.diverged_at is not None:
         return f"along {recording.name}: the law diverged at {history.diverged_at:g} s"
     at = strongest_along(history, design)

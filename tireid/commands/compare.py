@@ -1,7 +1,7 @@
 """`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side."""
 
 import argparse
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,14 @@ from identifier.method import Method
 from identifier.methods import DEFAULT, methods
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
-from identifier.verdict import Verdict
+from identifier.run import History
+from identifier.verdict import Verdict, judge
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE
 from tireid.commands import compare_results as results
 from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
-from tireid.learning import identify
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.reports.compare import write_compare_report
@@ -83,18 +83,24 @@ def run(options: argparse.Namespace) -> int:
         names = [name for name in names if name not in left_out]
         if not names:
             raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
-        lengths = [float(len(recordings))] * (len(names) + len(others))
+        steps = len(names) + len(others)
+        verdicts: dict[str, Verdict] = {}
+
+        def seen(name: str, run: History) -> None:
+            if name == DEFAULT:
+                verdicts[run.recording.name] = judge(run)
+
         comparison = run_comparison(
             names,
             vehicle,
             recordings,
             seed=seed,
-            progress=work.along(lengths),
+            progress=partial(work.step, steps),
             others=others,
             left_out=left_out,
+            seen=seen,
         )
         work.begin("step times, tables and figures")
-        verdicts = _default_verdicts(recordings, vehicle) if DEFAULT in names else {}
         figures = results.write_comparison(folder, comparison, verdicts)
         rows = results.summary_rows(comparison)
         write_compare_report(
@@ -113,11 +119,6 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
-
-
-def _default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
-    """Return the verdict on what the default learns on each recording, by its name."""
-    return {one.name: identify(one, vehicle, check=False).verdict for one in recordings}
 
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
 from identifier.compare.course import Trial, where_learnt_and_elsewhere
-from identifier.compare.study import Comparison, Frozen, ranking
+from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
 from identifier.reproducibility import AxleRmse
@@ -40,13 +40,15 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
     lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
-        online = [(rec, error) for rec, error in trial.online.items()]
         time = NOT_TOLD
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
-        cells = ["diverged" if trial.diverged_at else _mean(comparison, online)]
-        told = _slip_cells(trial)
-        lines.append([name, *cells, *_frozen_cells(comparison, trial), *told, time])
+        pairs = where_learnt_and_elsewhere(trial.frozen or {})
+        means = [_mean(comparison, some) for some in ([*trial.online.items()], *pairs)]
+        if trial.diverged_at:
+            means = ["diverged"] * 3
+        cells = means if trial.frozen is not None else [means[0], "a signal, no model", ""]
+        lines.append([name, *cells, *_slip_cells(trial), time])
     return lines
 
 
@@ -98,37 +100,19 @@ def pair_tables(comparison: Comparison) -> str:
                 frozen = comparison.trials[name].frozen
                 if frozen is not None:
                     error = frozen.get(learnt, {}).get(replayed)
-                    cell = "diverged" if error is None else _cell_text(comparison, replayed, error)
+                    cell = "diverged" if error is None else _mean(comparison, [(replayed, error)])
                     lines.append([name, cell])
             blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
     return "\n".join(blocks)
 
 
-def _cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
-    """Return an error as percent of the rms force and in newtons, front / rear.
-
-    error : over it [N].
-    """
-    return _mean(comparison, [(name, error)])
-
-
 def _newton_text(value: float) -> str:
-    """Return a force with three digits, more where it is above 1000 N.
-
-    value : [N].
-    """
+    """Return a force [N] with three digits, more where it is above 1000 N."""
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
-def _frozen_cells(comparison: Comparison, trial: Trial) -> list[str]:
-    if trial.frozen is None:
-        return ["a signal, no model", ""]
-    if trial.diverged_at:
-        return ["diverged", "diverged"]
-    return [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(trial.frozen)]
-
-
 def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
+    """Return a mean of errors as percent of the rms force and in newtons, front / rear."""
     if not pairs:
         return ""
     sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
@@ -162,7 +146,12 @@ def write_comparison(
     judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
     write_json(folder / "compare.json", numbers | {"verdict": judged})
     write_file(folder / "tables.txt", summary_table(comparison) + pair_tables(comparison))
-    _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
+    path = folder / "compare.csv"
+    with naming(path), path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(ERROR_COLUMNS)
+        for row in _error_rows(comparison):
+            writer.writerow(f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row)
     say("drawing figures")
     figures = {"methods": methods_figure(comparison)}
     if any(trial.frozen for trial in comparison.trials.values()):
@@ -199,7 +188,12 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     trial, timed = comparison.trials[name], name in comparison.step_times
     return {
         "online_N": {recording: asdict(error) for recording, error in trial.online.items()},
-        "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
+        "frozen_N": None
+        if trial.frozen is None
+        else {
+            learnt: {recording: asdict(error) for recording, error in replays.items()}
+            for learnt, replays in trial.frozen.items()
+        },
         "diverged_at_s": dict(trial.diverged_at),
         "percent": comparison.shares(name)._asdict(),
         "side_slip": {
@@ -211,23 +205,9 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     }
 
 
-def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
-    return {
-        learnt: {name: asdict(error) for name, error in replays.items()}
-        for learnt, replays in frozen.items()
-    }
-
-
 ERROR_COLUMNS = (
-    "method",
-    "kind",
-    "learnt_on",
-    "replayed_on",
-    "front_N",
-    "rear_N",
-    "front_percent",
-    "rear_percent",
-    "both_percent",
+    *("method", "kind", "learnt_on", "replayed_on", "front_N", "rear_N"),
+    *("front_percent", "rear_percent", "both_percent"),
 )
 
 
@@ -239,20 +219,9 @@ def _error_rows(comparison: Comparison) -> Iterator[Row]:
         both = comparison.course.share(name, error)
         return method, kind, learnt, name, error.front, error.rear, 100 * front, 100 * rear, both
 
-    def frozen_rows(method: str, kind: str, frozen: Frozen) -> Iterator[Row]:
-        for learnt, replays in frozen.items():
-            for name, error in replays.items():
-                yield row(method, kind, learnt, name, error)
-
     for method, trial in comparison.trials.items():
         for name, error in trial.online.items():
             yield row(method, "online", name, name, error)
-        yield from frozen_rows(method, "frozen", trial.frozen or {})
-
-
-def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:
-    with naming(path), path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for row in rows:
-            writer.writerow(f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row)
+        for learnt, replays in (trial.frozen or {}).items():
+            for name, error in replays.items():
+                yield row(method, "frozen", learnt, name, error)

@@ -10,13 +10,12 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge, judge_prediction
+from identifier.verdict import Verdict
 from tireid import report as page
 from tireid.commands import COMMANDS, certificate_table, demo_parts
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
 from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
-from tireid.commands.identify_results import write_results
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -53,7 +52,6 @@ REFERENCE = (
 
 def _demo_report(
     story: Story,
-    verdict: Verdict,
     shipped: demo_parts.Shipped,
     study: Study,
     driven: dict[str, demo_parts.Driven],
@@ -62,8 +60,7 @@ def _demo_report(
     command: str,
 ) -> page.Report:
     """Return the report: the product first, the paper's study folded."""
-    learnt = story.axle.learnt
-    model, runs = learnt.freeze(FREEZE), [learnt, *story.axle.others]
+    model, runs, verdict = story.axle.model, story.axle.runs, story.axle.verdict
     return page.Report(
         title=_TITLE,
         summary=SUMMARY,
@@ -71,7 +68,7 @@ def _demo_report(
             verdict_headline(verdict),
             *missed_headline(verdict),
             *number_headlines(verdict),
-            *identify_headlines(model, runs, story.axle.frozen[FREEZE]),
+            *identify_headlines(model, runs, story.axle.replays),
             *demo_parts.drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
@@ -128,6 +125,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
 
 
 def _predict(story: Story) -> page.Section:
+    told = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         page.Paragraph(
             text="Reproducing the drive that was learnt is the easier half. The same frozen "
@@ -137,19 +135,11 @@ def _predict(story: Story) -> page.Section:
         page.Table(
             caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
-            header=[
-                "drive",
-                "axle, online",
-                "frozen",
-                "of rms",
-                "paper, online",
-                "frozen",
-                "of rms",
-            ],
+            header=["drive", "axle, online", *told, "paper, online", *told],
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    for history in story.axle.others:
+    for history in story.axle.runs[1:]:
         name = history.recording.name
         said = name.replace("_", " ")
         figure = side_by_side_figure(story.side_by_side(name))
@@ -212,38 +202,41 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[page.Block]:
 
 
 def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
-    blocks: list[page.Block] = [
+    captions = {
+        "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
+        "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
+        "median error); all errors count from the onset on.",
+        "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median error).",
+    }
+    return [
         page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(
             text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets what it learnt before. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
-        page.Table(
-            caption="Table II of the paper beside ours, RMSE of the axle force [kN]: median "
+        _table(
+            study,
+            "slalom",
+            "Table II of the paper beside ours, RMSE of the axle force [kN]: median "
             f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
-            header=[page.printed(word) for word in header()],
-            rows=rows("slalom", study),
         ),
         page.Paragraph(text=page.printed(MEANING)),
-    ]
-    return [
-        *blocks,
-        *_drawn(
-            figures,
-            {
-                "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
-                "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
-                "median error); all errors count from the onset on.",
-                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median "
-                "error).",
-            },
-        ),
+        *_drawn(figures, captions),
         page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),
     ]
 
 
+def _table(study: Study, maneuver: str, caption: str) -> page.Table:
+    head = [page.printed(word) for word in header()]
+    return page.Table(caption=caption, header=head, rows=rows(maneuver, study))
+
+
 def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
+    drawn = (
+        "The table as a picture; hollow marks are the paper's values. "
+        "The drives are Figs. 2 and 3 in the folder paper."
+    )
     return [
         page.Subheading(text="The frozen-weight reproducibility test: step steer"),
         page.Paragraph(
@@ -253,18 +246,12 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
             "the truth than what its frozen weights say of it. After 36 s, at "
             "an angle that was not learnt, all of them miss more than the linear tire."
         ),
-        page.Table(
-            caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
-            header=[page.printed(word) for word in header()],
-            rows=rows("step_steer", study),
+        _table(
+            study,
+            "step_steer",
+            "Table I of the paper beside ours, RMSE of the axle force [kN].",
         ),
-        *_drawn(
-            figures,
-            {
-                "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
-                "The drives are Figs. 2 and 3 in the folder paper."
-            },
-        ),
+        *_drawn(figures, {"step_steer_errors": drawn}),
     ]
 
 
@@ -316,24 +303,12 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
-        parts = {"identify": story.axle, "paper_network": story.paper}
-        verdicts = {name: judge(part.learnt, FREEZE) for name, part in parts.items()}
-        figures: dict[str, Mapping[str, Figure]] = {}
-        for name, part in parts.items():
-            model = part.learnt.freeze(FREEZE)
-            figures[name] = write_results(
-                folders[name],
-                part.law,
-                part.learnt,
-                part.others,
-                part.frozen,
-                verdicts[name],
-                {one.recording.name: judge_prediction(model, one.recording) for one in part.others},
-            )
-        operation, drive = story.design.operation(story.car), story.paper.learnt.recording
-        draw_check(
-            folders["paper_network"], drive, story.car, story.design, operation, story.certificate
-        )
+        figures: dict[str, Mapping[str, Figure]] = {
+            "identify": story.axle.write(folders["identify"]),
+            "paper_network": story.paper.write(folders["paper_network"]),
+        }
+        operation = story.design.operation(story.car)
+        draw_check(folders["paper_network"], story.paper.runs[0], operation, story.certificate)
         work.begin(_EXPORTING)
         shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
         study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))
@@ -341,9 +316,7 @@ def run(options: argparse.Namespace) -> None:
         work.begin(DRIVING)
         driven = demo_parts.drive_story(story, folder)
         work.begin(_REPORTING)
-        report = _demo_report(
-            story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
-        )
+        report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
         page.write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),

@@ -15,9 +15,8 @@ from identifier.export.processor import figures_text, measure
 from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
-from tireid.commands.demo_story import FREEZE, Story
-from tireid.commands.drive import headline, inputs_of
-from tireid.commands.drive_results import drive_lines, known_curves, write_drives
+from tireid.commands.demo_story import Story
+from tireid.commands.drive_results import drive_lines, headline, inputs_of, write_drives
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions, Run, run_drive
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Verdict, self_test, write_files
@@ -121,18 +120,12 @@ def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, floa
 
 
 def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> Driven:
-    learnt = story.axle.learnt.freeze(FREEZE)
+    learnt = story.axle.model
     conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
     runs = [run_drive(label, conditions, learnt) for label in labels]
     folder.mkdir()
-    figures = write_drives(
-        folder,
-        runs,
-        known_curves(runs, setup, learnt),
-        inputs=inputs_of(conditions, labels, _SOURCE, learnt),
-        drops=setup.drops,
-        film=FILM,
-    )
+    inputs = inputs_of(conditions, labels, _SOURCE, learnt)
+    figures = write_drives(folder, conditions, runs, learnt, inputs, FILM)
     return Driven(conditions, runs, figures)
 
 
@@ -166,8 +159,7 @@ class Shipped(NamedTuple):
 
 def ship(story: Story, folder: Path) -> Shipped:
     """Export what the axle identifier learnt, compile it and test it."""
-    learnt = story.axle.learnt
-    model = learnt.freeze(FREEZE)
+    learnt, model = story.axle.runs[0], story.axle.model
     package = build_package(learnt.design, story.car, model)
     costs = measure(package)
     write_files(folder, package, figures_text(costs), costs)

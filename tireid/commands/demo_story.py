@@ -3,7 +3,7 @@
 It learns while it drives: with the axle identifier, the default in a car, and with the paper's.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,14 +11,16 @@ import numpy as np
 from identifier.method import Method
 from identifier.methods import LIVE, REFERENCE, certify, make_method
 from identifier.paper.design import PaperIdentifier
-from identifier.reproducibility import Replay, force_rms, online_error, replay, reproduce
-from identifier.run import History, identify
+from identifier.reproducibility import Replay, force_rms, online_error
+from identifier.run import identify
 from identifier.stability import Certificate
+from identifier.verdict import judge, judge_prediction
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
 from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
+from tireid.commands.identify_results import Results
 from tireid.output import text_table
 
 SPEED = 20.0  # m/s
@@ -50,36 +52,13 @@ DRIVES: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Learning:
-    """What one method learnt on the first drive, and what it says of the others.
-
-    Parameters
-    ----------
-    others : online runs over the drives that the frozen model predicts.
-    frozen : freeze time [s] to recording name to replay.
-    """
-
-    law: str
-    learnt: History
-    others: Sequence[History]
-    frozen: Mapping[float, Mapping[str, Replay]]
-
-    def errors(self, drive: History) -> tuple[float, float, float]:
-        """Return online and frozen error of both axles [kN], and its share of the rms [-]."""
-        frozen = self.frozen[FREEZE][drive.recording.name].against_truth
-        online, size = online_error(drive), force_rms(drive)
-        assert size is not None and frozen is not None and online is not None
-        return online.both / 1e3, frozen.both / 1e3, frozen.both / size.both
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Story:
     """The demo's drives, learnt by the axle identifier and by the paper's beside it."""
 
     car: Vehicle
     design: PaperIdentifier
-    axle: Learning
-    paper: Learning
+    axle: Results
+    paper: Results
 
     @property
     def certificate(self) -> Certificate:
@@ -88,21 +67,23 @@ class Story:
 
     def rows(self) -> list[list[str]]:
         """Return by drive, for axle and paper: online and frozen error, share of the force."""
-        rows = []
-        methods = self.axle, self.paper
-        for drives in zip(*([m.learnt, *m.others] for m in methods), strict=True):
-            row = [drives[0].recording.name]
-            for method, drive in zip(methods, drives, strict=True):
-                online, frozen, share = method.errors(drive)
-                row += [f"{online:.3f}", f"{frozen:.3f}", f"{100.0 * share:.0f} %"]
-            rows.append(row)
-        return rows
+        rows: dict[str, list[str]] = {}
+        for method in (self.axle, self.paper):
+            for run in method.runs:
+                name = run.recording.name
+                frozen = method.replays[name].against_truth
+                online, size = online_error(run), force_rms(run)
+                assert size is not None and frozen is not None and online is not None
+                told = [f"{one.both / 1e3:.3f}" for one in (online, frozen)]
+                share = f"{100.0 * frozen.both / size.both:.0f} %"
+                rows.setdefault(name, [name]).extend([*told, share])
+        return list(rows.values())
 
     def side_by_side(self, drive: str) -> dict[str, Replay]:
         """Return the replays of both methods over a drive, by the name in a legend."""
         return {
-            "axle identifier (curves of slip)": self.axle.frozen[FREEZE][drive],
-            "paper (network, integral law)": self.paper.frozen[FREEZE][drive],
+            "axle identifier (curves of slip)": self.axle.replays[drive],
+            "paper (network, integral law)": self.paper.replays[drive],
         }
 
     def text(self) -> str:
@@ -150,21 +131,14 @@ def _learning(
     car: Vehicle,
     recordings: Mapping[str, Recording],
     progress: Callable[[], None],
-) -> Learning:
-    histories = {}
-    for name, recording in recordings.items():
-        histories[name] = identify(recording, car, method)
+) -> Results:
+    runs = []
+    for recording in recordings.values():
+        runs.append(identify(recording, car, method))
         progress()
-    model = histories["slalom"].freeze(FREEZE)
-    return Learning(
-        law=law,
-        learnt=histories["slalom"],
-        others=[histories[name] for name in PREDICT],
-        frozen={
-            FREEZE: {name: replay(model, history) for name, history in histories.items()}
-            | {"slalom": reproduce(histories["slalom"], FREEZE)}
-        },
-    )
+    model, verdict = runs[0].freeze(FREEZE), judge(runs[0], FREEZE)
+    asked = {run.recording.name: judge_prediction(model, run.recording) for run in runs[1:]}
+    return Results.learnt(law, runs, [FREEZE], verdict, asked)
 
 
 def plant_recordings(

@@ -39,8 +39,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where something was found that matters."""
     if options.repair is not None:
-        if options.repair.suffix.lower() != ".toml":
-            raise ValueError(f"{options.repair}: the name must end in .toml")
+        shared.require_toml(options.repair)
         require_free(options.repair, force=options.force)
     vehicle, told = shared.read_vehicle(options), shared.told_map(options)
     recording = shared.read_log(options.log, vehicle, told, run_name=options.run_name, check=False)

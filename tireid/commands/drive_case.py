@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from identifier.frozen import VEHICLE_KEYS
-from identifier.tire_model import TireModel, load_model
+from identifier.tire_model import TireModel
 from models.faults import SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
@@ -20,14 +20,16 @@ from tireid.commands.options import (
     network_model,
     number_with_unit,
     read_vehicle,
+    require_one,
     seed_of,
+    stored_model,
 )
 from tireid.driving import runs
 from tireid.driving.learn import learning_drive
 from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.learning import identify
 from tireid.progress import Progress
-from tireid.verdicts import warn_of, warn_of_stored
+from tireid.verdicts import warn_of
 
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
@@ -116,7 +118,7 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     path = _named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
-    _require_one_source(options)
+    require_one(options, "weights", "network", "method", "paper", "design")
     setup = make_setup(
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
@@ -147,16 +149,6 @@ def _periods(delay: float) -> int:
             f"{delay:g}"
         )
     return round(periods)
-
-
-def _require_one_source(options: argparse.Namespace) -> None:
-    given = [
-        name
-        for name in ("weights", "network", "method", "paper", "design")
-        if getattr(options, name)
-    ]
-    if len(given) > 1:
-        raise ValueError(f"give only one of {', '.join('--' + name for name in given)}")
 
 
 def _named_path(name: str) -> Path:
@@ -198,8 +190,8 @@ def frozen_tires(
     if not {runs.FROZEN, runs.LEARNING} & set(labels):
         return "nothing was learnt", None
     if options.weights is not None:
-        model = load_model(options.weights)
-        warn_of_stored(options.weights)
+        model = stored_model(options.weights)
+        assert model is not None
         _require_its_car(options, model.vehicle, setup)
         return f"frozen ones from {options.weights}", model
     network = network_model(options, setup.vehicle, 1.0)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,27 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array
+from identifier.frozen import vehicle_numbers
 from identifier.tire_model import TireModel
-from models.faults import SensorFault
 from models.files import digest
+from models.vehicle import Vehicle
 from mpc.loop.record import Drive, told_scores
 from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film
 from tireid.animation.known import known_over_time, steady_curve
-from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run
-from tireid.driving.setup import Setup
+from tireid.driving.runs import (
+    FROZEN,
+    FULL,
+    IMU,
+    LEARNING,
+    LINEAR,
+    ORACLE,
+    WIDEST,
+    Conditions,
+    Run,
+)
+from tireid.driving.setup import PERIOD, PLANT, Setup
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -29,44 +41,101 @@ from tireid.figures.drive import (
 from tireid.figures.side_slip import drive_lateral_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
-from tireid.output import axle_columns, text_table, write_csv, write_json
+from tireid.output import axle_columns, finite, text_table, write_csv, write_json
 from tireid.progress import say
 from tireid.reports.drive import SCORES, score_rows
 
 NO_FILM = "none"
 
 
+def headline(conditions: Conditions) -> str:
+    """Return a case in one line."""
+    setup = conditions.setup
+    v = setup.speeds()
+    speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else f"{v.min():.1f} to {v.max():.1f} m/s"
+    wish = setup.wish.share
+    share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
+    drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
+    noise = "sensor noise" if conditions.noise else "no noise"
+    noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
+    noise += ", no v_y" if conditions.kind == IMU else ""
+    noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
+    noise += "".join(f", {fault}" for fault in conditions.faults)
+    return (
+        f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
+        f"{noise}, seed {conditions.seed}"
+    )
+
+
+def inputs_of(
+    conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
+) -> dict[str, Any]:
+    """Return all that goes into drives, ready for JSON."""
+    setup = conditions.setup
+    v = setup.speeds()
+    return {
+        "path": setup.path.name,
+        "path_hash": digest([setup.path.X.tolist(), setup.path.Y.tolist()]),
+        "length_m": setup.path.length,
+        "closed": setup.path.closed,
+        "laps": conditions.laps,
+        "speed": {"share": setup.wish.share, "m_s": setup.wish.speed},
+        "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
+        "grip_m_s2": setup.grip,
+        "mu": setup.mu,
+        "mu_drops": [{"s_m": s, "mu": mu} for s, mu in setup.drops],
+        "tires": list(labels),
+        "frozen": source,
+        "weights_hash": None if learnt is None else digest(learnt.to_dict()),
+        "plant": PLANT,
+        "vehicle": vehicle_numbers(setup.vehicle),
+        "chassis": _chassis(setup.vehicle),
+        "delay_ms": 1e3 * PERIOD * conditions.delay,
+        "period_ms": 1e3 * PERIOD,
+        "noise": conditions.noise,
+        **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
+        **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
+        **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
+        "faults": [finite(asdict(fault)) for fault in conditions.faults],
+        "seed": conditions.seed,
+    }
+
+
+def _chassis(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the chassis, with a hash in place of the file of its tire."""
+    chassis = vehicle.require_chassis()
+    path = None if chassis.tire is None else Path(chassis.tire)
+    tire = None if path is None else digest(path.read_text(errors="replace", encoding="utf-8"))
+    return {**asdict(chassis), "tire": tire}
+
+
 def write_drives(
     folder: Path,
+    conditions: Conditions,
     runs: Sequence[Run],
-    curves: Sequence[TireCurve],
-    *,
+    learnt: TireModel | None,
     inputs: Mapping[str, Any],
-    drops: Sequence[tuple[float, float]],
     film: str,
-    faults: Sequence[SensorFault] = (),
 ) -> dict[str, Figure]:
     """Write everything about drives along one path; return the figures by the name of their file.
 
-    drops : arc length [m] and friction from there on.   film : webp, gif, mp4 or none.
+    inputs : of `inputs_of`.   film : webp, gif, mp4 or none.
     """
-    first = runs[0]
+    first, drops, faults = runs[0], conditions.setup.drops, conditions.faults
+    curves = known_curves(runs, conditions.setup, learnt)
     write_json(folder / "summary.json", _summarize_drives(runs, inputs))
     for run in runs:
         name = "drive.csv" if run is first else f"drive_{run.label}.csv"
         write_csv(folder / name, _drive_columns(run.drive))
     say("drawing figures")
     drives = {run.label: run.drive for run in runs}
-    limits = first.problem.limits
+    limits, on_the_way = first.problem.limits, {"drops": drops, "faults": faults}
     figures = {
         "path": drive_path_figure(drives),
-        "errors": drive_errors_figure(drives, off_path=WIDEST, drops=drops, faults=faults),
+        "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
         "steering": drive_steering_figure(
-            drives,
-            angle_limit=limits.steering,
-            rate_limit=limits.steering_rate,
-            drops=drops,
-            faults=faults,
+            drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
         ),
         "tires": drive_tires_figure(first.drive, curves),
         "solve_times": drive_solve_figure(first.drive),
@@ -75,15 +144,10 @@ def write_drives(
         figures["lateral"] = drive_lateral_figure(first.drive)
     save_figures(folder, figures)
     if film != NO_FILM:
-        title = f"{first.drive.path.name}: {first.label} tires"
-        write_film(
-            folder / f"drive.{film}",
-            drives,
-            curves,
-            drops=drops,
-            title=title,
-            known=known_over_time(first.known, first.model, float(first.drive.v_x.mean())),
-        )
+        title, v_x = f"{first.drive.path.name}: {first.label} tires", first.drive.v_x.mean()
+        known = known_over_time(first.known, first.model, float(v_x))
+        path = folder / f"drive.{film}"
+        write_film(path, drives, curves, drops=drops, title=title, known=known)
     return figures
 
 

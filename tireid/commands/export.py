@@ -3,16 +3,12 @@
 import argparse
 from typing import Any
 
-from identifier.method import Method
 from identifier.methods import LIVE, continuing
-from identifier.tire_model import TireModel, load_model
 from models.rules import require_within
-from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.exporting import export
 from tireid.progress import say
-from tireid.verdicts import warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
@@ -27,30 +23,20 @@ def add_parser(commands: Any) -> None:
     shared.add_method(parser, LIVE)
     shared.add_weights(parser, "begin with it, as identified")
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
-    parser.add_argument("--single", action="store_true", help="float unless the build says double")
-    parser.add_argument(
-        "--with-a-y",
-        action="store_true",
-        help="a_y of an accelerometer is an input too, of a method that can go without it",
+    flags = {
+        "--single": "float unless the build says double",
+        "--with-a-y": "a_y of an accelerometer is an input too, of a method that can go without it",
+        "--band": "half the width of the 90 %% band around each force is an output too",
+        "--fmu": "also FMUs 2.0 and 3.0, Co-Simulation",
+        "--onnx": "also the model, frozen, as ONNX",
+        "--mpc": "also a tracker that steers by what is learnt",
+    }
+    shared.add_options(parser, bool, flags)
+    text = (
+        "of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
+        "number of its parameters (%(default)g)"
     )
-    parser.add_argument(
-        "--band",
-        action="store_true",
-        help="half the width of the 90 %% band around each force is an output too",
-    )
-    parser.add_argument("--fmu", action="store_true", help="also FMUs 2.0 and 3.0, Co-Simulation")
-    parser.add_argument("--onnx", action="store_true", help="also the model, frozen, as ONNX")
-    parser.add_argument(
-        "--mpc", action="store_true", help="also a tracker that steers by what is learnt"
-    )
-    parser.add_argument(
-        "--caution",
-        type=float,
-        default=0.0,
-        metavar="SHARE",
-        help="of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
-        "number of its parameters (%(default)g)",
-    )
+    shared.add_options(parser, float, {"--caution SHARE": (0.0, text)})
     shared.add_output(parser, "export")
     parser.set_defaults(run=run)
 
@@ -59,11 +45,12 @@ def run(options: argparse.Namespace) -> None:
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     if options.caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
-    start = None if options.weights is None else load_model(options.weights)
-    if options.weights is not None:
-        warn_of_stored(options.weights)
-    vehicle = _vehicle(options, start)
-    method = _method(options, vehicle, start)
+    start = shared.stored_model(options.weights)
+    vehicle = shared.car_of(options, start, options.weights)
+    if start is None or shared.method_is_given(options):
+        method = shared.chosen_method(options, vehicle, online=True).method
+    else:  # the one that goes on from the model
+        method = continuing(start, vehicle)
     exported = export(
         method,
         options.out,
@@ -81,17 +68,3 @@ def run(options: argparse.Namespace) -> None:
     )
     for line in str(exported).splitlines():
         say(line)
-
-
-def _vehicle(options: argparse.Namespace, start: TireModel | None) -> Vehicle:
-    if start is None or options.vehicle is not None:
-        return shared.read_vehicle(options)
-    shared.say_estimates(start.vehicle, options.weights)
-    return start.vehicle
-
-
-def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
-    """Return the method that is asked for; else the one that goes on from the model."""
-    if start is None or shared.method_is_given(options):
-        return shared.chosen_method(options, vehicle, online=True).method
-    return continuing(start, vehicle)

@@ -3,16 +3,25 @@
 import argparse
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from identifier.tire_model import STIFFNESS, load_model
+from identifier.tire_model import STIFFNESS
 from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import DONE, FAILS
-from tireid.commands.options import add_force, add_jobs, add_log_map, jobs_of, told_map
+from tireid.commands.options import (
+    add_force,
+    add_jobs,
+    add_log_map,
+    add_options,
+    jobs_of,
+    stored_model,
+    told_map,
+)
 from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, COLUMNS, Merged, fleet_prior, merge, usable
@@ -20,7 +29,6 @@ from tireid.fleet.store import LogRow, Store, StoreError
 from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
-from tireid.verdicts import warn_of_stored
 
 SHOWN = 5  # logs with errors that are named
 _SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
@@ -55,84 +63,49 @@ def _add_learn(tasks: Any) -> None:
     parser.add_argument(
         "logs", nargs="+", metavar="PATTERN", help="logs, quoted: 'logs/**/*.csv', s3://..."
     )
-    parser.add_argument(
-        "--vehicle",
-        required=True,
-        metavar="FILE",
-        help="car as TOML; {name} in it stands for a tag: cars/{vehicle}.toml",
-    )
+    text = "car as TOML; {name} in it stands for a tag: cars/{vehicle}.toml"
+    parser.add_argument("--vehicle", required=True, metavar="FILE", help=text)
     parser.add_argument("--out", required=True, metavar="STORE", help="folder or address to keep")
-    parser.add_argument(
-        "--tags",
-        default="",
-        metavar="PATTERN",
-        help="what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
-        "(2026-03-31) are known by name, the others stand in the column tags",
-    )
-    parser.add_argument(
-        "--root",
-        default="",
-        metavar="DIR",
-        help="name logs as they lie under this folder or address, not by their absolute paths",
-    )
-    parser.add_argument(
-        "--weights", type=Path, metavar="FILE", help="fit or prior that is believed before"
-    )
-    parser.add_argument(
-        "--judge",
-        choices=("motion", "none"),
-        default="motion",
-        help="verdict of each log: does the model give its motion back, or none (%(default)s)",
-    )
-    parser.add_argument(
-        "--part",
-        type=float,
-        default=PART,
-        metavar="S",
-        help="longest piece of a log that is kept as one [s] (%(default)g)",
-    )
-    parser.add_argument(
-        "--again", action="store_true", help="also learn logs whose row holds an error"
-    )
-    parser.add_argument(
-        "--replace",
-        action="store_true",
-        help="take out of the store what these logs were learnt with before: another car or other "
-        "options, or another content of the same file",
-    )
+    words = {
+        "--tags PATTERN": (
+            "",
+            "what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
+            "(2026-03-31) are known by name, the others stand in the column tags",
+        ),
+        "--root DIR": (
+            "",
+            "name logs as they lie under this folder or address, not by their absolute paths",
+        ),
+        "--scheduler ADDRESS": "work on the Dask cluster of this scheduler, as in tcp://host:8786",
+    }
+    add_options(parser, str, words)
+    add_options(parser, Path, {"--weights FILE": "fit or prior that is believed before"})
+    judging: dict[str, Any] = {"choices": ("motion", "none"), "default": "motion"}
+    text = "verdict of each log: does the model give its motion back, or none (%(default)s)"
+    parser.add_argument("--judge", help=text, **judging)
+    text = "longest piece of a log that is kept as one [s] (%(default)g)"
+    add_options(parser, float, {"--part S": (PART, text)})
+    flags = {
+        "--again": "also learn logs whose row holds an error",
+        "--replace": "take out of the store what these logs were learnt with before: another car "
+        "or other options, or another content of the same file",
+        "--no-check": "accept logs that contradict physics",
+    }
+    add_options(parser, bool, flags)
     add_log_map(parser)
-    parser.add_argument(
-        "--no-check", action="store_true", help="accept logs that contradict physics"
-    )
     add_jobs(parser)
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="work on the Dask cluster of this scheduler, as in tcp://host:8786",
-    )
     parser.set_defaults(run=_learn)
 
 
-def _add_question(parser: argparse.ArgumentParser) -> None:
+def _add_question(parser: argparse.ArgumentParser, by: str, out: str) -> None:
     parser.add_argument("store", metavar="STORE", help="that fleet learn keeps")
-    parser.add_argument(
-        "--where",
-        default="",
-        metavar="SQL",
-        help="rows that count, by a condition on their columns: \"a_y_most > 4 and tires = 'x'\"",
-    )
-    parser.add_argument(
-        "--all", action="store_true", help="also logs whose answer the verdict refuses"
-    )
-
-
-def _add_by(parser: argparse.ArgumentParser, default: str) -> None:
-    parser.add_argument(
-        "--by",
-        default=default,
-        metavar="NAMES",
-        help=f"what logs of a group have in common, of {', '.join(BY)} and tags (%(default)s)",
-    )
+    where = "rows that count, by a condition on their columns: \"a_y_most > 4 and tires = 'x'\""
+    text = f"what logs of a group have in common, of {', '.join(BY)} and tags (%(default)s)"
+    add_options(parser, str, {"--where SQL": ("", where), "--by NAMES": (by, text)})
+    add_options(parser, bool, {"--all": "also logs whose answer the verdict refuses"})
+    metavar = "FILE" if out.endswith(".json") else "DIR"
+    add_options(parser, Path, {f"--out {metavar}": (Path(out), "(%(default)s)")})
+    add_force(parser)
 
 
 def _add_merge(tasks: Any) -> None:
@@ -142,12 +115,7 @@ def _add_merge(tasks: Any) -> None:
         description="Add up what logs tell, group by group, and write a model of each, as "
         "weights.json is, and a table.",
     )
-    _add_question(parser)
-    _add_by(parser, "vehicle,tires")
-    parser.add_argument(
-        "--out", type=Path, default=Path("tireid-fleet-merge"), metavar="DIR", help="(%(default)s)"
-    )
-    add_force(parser)
+    _add_question(parser, "vehicle,tires", "tireid-fleet-merge")
     parser.set_defaults(run=_merge)
 
 
@@ -158,15 +126,9 @@ def _add_prior(tasks: Any) -> None:
         description="Learn from the cars of a store what they have in common and how they differ, "
         "and write a model to begin with: tireid identify --weights FILE.",
     )
-    _add_question(parser)
-    _add_by(parser, "vehicle,tires")
-    parser.add_argument(
-        "--vehicle", type=Path, required=True, metavar="FILE", help="the next car, as TOML"
-    )
-    parser.add_argument(
-        "--out", type=Path, default=Path("prior.json"), metavar="FILE", help="(%(default)s)"
-    )
-    add_force(parser)
+    _add_question(parser, "vehicle,tires", "prior.json")
+    car: dict[str, Any] = {"type": Path, "required": True, "metavar": "FILE"}
+    parser.add_argument("--vehicle", help="the next car, as TOML", **car)
     parser.set_defaults(run=_prior)
 
 
@@ -178,40 +140,25 @@ def _add_watch(tasks: Any) -> None:
         "changes of stiffness and friction: wear, other tires, a wet road. Exit code 1 where one "
         "lasts. Logs are ordered by their date.",
     )
-    _add_question(parser)
-    _add_by(parser, "vehicle")
+    _add_question(parser, "vehicle", "tireid-fleet-watch")
     _add_watching(parser)
-    parser.add_argument(
-        "--out", type=Path, default=Path("tireid-fleet-watch"), metavar="DIR", help="(%(default)s)"
-    )
-    add_force(parser)
     parser.set_defaults(run=_watch)
 
 
 def _add_watching(parser: argparse.ArgumentParser) -> None:
     usual = Watching()
-    for name, what in (
-        ("false_alarms", "accepted false alarms in 1000 h of learning"),
-        ("baseline", "learning of a car that is its baseline [s]"),
-        ("stiffness", "change of stiffness that is looked for, of ln C"),
-        ("friction", "change of friction that is looked for, of ln mu"),
-    ):
-        parser.add_argument(
-            f"--{name.replace('_', '-')}",
-            type=float,
-            default=getattr(usual, name),
-            metavar="X",
-            help=f"{what} (%(default)g)",
-        )
+    numbers = {
+        "--false-alarms X": (usual.false_alarms, "accepted false alarms in 1000 h of learning"),
+        "--baseline X": (usual.baseline, "learning of a car that is its baseline [s]"),
+        "--stiffness X": (usual.stiffness, "change of stiffness that is looked for, of ln C"),
+        "--friction X": (usual.friction, "change of friction that is looked for, of ln mu"),
+    }
+    told = {word: (value, f"{text} (%(default)g)") for word, (value, text) in numbers.items()}
+    add_options(parser, float, told)
 
 
 def _watching(options: argparse.Namespace) -> Watching:
-    return Watching(
-        baseline=options.baseline,
-        false_alarms=options.false_alarms,
-        stiffness=options.stiffness,
-        friction=options.friction,
-    )
+    return Watching(**{one.name: getattr(options, one.name) for one in fields(Watching)})
 
 
 def _add_report(tasks: Any) -> None:
@@ -221,13 +168,8 @@ def _add_report(tasks: Any) -> None:
         description="Write report.html: merged models, how stiffness went log by log, what "
         "changed, and which logs were left out.",
     )
-    _add_question(parser)
-    _add_by(parser, "vehicle")
+    _add_question(parser, "vehicle", "tireid-fleet")
     _add_watching(parser)
-    parser.add_argument(
-        "--out", type=Path, default=Path("tireid-fleet"), metavar="DIR", help="(%(default)s)"
-    )
-    add_force(parser)
     parser.set_defaults(run=_report)
 
 
@@ -255,7 +197,7 @@ def _learn(options: argparse.Namespace) -> int:
         say(f"{log}: left out, {why}")
     telling = Telling(
         log_map=told_map(options),
-        start=None if options.weights is None else load_model(options.weights),
+        start=stored_model(options.weights),
         judging=options.judge,
         check=not options.no_check,
         part=options.part,
@@ -264,8 +206,6 @@ def _learn(options: argparse.Namespace) -> int:
         vehicle = Vehicle.from_toml(car)
         if vehicle.estimates:
             say(f"{car}: {vehicle.estimates}")
-    if options.weights is not None:
-        warn_of_stored(options.weights)
     store = Store(options.out)
     store.require_ours()
     there: Any = cluster(options.scheduler) if options.scheduler else nullcontext()

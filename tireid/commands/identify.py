@@ -6,39 +6,30 @@ from typing import Any
 
 import numpy as np
 
-from codegen.escape import visible
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import DEFAULT, usual
 from identifier.paper.network import Weights
-from identifier.reproducibility import (
-    Replay,
-    counted_samples,
-    force_rms,
-    freeze_key,
-    replay,
-    reproduce,
-)
+from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
-from identifier.tire_model import TireModel, load_model
+from identifier.tire_model import TireModel
 from identifier.verdict import Verdict, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
-from tireid.commands import identify_results as results
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import resumed_line, verdict_line
+from tireid.commands.identify_results import AskedBound, Results, file_name, guaranteed_text
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify, with_v_y
-from tireid.output import output_folder, require_curves, require_free, text_table, write_json
+from tireid.output import output_folder, require_curves, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
-from tireid.verdicts import asked_text, verdict_text, warn_of_stored
+from tireid.verdicts import asked_text, verdict_text
 
 LEARNING, _JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
-_OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
@@ -60,43 +51,27 @@ def add_parser(commands: Any) -> None:
     shared.add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_method(parser)
-    parser.add_argument(
-        "--freeze",
-        nargs="+",
-        action="extend",
-        type=float,
-        metavar="T",
-        help="freeze at these times [s] (the end)",
+    several: dict[str, Any] = {"nargs": "+", "action": "extend"}
+    text = "freeze at these times [s] (the end)"
+    parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
+    text = "recordings to predict, each with a verdict"
+    parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
+    text = (
+        "state forces that are guaranteed where no force differs from the best curve by more "
+        "than E static axle loads, or, with a second number, is late by more [s] (estimated)"
     )
-    parser.add_argument(
-        "--replay",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="LOG[:RUN]",
-        help="recordings to predict, each with a verdict",
-    )
-    parser.add_argument(
-        "--bound",
-        nargs="*",
-        type=float,
-        metavar="E",
-        help="state forces that are guaranteed where no force differs from the best curve by more "
-        "than E static axle loads, or, with a second number, is late by more [s] (estimated)",
-    )
+    parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
     add_repair(parser, "learn on what is left, and write it to")
     shared.add_weights(parser, "begin learning with it")
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_network_arguments(parser, "freeze nothing, judge this network instead")
     shared.add_accept(parser)
-    parser.add_argument(
-        "--curves",
-        choices=("csv", "parquet"),
-        default="csv",
-        help="as what curves over time are written (csv); parquet is smaller, sooner written and "
-        "has all digits",
+    text = (
+        "as what curves over time are written (csv); parquet is smaller, sooner written and "
+        "has all digits"
     )
+    parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
@@ -109,12 +84,10 @@ def run(options: argparse.Namespace) -> int:
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
-    bound = None if options.bound is None else results.AskedBound.of(options.bound)
+    bound = None if options.bound is None else AskedBound.of(options.bound)
     if bound is not None and options.network is not None:
         raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
-    start = None if options.weights is None else load_model(options.weights)
-    if options.weights is not None:
-        warn_of_stored(options.weights)
+    start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
     require_curves(options.curves)
@@ -158,76 +131,57 @@ def run(options: argparse.Namespace) -> int:
         output_folder(options.out, force=options.force) as folder,
         Progress("identify", parts) as progress,
     ):
-        histories: list[History] = []
-        pieces: list[History] = []
+        runs: list[History] = []
         for k, one in enumerate((recording, *others)):
-            if design.whole and histories:
-                histories.append(histories[0].asked(one, freeze_times[-1]))
+            if design.whole and runs:
+                runs.append(runs[0].asked(one, freeze_times[-1]))
                 continue
             share = progress.within(k / count, (k + 1) / count)
-            histories.append(  # checked when they were read
+            runs.append(  # checked when they were read
                 identify(one, vehicle, design, start=start, check=False, progress=share).history
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(_JUDGING)
+        learnt, closing = runs[0], ""
         if network is not None:
-            verdict = judge_prediction(network, histories[0].recording)
-            verdict = with_doctor(verdict, diagnosis, repair)
-            asked = _asked(network, others)
-            progress.begin(DRAWING)
-            replays, figures = results.write_network_results(
-                folder, options.network, law, network, histories, verdict, asked, options.curves
-            )
-            by_key = {results.NETWORK: replays}
-            told = results.network_table(law, histories, replays)
+            verdict = with_doctor(judge_prediction(network, learnt.recording), diagnosis, repair)
+            asked, file = _asked(network, others), options.network.name
+            found = Results.of_network(law, runs, network, file, verdict, asked)
         else:
-            learnt = histories[0]
             for t in freeze_times:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
             verdict = with_doctor(judge(learnt, freeze_times[-1]), diagnosis, repair)
             asked = _asked(learnt.freeze(freeze_times[-1]), others)
-            frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
-            figures = results.write_results(
-                folder,
-                law,
-                learnt,
-                histories[1:],
-                frozen,
-                verdict,
-                asked,
-                pieces,
-                curves=options.curves,
-                bound=bound,
-                progress=progress.begin(DRAWING),
-            )
-            by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
+            found = Results.learnt(law, runs, freeze_times, verdict, asked, pieces, bound)
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
-            told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
-        doctor = doctor_text(diagnosis, repair, options.repair)
-        model = network or load_model(folder / "weights.json")
-        sure = "" if bound is None else results.guaranteed_text(model)
-        of_others = asked_text(asked)
-        parts_told = (told, sure, doctor, of_others, verdict_text(verdict))
-        told = "\n".join(part for part in parts_told if part)
+        figures = found.write(folder, curves=options.curves, progress=progress.begin(DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(
             folder,
             law,
-            model,
-            histories,
-            by_key,
+            found.model,
+            runs,
+            found.by_label,
             figures,
             verdict,
-            pieces,
+            found.parts,
             diagnosis=diagnosis,
             command=options.words,
             asked=asked,
         )
+        told = (
+            found.table(),
+            closing,
+            "" if bound is None else guaranteed_text(found.model),
+            doctor_text(diagnosis, repair, options.repair),
+            asked_text(asked),
+            verdict_text(verdict),
+        )
     if repair:
         write_repair(options.repair, shared.told_map(options), diagnosis)
         say(f"wrote {options.repair}")
-    tell(told)
+    tell("\n".join(part for part in told if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
 
@@ -294,7 +248,7 @@ def _read(
 
 
 def _require_distinct(recordings: list[Recording]) -> None:
-    files = [results.file_name(recording) for recording in recordings]
+    files = [file_name(recording) for recording in recordings]
     for recording, name in zip(recordings, files, strict=True):
         if files.count(name) > 1:
             raise ValueError(
@@ -312,34 +266,3 @@ def _require_inside(freeze_times: list[float], recording: Recording) -> None:
     for earlier, later in pairwise(map(freeze_key, freeze_times)):
         if earlier == later:
             raise ValueError(f"--freeze {later} is given twice: the times differ too little")
-
-
-def _replays(t: float, learnt: History, others: list[History]) -> dict[str, Replay]:
-    model = learnt.freeze(t)
-    return {learnt.recording.name: reproduce(learnt, t)} | {
-        history.recording.name: replay(model, history) for history in others
-    }
-
-
-def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]) -> str:
-    """Return a table of the errors per axle, and as a share of the force where there is truth.
-
-    Under the recording that was learnt stands the paper's measure: its past, t < T_freeze, against
-    what was identified online.
-
-    frozen : freeze time [s] to recording name to replay.
-    """
-    sizes = {history.recording.name: force_rms(history) for history in histories}
-    rows = [["frozen at", "replayed on", "front", "rear"]]
-    for t, replays in frozen.items():
-        for name, result in replays.items():
-            error = result.against_truth or result.against_online
-            note = results.no_truth(error, sizes[name])
-            cells = results.error_cells(error, sizes[name])
-            rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
-            sides = result.reproduction
-            if sides is not None and sides.past_against_online is not None:
-                rows.append(
-                    ["", _OWN_PAST, *results.error_cells(sides.past_against_online, sizes[name])]
-                )
-    return text_table(rows, "><>>")

@@ -7,7 +7,7 @@ from typing import Any
 from models.files import write_atomically
 from models.vehicle import vehicle_template
 from tireid.commands import COMMANDS
-from tireid.commands.options import add_force
+from tireid.commands.options import add_force, require_toml
 from tireid.output import require_free
 from tireid.progress import say
 
@@ -26,8 +26,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    if options.file.suffix.lower() != ".toml":
-        raise ValueError(f"{options.file}: the name must end in .toml")
+    require_toml(options.file)
     require_free(options.file, force=options.force)
     write_atomically(options.file, vehicle_template())
     say(f"wrote {options.file}: replace its numbers by those of your car")

@@ -9,7 +9,7 @@ import argparse
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,6 +27,7 @@ from identifier.methods import (
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
+from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_repaired, split_log_argument
 from models.recordings.map import CUT, MEND
@@ -35,13 +36,23 @@ from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.commands import DONE, NOT_VALID
 from tireid.progress import say
+from tireid.verdicts import warn_of_stored
 
-RENAMED = {  # options that had another word in some command
-    "--law": "--method",
-    "--methods": "--method",
-    "--workers": "--jobs",
-    "--figures": "--out",
-}
+
+def add_options(parser: Any, kind: type, told: Mapping[str, str | tuple[Any, str]]) -> None:
+    """Add options of one kind to a parser or to a group of it; bool is a flag.
+
+    told : by "--word METAVAR" its help, or its default and its help.
+    """
+    for words, what in told.items():
+        word, _, metavar = words.partition(" ")
+        default, text = what if isinstance(what, tuple) else (None, what)
+        if kind is bool:
+            parser.add_argument(word, action="store_true", help=text)
+        else:
+            more: Mapping[str, Any] = {"default": default, "metavar": metavar or None}
+            read = None if kind is str else kind
+            parser.add_argument(word, type=read, help=text, **more)
 
 
 def add_vehicle(
@@ -98,11 +109,31 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
     """Add the option that takes an answer as it is."""
-    parser.add_argument(
-        "--accept",
-        action="store_true",
-        help=f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}",
-    )
+    text = f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}"
+    parser.add_argument("--accept", action="store_true", help=text)
+
+
+def stored_model(path: Path | None) -> TireModel | None:
+    """Return a stored model, None where none is given; say where it was found not valid."""
+    if path is None:
+        return None
+    model = load_model(path)
+    warn_of_stored(path)
+    return model
+
+
+def car_of(options: argparse.Namespace, model: TireModel | None, source: Path | None) -> Vehicle:
+    """Return the car of --vehicle; where it is not given that of a model, if there is one."""
+    if model is None or options.vehicle is not None:
+        return read_vehicle(options)
+    say_estimates(model.vehicle, source)
+    return repaired_vehicle(model.vehicle, options)
+
+
+def require_toml(path: Path) -> None:
+    """Refuse a file to write whose name does not say that it is TOML."""
+    if path.suffix.lower() != ".toml":
+        raise ValueError(f"{path}: the name must end in .toml")
 
 
 def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
@@ -127,10 +158,7 @@ def seed_of(options: argparse.Namespace) -> int:
 
 
 def add_jobs(parser: argparse.ArgumentParser) -> None:
-    count = os.cpu_count() or 1
-    parser.add_argument(
-        "--jobs", type=int, default=count, metavar="N", help="processes (%(default)s)"
-    )
+    add_options(parser, int, {"--jobs N": (os.cpu_count() or 1, "processes (%(default)s)")})
 
 
 def jobs_of(options: argparse.Namespace) -> int:
@@ -156,18 +184,10 @@ def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
 
     usual : the default.
     """
-    parser.add_argument(
-        "--method",
-        choices=methods(),
-        metavar="NAME",
-        help=f"what learns: {', '.join(methods())} (default: {usual})",
-    )
-    parser.add_argument(
-        "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"
-    )
-    parser.add_argument(
-        "--design", type=Path, metavar="FILE", help="design.toml, in place of --method"
-    )
+    text = f"what learns: {', '.join(methods())} (default: {usual})"
+    parser.add_argument("--method", choices=methods(), metavar="NAME", help=text)
+    add_options(parser, bool, {"--paper": f"the paper's network and law: --method {REFERENCE}"})
+    add_options(parser, Path, {"--design FILE": "design.toml, in place of --method"})
 
 
 class Chosen(NamedTuple):
@@ -177,12 +197,17 @@ class Chosen(NamedTuple):
     method: Method
 
 
-def method_is_given(options: argparse.Namespace) -> bool:
-    """Return whether a command is told what learns."""
-    given = [word for word in ("method", "paper", "design") if getattr(options, word)]
+def require_one(options: argparse.Namespace, *words: str) -> bool:
+    """Refuse more than one of some options; return whether there is one."""
+    given = [word for word in words if getattr(options, word)]
     if len(given) > 1:
         raise ValueError(f"give only one of {', '.join('--' + word for word in given)}")
     return bool(given)
+
+
+def method_is_given(options: argparse.Namespace) -> bool:
+    """Return whether a command is told what learns."""
+    return require_one(options, "method", "paper", "design")
 
 
 def chosen_method(
@@ -215,9 +240,7 @@ def chosen_method(
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
     """Add --log, --columns and --no-check."""
     add_log_map(parser)
-    parser.add_argument(
-        "--no-check", action="store_true", help="accept a log that contradicts physics"
-    )
+    add_options(parser, bool, {"--no-check": "accept a log that contradicts physics"})
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
@@ -238,26 +261,18 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         help="read column COLUMN of the logs as NAME, for example r=yaw_rate; behind it a unit, "
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
-    parser.add_argument(
-        "--dbc", metavar="FILE", help="DBC that tells the signals in the frames of a CAN log"
+    add_options(
+        parser, str, {"--dbc FILE": "DBC that tells the signals in the frames of a CAN log"}
     )
-    parser.add_argument(
-        "--rate",
-        type=float,
-        metavar="HZ",
-        help="samples per second, where no column of the logs is a time",
+    add_options(
+        parser, float, {"--rate HZ": "samples per second, where no column of the logs is a time"}
     )
-    parser.add_argument(
-        "--cut-holes",
-        action="store_true",
-        help="leave cells without a value (NaN) out of the logs, which are refused else",
-    )
-    parser.add_argument(
-        "--mend-clock",
-        action="store_true",
-        help="sort samples by time, leave out those that share a stamp, and learn on what follows "
-        "where the clock starts again as after a gap; refused else",
-    )
+    flags = {
+        "--cut-holes": "leave cells without a value (NaN) out of the logs, which are refused else",
+        "--mend-clock": "sort samples by time, leave out those that share a stamp, and learn on "
+        "what follows where the clock starts again as after a gap; refused else",
+    }
+    add_options(parser, bool, flags)
 
 
 def _map_path(options: argparse.Namespace) -> Path | None:
@@ -334,18 +349,11 @@ _CONVENTIONS = (
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     """Add the option and what belongs to it."""
     group = parser.add_argument_group("a tire network of your own", _CONVENTIONS)
-    group.add_argument("--network", type=Path, metavar="FILE.onnx", help=what)
-    group.add_argument(
-        "--network-inputs",
-        nargs="+",
-        metavar="SIGNAL",
-        help=f"what its columns are, in order, of {', '.join(SIGNALS)}",
-    )
-    group.add_argument(
-        "--network-iso",
-        action="store_true",
-        help="its slip angles have the sign of ISO 8855, in which F_y = -C alpha",
-    )
+    add_options(group, Path, {"--network FILE.onnx": what})
+    text = f"what its columns are, in order, of {', '.join(SIGNALS)}"
+    group.add_argument("--network-inputs", nargs="+", metavar="SIGNAL", help=text)
+    text = "its slip angles have the sign of ISO 8855, in which F_y = -C alpha"
+    add_options(group, bool, {"--network-iso": text})
 
 
 def network_model(

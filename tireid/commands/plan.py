@@ -12,7 +12,6 @@ from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
 from identifier.plan import STEERING_LAG, Plan, hold_of
 from identifier.plan.search import REAR
-from identifier.tire_model import load_model
 from models.files import digest
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
@@ -24,7 +23,6 @@ from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.plan import RIVALS, plan_words, rival_rows, write_plan_report
-from tireid.verdicts import warn_of_stored
 
 PERIOD = 0.01  # s, of steering.csv
 RUN_UP = 1.0  # s straight ahead, before each pass
@@ -40,75 +38,35 @@ def add_parser(commands: Any) -> None:
         "and report.html, which compares it with a slalom and with random steering.",
     )
     shared.add_vehicle(parser, default="the sedan; with --after that of the model")
-    parser.add_argument(
-        "--area", required=True, metavar="LxW", help="length and width [m], as 40x40"
+    needed = {"required": True}
+    parser.add_argument("--area", metavar="LxW", help="length and width [m], as 40x40", **needed)
+    text = "held throughout: 15 or 15m/s, 54km/h"
+    parser.add_argument("--speed", metavar="V", help=text, **needed)
+    of_steering = "of steering, over as many passes as the area takes (%(default)g)"
+    lag = (
+        "time constant from the angle asked for to that of the front wheels, a guess within "
+        f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)"
     )
-    parser.add_argument(
-        "--speed", required=True, metavar="V", help="held throughout: 15 or 15m/s, 54km/h"
-    )
-    parser.add_argument(
-        "--time",
-        type=float,
-        default=planning.TIME,
-        metavar="S",
-        help="of steering, over as many passes as the area takes (%(default)g)",
-    )
-    parser.add_argument(
-        "--after",
-        type=Path,
-        metavar="FILE",
-        help="weights.json, as identified: plan what is still unknown",
-    )
-    parser.add_argument(
-        "--mu",
-        type=float,
-        metavar="MU",
-        help=f"friction, a guess within 30 %% ({planning.FRICTION:g})",
-    )
-    parser.add_argument(
-        "--grip",
-        type=float,
-        default=100.0 * planning.SHARE,
-        metavar="PERCENT",
-        help="share of the grip that is used at most (%(default)g)",
-    )
-    parser.add_argument(
-        "--margin",
-        type=float,
-        metavar="M",
-        help=f"from the car to the edge of the area ({planning.MARGIN:g} wheelbases)",
-    )
-    parser.add_argument(
-        "--steering-rate",
-        type=float,
-        metavar="DEG/S",
-        help=f"largest, of the front wheels ({math.degrees(planning.RATE):.0f} over sqrt(L/g))",
-    )
-    parser.add_argument(
-        "--steering-angle",
-        type=float,
-        default=30.0,
-        metavar="DEG",
-        help="largest, of the front wheels (%(default)g)",
-    )
-    parser.add_argument(
-        "--steering-lag",
-        type=float,
-        metavar="S",
-        help="time constant from the angle asked for to that of the front wheels, a guess within "
-        f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)",
-    )
-    parser.add_argument(
-        "--steering-ratio",
-        type=float,
-        metavar="RATIO",
-        help="hand wheel over front wheels: steering.csv tells the hand wheel too",
-    )
-    parser.add_argument(
-        "--blind",
-        action="store_true",
-        help="nobody holds the course, steering alone is played: takes more room",
-    )
+    rate = math.degrees(planning.RATE)
+    numbers = {
+        "--time S": (planning.TIME, of_steering),
+        "--mu MU": f"friction, a guess within 30 %% ({planning.FRICTION:g})",
+        "--grip PERCENT": (
+            100.0 * planning.SHARE,
+            "share of the grip that is used at most (%(default)g)",
+        ),
+        "--margin M": f"from the car to the edge of the area ({planning.MARGIN:g} wheelbases)",
+        "--steering-rate DEG/S": f"largest, of the front wheels ({rate:.0f} over sqrt(L/g))",
+        "--steering-angle DEG": (30.0, "largest, of the front wheels (%(default)g)"),
+        "--steering-lag S": lag,
+        "--steering-ratio RATIO": "hand wheel over front wheels: steering.csv tells the hand wheel "
+        "too",
+    }
+    shared.add_options(parser, float, numbers)
+    text = "weights.json, as identified: plan what is still unknown"
+    shared.add_options(parser, Path, {"--after FILE": text})
+    text = "nobody holds the course, steering alone is played: takes more room"
+    shared.add_options(parser, bool, {"--blind": text})
     shared.add_seed(parser, "the search")
     shared.add_output(parser, "plan")
     parser.set_defaults(run=run)
@@ -117,19 +75,12 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 0."""
     area, speed = parse_area(options.area), parse_speed(options.speed)
-    ratio = options.steering_ratio
+    ratio, rate = options.steering_ratio, options.steering_rate
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
     _require_ranges(options)
-    seed, model = shared.seed_of(options), None
-    if options.after is not None:
-        model = load_model(options.after)
-        warn_of_stored(options.after)
-    if model is not None and options.vehicle is None:
-        vehicle = model.vehicle
-        shared.say_estimates(vehicle, options.after)
-    else:
-        vehicle = shared.read_vehicle(options)
+    seed, model = shared.seed_of(options), shared.stored_model(options.after)
+    vehicle = shared.car_of(options, model, options.after)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
             found = planning.plan(
@@ -141,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
                 friction=options.mu,
                 share=0.01 * options.grip,
                 margin=options.margin,
-                rate_limit=_radians(options.steering_rate),
+                rate_limit=None if rate is None else math.radians(rate),
                 max_angle=math.radians(options.steering_angle),
                 steering_lag=options.steering_lag,
                 held=not options.blind,
@@ -179,10 +130,6 @@ def _require_ranges(options: argparse.Namespace) -> None:
             require_within(ValueError, low, high, **{word: value})
     if options.steering_rate is not None:
         require_positive(ValueError, **{"--steering-rate": options.steering_rate})
-
-
-def _radians(degrees: float | None) -> float | None:
-    return None if degrees is None else math.radians(degrees)
 
 
 def parse_area(text: str) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,9 +14,8 @@ from codegen.escape import visible
 from identifier.frozen import vehicle_numbers
 from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
-from identifier.tire_model import UNCALIBRATED, TireModel, load_model
+from identifier.tire_model import UNCALIBRATED, TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
-from models.recordings.record import ALL
 from tireid import __version__, output
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
@@ -28,7 +27,7 @@ from tireid.figures.tires import slip_figure
 from tireid.learning import replay
 from tireid.progress import say, tell
 from tireid.reports.predict import write_predict_report
-from tireid.verdicts import verdict_text, warn_of_stored
+from tireid.verdicts import verdict_text
 
 
 def add_parser(commands: Any) -> None:
@@ -66,18 +65,16 @@ def run(options: argparse.Namespace) -> int:
     if recording.estimated:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict
-    half, friction = model.half_band_over(recording), verdict.friction
+    facts, friction = Facts.of(prediction), verdict.friction
     with output.output_folder(options.out, force=options.force) as folder:
-        parts = blocks(len(recording))
-        output.write_long_csv(
-            folder / "forces.csv", (force_columns(model, prediction, half, part) for part in parts)
-        )
+        columns = (force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
+        output.write_long_csv(folder / "forces.csv", columns)
         if friction is not None:
-            columns = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
-            columns |= {"another": friction.another, "unexplained": friction.unexplained}
-            output.write_csv(folder / "friction.csv", columns)
-        output.write_json(folder / "summary.json", summary(model, prediction, verdict, half))
-        lines = _prediction_text(model, prediction, half, friction)
+            told = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
+            told |= {"another": friction.another, "unexplained": friction.unexplained}
+            output.write_csv(folder / "friction.csv", told)
+        output.write_json(folder / "summary.json", summary(prediction, verdict, facts))
+        lines = _prediction_text(prediction, friction, facts)
         say("drawing figures")
         figures = draw(folder, prediction, verdict)
         write_predict_report(
@@ -97,13 +94,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _model(options: argparse.Namespace) -> TireModel:
     """Return the model, on the car that drove."""
-    model = load_model(options.model)
-    warn_of_stored(options.model)
-    if options.vehicle is None:
-        shared.say_estimates(model.vehicle, options.model)
-        vehicle = shared.repaired_vehicle(model.vehicle, options)
-    else:
-        vehicle = shared.read_vehicle(options)
+    model = shared.stored_model(options.model)
+    assert model is not None
+    vehicle = shared.car_of(options, model, options.model)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:
@@ -116,29 +109,45 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-def truth_within_band(prediction: Prediction, half: Array | None) -> Array | None:
-    """Return in which share of samples the true force lies in the band, (2,); None: nobody knows.
+class Facts(NamedTuple):
+    """What is asked of a prediction, each None where nobody knows.
 
-    half : width of its band (n, 2) [N]; samples without one do not count.
+    half : width of the band of its forces (n, 2) [N].
+    beyond : share of samples whose slip is beyond the known.   inside : of windows whose force that
+        the motion shows lies in the band.   held : of samples whose true force does, (2,) each.
+    against : times [s] of windows, and whether they contradict what is guaranteed (n, 2).
     """
-    truth = prediction.recording.axle_force
-    if half is None or truth is None or not (half > 0.0).any():
-        return None
-    inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
-    share: Array = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
-    return share
+
+    half: Array | None
+    beyond: tuple[float, float] | None
+    inside: Array | None
+    held: Array | None
+    against: tuple[Array, NDArray[np.bool_]] | None
+
+    @classmethod
+    def of(cls, prediction: Prediction) -> "Facts":
+        model, recording = prediction.model, prediction.recording
+        half, truth, held = model.half_band_over(recording), recording.axle_force, None
+        if half is not None and truth is not None and (half > 0.0).any():
+            inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
+            held = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
+        return cls(
+            half,
+            beyond_known(model, recording),
+            within_band(model, recording),
+            held,
+            contradictions(model, recording),
+        )
 
 
-def force_columns(
-    model: TireModel, prediction: Prediction, half: Array | None, part: slice = ALL
-) -> dict[str, Array]:
+def force_columns(prediction: Prediction, half: Array | None, part: slice) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
 
     half : width of its band (n, 2) [N]; None where the model has none.
     """
-    recording, car = prediction.recording, model.vehicle
+    recording, car = prediction.recording, prediction.model.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
-    columns = {"t_s": recording.t[part], "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
+    columns = {"t_s": recording.t[part], **output.axle_columns("alpha_{}_rad", alpha)}
     forces = {"predicted": prediction.axle_force, "half_band": half, "true": recording.axle_force}
     for name, force in forces.items():
         if force is not None:
@@ -146,18 +155,11 @@ def force_columns(
     return columns
 
 
-def summary(
-    model: TireModel, prediction: Prediction, verdict: Verdict, half: Array | None
-) -> dict[str, Any]:
-    """Return what summary.json holds; null stands for what cannot be known.
-
-    half : width of the band of its forces (n, 2) [N]; None where the model has none.
-    """
+def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str, Any]:
+    """Return what summary.json holds; null stands for what cannot be known."""
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
-    friction = verdict.friction
-    beyond, known = beyond_known(model, prediction.recording), model.known_slip
-    inside, held = within_band(model, prediction.recording), truth_within_band(prediction, half)
-    against = contradictions(model, prediction.recording)
+    friction, model = verdict.friction, prediction.model
+    inside, held, against, known = facts.inside, facts.held, facts.against, model.known_slip
     shares = (None, None) if motion is None else motion.explained
     return {
         "verdict": verdict.to_dict(),
@@ -176,7 +178,7 @@ def summary(
             "explained_yaw": shares[1],
         },
         "known_slip_rad": None if known is None else known.tolist(),
-        "beyond_known_slip": beyond,
+        "beyond_known_slip": facts.beyond,
         "windows_within_band": None if inside is None else inside.tolist(),
         "truth_within_band": None if held is None else held.tolist(),
         "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
@@ -213,15 +215,13 @@ def error_table(prediction: Prediction) -> str:
     )
 
 
-def _prediction_text(
-    model: TireModel, prediction: Prediction, half: Array | None, friction: RoadFriction | None
-) -> str:
+def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: Facts) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
-    half : width of the band of its forces (n, 2) [N]; None where the model has none.
     friction : of the drive's road; None where nobody can tell.
     """
-    motion, lines = prediction.motion, []
+    motion, model, lines = prediction.motion, prediction.model, []
+    inside, held, beyond, known = facts.inside, facts.held, facts.beyond, model.known_slip
     if prediction.against_truth is None:
         lines.append("no true forces in the log: what the forces miss cannot be said in newtons")
     if motion is not None:
@@ -230,28 +230,24 @@ def _prediction_text(
             f"m/s² lateral and {motion.yaw:.3g} of {motion.yaw_rms:.3g} rad/s² yaw acceleration, "
             f"rms, sensor noise included; {prediction.motion_text()}"
         )
-    beyond, known = beyond_known(model, prediction.recording), model.known_slip
     if beyond is not None and known is not None:
         front, rear = np.degrees(known)
         lines.append(
             f"known to {front:.1f} / {rear:.1f} deg of slip, which {100.0 * beyond[0]:.0f} / "
             f"{100.0 * beyond[1]:.0f} % of the samples exceed (front / rear)"
         )
-    inside = within_band(model, prediction.recording)
     if inside is not None:
         lines.append(
             f"in {100.0 * inside[0]:.0f} / {100.0 * inside[1]:.0f} % of the windows of 0.3 s the "
             "force that the motion shows lies in the band of 90 % (front / rear)"
         )
-    held = truth_within_band(prediction, half)
     if held is not None:
         lines.append(
             f"{100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the true forces lie in it, the "
             "noise of the sensors in the band (front / rear)"
         )
-    against = contradictions(model, prediction.recording)
-    if against is not None:
-        lines.append(_contradiction_line(*against))
+    if facts.against is not None:
+        lines.append(_contradiction_line(*facts.against))
     if model.has_band and not model.band_calibrated:
         lines.append(f"friction: cannot be told, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:

@@ -2,22 +2,20 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from codegen.escape import mathtext
 from identifier.compare.course import where_learnt_and_elsewhere
-from identifier.compare.study import Comparison, Frozen, ranking
+from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import AxleRmse
 from tireid.figures import style
 
-TICKS = ((1, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 1.5, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,))
-MOST = 6  # ticks of an axis
 FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
 
 
@@ -32,29 +30,6 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
 def method_label(name: str) -> str:
     """Return the name of a method as a figure shows it."""
     return mathtext(name.replace("_", " "))
-
-
-def _percent_axis(axes: Axes, which: str, low: float, high: float) -> None:
-    """Make an axis logarithmic from low to high, at most to FARTHEST, with ticks in percent.
-
-    low : smallest value shown [%].   high : largest value shown [%].
-    """
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    limits = low / 1.2, min(high, FARTHEST) * 1.2
-    axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
-    axis.set_major_locator(FixedLocator(_ticks(*limits)))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-
-
-def _ticks(low: float, high: float) -> list[float]:
-    """As many ticks as fit, by the steps of one decade."""
-    for steps in TICKS:
-        every = [step * 10.0**decade for decade in range(-3, 4) for step in steps]
-        ticks = [tick for tick in every if low <= tick <= high]
-        if len(ticks) <= MOST:
-            break
-    return ticks
 
 
 ONLINE, OWN, OTHER = "online", "frozen, where learnt", "frozen, other recordings"
@@ -75,19 +50,14 @@ def methods_figure(comparison: Comparison) -> Figure:
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
-    _percent_axis(axes, "x", min(finite, default=1.0), max(finite, default=100.0))
+    low, high = min(finite, default=1.0), min(max(finite, default=100.0), FARTHEST)
+    axes.set(xscale="log", xlim=(low / 1.2, high * 1.2))
+    style.few_ticks(axes.xaxis)
     for position, (label, errors) in enumerate(rows.items()):
         _draw_row(axes, position, errors)
         if label in lost:
-            axes.text(
-                0.995,
-                position,
-                "diverged",
-                color=style.GREY,
-                ha="right",
-                va="center",
-                transform=axes.get_yaxis_transform(),
-            )
+            place: Mapping[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
+            axes.text(0.995, position, "diverged", color=style.GREY, ha="right", **place)
         axes.axhline(position + 0.5, color="#DDDDDD", linewidth=0.5)
     axes.set_yticks(range(len(rows)), list(rows))
     axes.tick_params(axis="y", length=0.0)
@@ -103,15 +73,8 @@ def _method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     trial, course = comparison.trials[name], comparison.course
     sane = {rec: error for rec, error in trial.online.items() if rec not in trial.diverged_at}
     online = [course.share(rec, error) for rec, error in sane.items()]
-    return {ONLINE: online, **_frozen_errors(comparison, trial.frozen or {})}
-
-
-def _frozen_errors(comparison: Comparison, frozen: Frozen) -> dict[str, list[float]]:
-    course = comparison.course
-    return {
-        kind: [course.share(name, error) for name, error in pairs]
-        for kind, pairs in zip((OWN, OTHER), where_learnt_and_elsewhere(frozen), strict=True)
-    }
+    frozen = zip((OWN, OTHER), where_learnt_and_elsewhere(trial.frozen or {}), strict=True)
+    return {ONLINE: online} | {kind: [course.share(*one) for one in some] for kind, some in frozen}
 
 
 def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> None:
@@ -122,16 +85,8 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
         shown = np.minimum(values, FARTHEST * 1.1)
         y = position + shift
         axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
-        axes.plot(
-            min(float(np.mean(values)), FARTHEST * 1.1),
-            y,
-            marker=marker,
-            color=color,
-            linestyle="",
-            markersize=4.5,
-            label=kind,
-            clip_on=False,
-        )
+        mean, look = min(float(np.mean(values)), FARTHEST * 1.1), {"color": color, "label": kind}
+        axes.plot(mean, y, marker, markersize=4.5, clip_on=False, **look)
 
 
 BEST, WORST = 1.0, 100.0  # [%], ends of the color scale
@@ -192,12 +147,11 @@ def _draw_map(
         text = "div." if np.isnan(share) else text
         axes.text(j, i, text, ha="center", va="center", color="white" if dark else "black")
     labels = short_names(names).values()
+    cut = [one if len(one) <= LONGEST else f"{one[: LONGEST - 1]}…" for one in labels]
     letters = [_letter(number) for number in range(len(names))]
     axes.set_xticks(range(len(names)), letters)
-    axes.set_yticks(
-        range(len(names)),
-        [f"{_cut(label)}  {letter}" for label, letter in zip(labels, letters, strict=True)],
-    )
+    both = [f"{label}  {letter}" for label, letter in zip(cut, letters, strict=True)]
+    axes.set_yticks(range(len(names)), both)
     axes.tick_params(length=0.0)
     axes.grid(visible=False)
 
@@ -205,7 +159,3 @@ def _draw_map(
 def _letter(number: int) -> str:
     """A to Z, then numbers: what stands for a recording below a map."""
     return chr(ord("A") + number) if number < 26 else str(number + 1)
-
-
-def _cut(label: str) -> str:
-    return label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…"

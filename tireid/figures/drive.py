@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from codegen.arrays import Array
 from models.faults import SensorFault
@@ -32,33 +31,16 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     left, right = figure.subplots(1, 2)
     wide = largest > WIDE * median
     low = float(times.min()) / 1.1 if wide else 0.0
-    bins = (
-        np.geomspace(low, 1.1 * largest, _BINS) if wide else np.linspace(low, 1.1 * largest, _BINS)
-    )
+    bins = (np.geomspace if wide else np.linspace)(low, 1.1 * largest, _BINS)
     left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
     left.set(xlabel="solve time [ms]", ylabel="steps [-]", xlim=(low, 1.1 * largest))
     right.plot(
-        drive.t,
-        times,
-        linestyle="",
-        marker=".",
-        markersize=2.2,
-        markeredgewidth=0.0,
-        color=style.BLUE,
-        rasterized=True,
-        label="a step",
+        drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, rasterized=True, label="a step"
     )
     failed = drive.status != 0
     if failed.any():
-        right.plot(
-            drive.t[failed],
-            times[failed],
-            linestyle="",
-            marker="x",
-            markersize=4.0,
-            color=style.ORANGE,
-            label=f"failed ({np.count_nonzero(failed)})",
-        )
+        label = f"failed ({np.count_nonzero(failed)})"
+        right.plot(drive.t[failed], times[failed], "x", ms=4.0, color=style.ORANGE, label=label)
     for value, name, color in ((median, "median", style.PURPLE), (p99, "99 %", style.ORANGE)):
         text = f"{name} {value:.3g} ms"
         left.axvline(value, color=color, linewidth=1.1, linestyle=(0, (4, 1.5)), label=text)
@@ -67,12 +49,9 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         left.set_xscale("log")
         right.set_yscale("log")
         for axis in (left.xaxis, right.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            axis.set_minor_locator(NullLocator())
-    right.set_title(
-        f"largest {largest:.3g} ms of a period of {MILLI * drive.period:g} ms", loc="right"
-    )
+            style.few_ticks(axis)
+    period = f"largest {largest:.3g} ms of a period of {MILLI * drive.period:g} ms"
+    right.set_title(period, loc="right")
     left.set_title(f"{times.size} steps")
     style.legend_above(figure)
     return figure
@@ -129,21 +108,16 @@ def drive_errors_figure(
     """
     figure = style.new_figure(style.PAGE, 5.2)
     panels = figure.subplots(4, 1, sharex=True)
-    labels = (
-        "deviation $e_y$\n[m]",
-        "heading error\n[deg]",
-        "lateral acc.\n[m/s²]",
-        "speed $v_x$\n[m/s]",
-    )
+    labels = ("deviation $e_y$\n[m]", "heading error\n[deg]", "lateral acc.\n[m/s²]")
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
         curves = (drive.e_y, np.rad2deg(drive.e_psi), drive.a_y, drive.v_x)
         for axes, curve in zip(panels, curves, strict=True):
             axes.plot(drive.s, curve, label=label, **look)
         _mark_notes(panels[0], drive, look["color"])
-    for axes, label in zip(panels, labels, strict=True):
+    for axes, label in zip(panels, (*labels, "speed $v_x$\n[m/s]"), strict=True):
         axes.set_ylabel(label)
-        mark_drops(axes, drops)
+        _mark_road(axes, drives, drops, faults)
     for axes in panels[:3]:
         axes.axhline(0.0, color="#999999", linewidth=0.6, zorder=1)
     largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
@@ -155,12 +129,9 @@ def drive_errors_figure(
     _roomy(panels[3], min(float(drive.v_x.min()) for drive in drives.values()))
     last = max(float(drive.s[-1]) for drive in drives.values())
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
-    for axes in panels:
-        _mark_faults(axes, drives, faults)
     figure.align_ylabels(panels)
-    style.legend_above(
-        figure, order=(*drives, _REPLANNED, *(friction_label(mu) for _, mu in drops))
-    )
+    order = (*drives, _REPLANNED, *(friction_label(mu) for _, mu in drops))
+    style.legend_above(figure, order=order)
     return figure
 
 
@@ -169,38 +140,32 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
 
     drops : arc length [m] and friction from there on.
     """
+    look: Mapping[str, Any] = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2))}
     for place, mu in drops:
-        axes.axvline(
-            place, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=friction_label(mu)
-        )
+        axes.axvline(place, label=friction_label(mu), **look)
 
 
-def _mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[SensorFault]) -> None:
-    """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors."""
+def _mark_road(
+    axes: Axes,
+    drives: Mapping[str, "Drive"],
+    drops: Sequence[tuple[float, float]],
+    faults: Sequence[SensorFault],
+) -> None:
+    """Mark drops, shade where a sensor is broken, mark where a supervisor came to doubt it."""
     from mpc.handover.rules import Verdict
 
+    mark_drops(axes, drops)
     first = next(iter(drives.values()))
+    shade: Mapping[str, Any] = {"facecolor": "#F6D9D5", "edgecolor": "none", "zorder": 0}
     for fault in faults:
-        if fault.start > first.t[-1]:
-            continue
-        span = np.interp([fault.start, fault.start + fault.duration], first.t, first.s)
-        axes.axvspan(
-            *map(float, span),
-            facecolor="#F6D9D5",
-            edgecolor="none",
-            zorder=0,
-            label=f"{fault.channel} {fault.kind}",
-        )
+        if fault.start <= first.t[-1]:
+            span = np.interp([fault.start, fault.start + fault.duration], first.t, first.s)
+            axes.axvspan(*map(float, span), label=f"{fault.channel} {fault.kind}", **shade)
     for label, drive in drives.items():
+        look = {"color": tire_look(label)["color"], "linewidth": 1.2, "linestyle": (0, (1, 1))}
         for t, text in drive.notes:
             if text.startswith(Verdict.FAULT.value):
-                axes.axvline(
-                    float(np.interp(t, drive.t, drive.s)),
-                    color=tire_look(label)["color"],
-                    linewidth=1.2,
-                    linestyle=(0, (1, 1)),
-                    label=_NOTICED,
-                )
+                axes.axvline(float(np.interp(t, drive.t, drive.s)), label=_NOTICED, **look)
 
 
 def friction_label(mu: float) -> str:
@@ -216,18 +181,8 @@ def _mark_notes(axes: Axes, drive: "Drive", color: str) -> None:
     if drive.notes:
         at = np.searchsorted(drive.t, [t for t, _ in drive.notes])
         at = np.minimum(at, drive.t.size - 1)
-        axes.plot(
-            drive.s[at],
-            drive.e_y[at],
-            linestyle="",
-            marker="D",
-            markersize=3.2,
-            markerfacecolor="white",
-            markeredgewidth=0.9,
-            color=color,
-            zorder=3.0,
-            label=_REPLANNED,
-        )
+        look: Mapping[str, Any] = {"color": color, "ms": 3.2, "mfc": "white", "mew": 0.9}
+        axes.plot(drive.s[at], drive.e_y[at], "D", zorder=3.0, label=_REPLANNED, **look)
 
 
 def _roomy(axes: Axes, slowest: float) -> None:
@@ -262,26 +217,17 @@ def drive_steering_figure(
         look = tire_look(label)
         angle.plot(drive.s, np.rad2deg(drive.command), label=label, **look)
     name, first = next(iter(drives.items()))
-    angle.plot(
-        first.s,
-        np.rad2deg(first.delta),
-        color=style.PURPLE,
-        linewidth=0.8,
-        label=f"wheels of {name}",
-    )
-    rate.plot(
-        first.s[1:],
-        np.rad2deg(np.diff(first.command) / np.diff(first.t)),
-        **(tire_look(name) | {"linewidth": 0.7, "linestyle": "-"}),
-    )
+    wheels: Mapping[str, Any] = {"color": style.PURPLE, "label": f"wheels of {name}"}
+    angle.plot(first.s, np.rad2deg(first.delta), linewidth=0.8, **wheels)
+    speed = np.rad2deg(np.diff(first.command) / np.diff(first.t))
+    rate.plot(first.s[1:], speed, **(tire_look(name) | {"linewidth": 0.7, "linestyle": "-"}))
     for axes, limit, label in (
         (angle, angle_limit, "command\n[deg]"),
         (rate, rate_limit, f"rate, {name}\n[deg/s]"),
     ):
         axes.set_ylabel(label)
         _limits(axes, float(np.rad2deg(limit)))
-        mark_drops(axes, drops)
-        _mark_faults(axes, drives, faults)
+        _mark_road(axes, drives, drops, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
     style.legend_above(figure, order=tuple(drives))
@@ -304,8 +250,8 @@ _FRONT_OVERHANG, _REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axl
 TRACK = 0.57  # of the wheelbase, where no chassis says
 _BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
 _WHEEL_LENGTH, _WHEEL_WIDTH = 0.24, 0.085  # of the wheelbase
-CORNERS = 6  # points of each rounded corner
-ROUNDING = 0.28  # radius of the body's corners, of its width
+CORNERS = 33  # points of the body
+ROUNDING = 0.3  # of its corners: exponent of a circle that becomes a rectangle
 
 
 class _CarShape(NamedTuple):
@@ -327,14 +273,16 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     tracks = (TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
     half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
     front, rear = vehicle.l_f + _FRONT_OVERHANG * long, -vehicle.l_r - _REAR_OVERHANG * long
-    body = _rounded(rear, front, half, 2.0 * half * ROUNDING)
-    glass = np.array([(0.32, 0.6), (0.18, 0.78), (0.18, -0.78), (0.32, -0.6)]) * (long, half) + (
-        0.05 * long,
-        0.0,
-    )
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS)
+    round_ = np.column_stack([np.cos(angle), np.sin(angle)])
+    body = np.sign(round_) * np.abs(round_) ** ROUNDING * (0.5 * (front - rear), half)
+    body += (0.5 * (front + rear), 0.0)
+    glass = np.array([(0.37, 0.6), (0.23, 0.78), (0.23, -0.78), (0.37, -0.6)]) * (long, half)
+    corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
+    wheel = 0.5 * long * corners * (_WHEEL_LENGTH, _WHEEL_WIDTH)
     wheels = np.stack(
         [
-            _wheel(long) @ _turn(angle).T + (x, 0.5 * side * track)
+            wheel @ _turn(angle).T + (x, 0.5 * side * track)
             for x, track, angle in ((vehicle.l_f, tracks[0], delta), (-vehicle.l_r, tracks[1], 0.0))
             for side in (1.0, -1.0)
         ]
@@ -343,25 +291,9 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     return _CarShape(body @ turn + place, glass @ turn + place, wheels @ turn + place)
 
 
-def _wheel(wheelbase: float) -> Array:
-    corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
-    return 0.5 * wheelbase * corners * (_WHEEL_LENGTH, _WHEEL_WIDTH)
-
-
 def _turn(angle: float) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
-
-
-def _rounded(rear: float, front: float, half: float, radius: float) -> Array:
-    """Return a rectangle with round corners, counterclockwise."""
-    quarter = np.linspace(0.0, 0.5 * np.pi, CORNERS)
-    points = []
-    for turn, x, y in ((0, front, half), (1, rear, half), (2, rear, -half), (3, front, -half)):
-        angle = quarter + 0.5 * np.pi * turn
-        center = x - np.sign(x - 0.5 * (rear + front)) * radius, y - np.sign(y) * radius
-        points.append(np.column_stack([np.cos(angle), np.sin(angle)]) * radius + center)
-    return np.concatenate(points)
 
 
 _ROW_LENGTH = 80.0  # a long and narrow path goes on in the next row after about this many meters

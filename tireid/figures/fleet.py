@@ -16,6 +16,7 @@ from tireid.figures.style import (
     ORANGE,
     PAGE,
     SERIES,
+    axle_panels,
     legend_above,
     new_figure,
     note,
@@ -35,8 +36,6 @@ DAY = 86_400.0  # s
 def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
     """Draw the cornering stiffness that each log tells, over the days, a color for each car.
 
-    Parameters
-    ----------
     rows : of logs that were learnt; what the verdict refuses is drawn hollow.
     """
     figure = new_figure(PAGE, 4.4)
@@ -64,8 +63,7 @@ def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
 @styled
 def curves_figure(groups: Sequence[Merged]) -> Figure:
     """Draw the force curves of groups, as far as they are known."""
-    figure = new_figure(PAGE, 3.0)
-    panels = figure.subplots(1, 2, sharey=True)
+    figure, (panels,) = axle_panels([3.0])
     for k, one in enumerate(groups):
         color, label = _look(k, one.name, len(groups))
         for i, axes in enumerate(panels):
@@ -74,8 +72,8 @@ def curves_figure(groups: Sequence[Merged]) -> Figure:
             force = one.model.force_at(slip)[:, i] / one.model.vehicle.axle_loads[i]
             style = "-" if known else ":"
             axes.plot(np.degrees(slip), force, style, color=color, label=label)
-    for axes, name in zip(panels, AXLES, strict=True):
-        axes.set(title=name, xlabel="slip angle [deg]")
+    for axes in panels:
+        axes.set(xlabel="slip angle [deg]")
     panels[0].set(ylabel="force [static axle loads]")
     legend_above(figure, columns=4)
     return figure

@@ -1,6 +1,8 @@
 """The norm of the identifier's error over time, beside the bounds that hold for it."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,8 +25,6 @@ def error_figure(
     history: History,
     bounds: Mapping[str, float] | None = None,
     freeze_times: Sequence[float] = (),
-    *,
-    window: style.Window = None,
 ) -> Figure:
     """Draw the norm of ξ̃ = ξ - ξ̂ over time and its bounds.
 
@@ -32,12 +32,11 @@ def error_figure(
 
     bounds : by name, bounds on the norm [U s]; one that is not finite is left out.
     freeze_times : times at which weights were taken [s].
-    window : first and last time to show [s]; None shows all.
     """
     recording = history.recording
-    ends = style.time_window(recording.t, window)
+    ends = style.time_window(recording.t, None)
     # A root of squares would overflow where a law diverges; hypot does not.
-    t, (norm,) = shown_of_run(history, ends, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
+    t, (norm,) = shown_of_run(history, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -51,20 +50,10 @@ def error_figure(
         axes.set_ylim(typical / 30.0, 2.0 * top)
     else:
         axes.set_ylim(0.0, 1.08 * top)
-    axes.plot(
-        t,
-        np.minimum(norm, 1e3 * top),
-        color=style.BLUE,
-        linewidth=0.9,
-        label=r"$|\tilde{\xi}|$ online",
-    )
-    styles = (
-        (style.PURPLE, "-"),
-        (style.GREEN, (0, (5, 1.5))),
-        (style.AMBER, (0, (5, 1.5, 1, 1.5))),
-    )
-    for number, (name, bound) in enumerate(known.items()):
-        color, dashes = styles[number % len(styles)]
+    look = {**style.ONLINE, "label": r"$|\tilde{\xi}|$ online"}
+    axes.plot(t, np.minimum(norm, 1e3 * top), **look)
+    looks = (style.PURPLE, "-"), (style.GREEN, "--"), (style.AMBER, "-.")
+    for (name, bound), (color, dashes) in zip(known.items(), cycle(looks), strict=False):
         axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
     for t_freeze in freeze_times:
         style.mark_freeze(axes, t_freeze, prediction=False)
@@ -87,17 +76,14 @@ _SYMBOLS = {
 
 
 @style.styled
-def weights_figure(
-    history: History, freeze_times: Sequence[float] = (), *, window: style.Window = None
-) -> Figure:
+def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
     """Draw every entry of W and V over time: W by axle, V by the input it weighs.
 
     freeze_times : times at which weights were taken [s].
-    window : first and last time to show [s]; None shows all.
     """
     recording, design = history.recording, style.paper_design(history)
-    ends = style.time_window(recording.t, window)
-    t, (W, V) = shown_of_run(history, ends, lambda block: [block.before["W"], block.before["V"]])
+    ends = style.time_window(recording.t, None)
+    t, (W, V) = shown_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
     figure = style.new_figure(style.PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
@@ -110,9 +96,8 @@ def weights_figure(
     lower.set(ylabel=r"weights $\hat{V}$ [-]")
     style.label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
-        axes.set_ylim(
-            style.force_range(_settled(values) if history.diverged_at is not None else values)
-        )
+        settled = values if history.diverged_at is None else _settled(values)
+        axes.set_ylim(style.force_range(settled))
         for t_freeze in freeze_times:
             style.mark_freeze(axes, t_freeze, prediction=False)
         style.legend_beside(axes)
@@ -122,10 +107,8 @@ def weights_figure(
 
 def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
     """Draw the columns of `values` (n, k) in one color under one label."""
-    lines = axes.plot(
-        t, style.drawable(values, style.force_range(values)), color=color, linewidth=0.7
-    )
-    lines[0].set_label(label)
+    drawn = style.drawable(values, style.force_range(values))
+    axes.plot(t, drawn, color=color, linewidth=0.7)[0].set_label(label)
 
 
 def _settled(values: Array) -> Array:
@@ -173,30 +156,14 @@ def comparison_figure(
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T
         middle = np.where(np.isfinite(middle), middle, np.nan)
         whiskers = [np.where(np.isfinite(end), abs(middle - end), 0.0) for end in (low, high)]
-        axes.errorbar(
-            [columns.index(name) + shift for name in row],
-            middle,
-            yerr=whiskers,
-            fmt=marker,
-            color=color,
-            markersize=4.5,
-            elinewidth=1.2,
-            capsize=3.0,
-            label=label,
-        )
+        at = [columns.index(name) + shift for name in row]
+        look: Mapping[str, Any] = {"color": color, "ms": 4.5, "elinewidth": 1.2, "capsize": 3.0}
+        axes.errorbar(at, middle, yerr=whiskers, fmt=marker, label=label, **look)
         printed = {name: value for name, value in (paper or {}).get(law, {}).items() if name in row}
         if printed:
-            axes.plot(
-                [columns.index(name) + shift + 0.07 for name in printed],
-                list(printed.values()),
-                linestyle="",
-                marker=marker,
-                markersize=5.0,
-                markerfacecolor="white",
-                markeredgecolor=color,
-                markeredgewidth=1.1,
-                label=f"{label} (paper)",
-            )
+            at = [columns.index(name) + shift + 0.07 for name in printed]
+            look = {"ms": 5.0, "mfc": "white", "mec": color, "mew": 1.1}
+            axes.plot(at, list(printed.values()), marker, label=f"{label} (paper)", **look)
         drawn += [*middle, *(middle - whiskers[0]), *(middle + whiskers[1]), *printed.values()]
     positive = [value for value in drawn if value > 0.0]
     if positive and max(positive) > WIDE * min(positive):
@@ -234,9 +201,8 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
     span = 1.3 * float(np.abs(1.0 - design).max())
     views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)
     for axes, (left, right, height) in zip(panels, views, strict=True):
-        axes.plot(
-            circle.real, circle.imag, color=style.BLACK, linewidth=0.9, label="stability limit"
-        )
+        limit: Mapping[str, Any] = {"color": style.BLACK, "label": "stability limit"}
+        axes.plot(circle.real, circle.imag, linewidth=0.9, **limit)
         axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
         axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:

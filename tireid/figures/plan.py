@@ -1,5 +1,8 @@
 """A planned maneuver: its passes in the area, what is steered, and the band before and after."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -17,31 +20,24 @@ ARROW = 0.07  # lengths of the area: that shows where and whither a pass comes i
 def plan_area_figure(found: Plan) -> Figure:
     """Draw the passes in the area, with every tire that the car may have."""
     space = found.space
-    figure = style.new_figure(
-        style.PAGE, min(max(1.8, style.PAGE * space.width / space.length), style.PAGE)
-    )
+    height = style.PAGE * space.width / space.length
+    figure = style.new_figure(style.PAGE, min(max(1.8, height), style.PAGE))
     axes = figure.subplots()
     axes.add_patch(Rectangle((0.0, 0.0), space.length, space.width, fill=False, linewidth=1.2))
     inner = space.length - 2.0 * space.margin, space.width - 2.0 * space.margin
     corner = space.margin, space.margin
-    axes.add_patch(
-        Rectangle(corner, *inner, fill=False, linestyle="--", color=style.GREY, label="margin")
-    )
+    look: Mapping[str, Any] = {"fill": False, "linestyle": "--", "color": style.GREY}
+    axes.add_patch(Rectangle(corner, *inner, label="margin", **look))
     for k, one in enumerate(found.passes):
         color = style.SERIES[k % len(style.SERIES)]
-        others = axes.plot(
-            one.motion.X[:, 0, 1:], one.motion.Y[:, 0, 1:], color=color, alpha=0.4, linewidth=0.6
-        )
-        axes.plot(one.motion.X[:, 0, 0], one.motion.Y[:, 0, 0], color=color, label=f"pass {k + 1}")
+        X, Y = one.motion.X[:, 0], one.motion.Y[:, 0]
+        others = axes.plot(X[:, 1:], Y[:, 1:], color=color, alpha=0.4, linewidth=0.6)
+        axes.plot(X[:, 0], Y[:, 0], color=color, label=f"pass {k + 1}")
         others[0].set_label("other tires" if k == 0 else None)
-        (X, Y, psi), ahead = one.course(np.zeros(1))[0], ARROW * space.length
-        axes.annotate(
-            "",
-            (X, Y),
-            (X - ahead * np.cos(psi), Y - ahead * np.sin(psi)),
-            arrowprops={"arrowstyle": "-|>", "color": color},
-            annotation_clip=False,
-        )
+        (x, y, psi), ahead = one.course(np.zeros(1))[0], ARROW * space.length
+        tail = x - ahead * np.cos(psi), y - ahead * np.sin(psi)
+        arrow = {"arrowstyle": "-|>", "color": color}
+        axes.annotate("", (x, y), tail, arrowprops=arrow, annotation_clip=False)
     axes.set_xlim(-1.3 * ARROW * space.length, 1.03 * space.length)
     axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
     style.legend_above(figure)
@@ -80,9 +76,8 @@ def plan_band_figure(found: Plan) -> Figure:
     slip = np.linspace(0.0, farthest, 200)
     units = unit_matrix(slip, tires.method.ladder)
     unit = style.force_unit_of(tires.grip[0] * loads)
-    figure = style.new_figure(style.PAGE, 2.9)
-    both = figure.subplots(1, 2, sharey=True)
-    for i, (axes, title) in enumerate(zip(both, style.AXLES, strict=True)):
+    figure, ((*both,),) = style.axle_panels([2.9])
+    for i, axes in enumerate(both):
         force = units @ tires.W[0, i]
         for P, color, label in (
             (tires.covariance, style.GREY, "before"),
@@ -91,11 +86,9 @@ def plan_band_figure(found: Plan) -> Figure:
             half = _half_band(units, force, P[i], tires.prior[i])
             low, high = ((force + sign * half) * loads[i] / unit.newtons for sign in (-1.0, 1.0))
             axes.fill_between(np.degrees(slip), low, high, color=color, alpha=0.3, label=label)
-        axes.plot(
-            np.degrees(slip), force * loads[i] / unit.newtons, color=style.BLUE, label="likely"
-        )
+        likely = force * loads[i] / unit.newtons
+        axes.plot(np.degrees(slip), likely, color=style.BLUE, label="likely")
         axes.set(xlabel="slip angle [deg]")
-        axes.set_title(title)
     both[0].set(ylabel=f"lateral force [{unit.name}]")
     style.legend_above(figure)
     return figure

@@ -20,14 +20,11 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
     loads = np.array(vehicle.axle_loads)
     measured, modelled = shown.measured * loads, shown.modelled * loads
     unit = style.force_unit_of(measured)
-    figure = style.new_figure(style.PAGE, 3.0)
-    panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[2.0, 1.0])
-    for axle, name in enumerate(style.AXLES):
-        upper, lower = panels[:, axle]
+    figure, panels = style.axle_panels([2.0, 1.0])
+    for axle, (upper, lower) in enumerate(panels.T):
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
         upper.plot(shown.t, seen, color=style.BLACK, label="shown by the motion", **POINTS)
         upper.plot(shown.t, said, color=style.ORANGE, label="model", **POINTS)
-        upper.set(title=name)
         lower.axhline(0.0, color=style.BLACK, linewidth=0.6)
         lower.plot(shown.t, said - seen, color=style.ORANGE, **POINTS)
         style.label_time(lower, shown.t)
@@ -45,20 +42,14 @@ def friction_figure(friction: RoadFriction) -> Figure:
     figure = style.new_figure(style.PAGE, 2.8)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     ends = ratio * np.exp(-sd), ratio * np.exp(sd)
-    upper.fill_between(
-        t, *ends, color=style.SKY, alpha=0.5, linewidth=0.0, label="one standard deviation"
-    )
+    shade: Mapping[str, Any] = {"color": style.SKY, "alpha": 0.5, "linewidth": 0.0}
+    upper.fill_between(t, *ends, label="one standard deviation", **shade)
     upper.plot(t, ratio, color=style.BLUE, label="friction")
     upper.axhline(1.0, color=style.GREY, linewidth=0.8, linestyle="--", label="as taught")
     upper.set(ylabel="friction over that\nof the drive that taught", ylim=(0.0, None))
     lower.plot(t, friction.another[some], color=style.ORANGE, label="another road")
-    lower.plot(
-        t,
-        friction.unexplained[some],
-        color=style.BLACK,
-        linestyle=":",
-        label="no friction explains it",
-    )
+    look: Mapping[str, Any] = {"color": style.BLACK, "linestyle": ":"}
+    lower.plot(t, friction.unexplained[some], label="no friction explains it", **look)
     lower.set(ylabel="probability", ylim=(-0.05, 1.05))
     style.label_time(lower, friction.t)
     style.legend_above(figure)

@@ -24,6 +24,7 @@ OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style
 COLUMNS = 5  # entries of a row of the legend
 BAND = "within 2 standard deviations"
 MILLI = 1e3
+_SHADE: Mapping[str, Any] = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
 BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 
@@ -40,12 +41,8 @@ def side_slip_figure(
     told = {name: by_name for name, by_name in told.items() if by_name}
     if not told:
         raise ValueError("no method told a lateral velocity")
-    with_band = [
-        name
-        for name, by_name in told.items()
-        if any(one.v_y_sd is not None for one in by_name.values())
-    ]
-    first = FIRST if FIRST in told else next(iter(with_band), next(iter(told)))
+    has_band = {n: any(one.v_y_sd is not None for one in told[n].values()) for n in told}
+    first = max(told, key=lambda name: (name == FIRST, has_band[name]))
     known = [recording.logged_v_y is not None for recording in drawn]
     ratios = [ratio for one in known for ratio in ([1.5, 0.9] if one else [1.5])]
     figure = style.new_figure(style.PAGE, 0.7 + sum(ratios))
@@ -79,7 +76,7 @@ def _draw(
             np.clip(_degrees(told[first].v_y[part] + side * SIGMAS * band[part], at), -limit, limit)
             for side in (-1.0, 1.0)
         )
-        upper.fill_between(t, low, high, color=style.BLUE, alpha=0.2, linewidth=0.0, label=BAND)
+        upper.fill_between(t, low, high, label=BAND, **_SHADE)
     if exact is not None:
         upper.plot(t, exact, **{**style.TRUTH, "label": "recorded"})
     colors = dict(zip((name for name in told if name != first), OTHERS * len(told), strict=False))
@@ -113,18 +110,9 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     inertial = drive.told["inertial_v_y"]
     figure = style.new_figure(style.PAGE, 3.6)
     above, below = figure.subplots(2, 1, sharex=True)
-    shade: Mapping[str, Any] = {
-        "color": style.BLUE,
-        "alpha": 0.2,
-        "linewidth": 0.0,
-        "label": "told, two sigma",
-    }
+    shade: Mapping[str, Any] = {**_SHADE, "label": "told, two sigma"}
     told_look: Mapping[str, Any] = {**style.ONLINE, "label": "told"}
-    alone: Mapping[str, Any] = {
-        "color": style.GREY,
-        "linewidth": 0.8,
-        "label": "inertial identifier alone",
-    }
+    alone: Mapping[str, Any] = {"color": style.GREY, "label": "inertial identifier alone"}
     above.fill_between(drive.s, told - band, told + band, **shade)
     above.plot(drive.s, inertial, **alone)
     above.plot(drive.s, drive.v_y, **style.TRUTH)

@@ -4,21 +4,22 @@ Truth is black, what was identified online blue, frozen weights orange and dashe
 grey and dotted; the colors are those of Okabe and Ito, which color-blind readers tell apart.
 """
 
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec
+from typing import Any, Literal, NamedTuple, ParamSpec
 
 import numpy as np
 from matplotlib import font_manager, get_data_path, rc_params_from_file, style
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.ticker import FuncFormatter, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.writing import write_file
@@ -38,18 +39,10 @@ SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 
 TRUTH: Mapping[str, Any] = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
 ONLINE: Mapping[str, Any] = {"color": BLUE, "linewidth": 0.9, "label": "online"}
-FROZEN: Mapping[str, Any] = {
-    "color": ORANGE,
-    "linewidth": 1.1,
-    "linestyle": (0, (3.5, 1.2)),
-    "label": "frozen weights",
-}
-LINEAR: Mapping[str, Any] = {
-    "color": GREY,
-    "linewidth": 1.2,
-    "linestyle": (0, (1, 1.2)),
-    "label": "linear tire",
-}
+_DASHED = {"color": ORANGE, "linestyle": (0, (3.5, 1.2))}
+FROZEN: Mapping[str, Any] = {**_DASHED, "linewidth": 1.1, "label": "frozen weights"}
+_DOTTED = {"color": GREY, "linestyle": (0, (1, 1.2))}
+LINEAR: Mapping[str, Any] = {**_DOTTED, "linewidth": 1.2, "label": "linear tire"}
 
 _look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
 LOOK: dict[str, Any] = dict(_look.items())
@@ -66,19 +59,6 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapper
 
 
-class _PlainNumbers(ScalarFormatter):
-    r"""The usual numbers of an axis as words: math, `$\mathdefault{1.5}$`, is laid out slowly.
-
-    What stands beside the axis, as ×10³, stays as it is.
-    """
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        return _MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
-
-
-_MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
-
-
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
@@ -87,6 +67,28 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def axle_panels(
+    heights: Sequence[float], *, room: float = 0.0, sharex: bool | Literal["col"] = True
+) -> tuple[Figure, NDArray[Any]]:
+    """Return an empty figure and its panels: a row for each height [in], a column for each axle.
+
+    room : above and below them [in].
+    """
+    figure = new_figure(PAGE, room + sum(heights))
+    ratios: Mapping[str, Any] = {"height_ratios": heights, "squeeze": False}
+    panels = figure.subplots(len(heights), 2, sharex=sharex, sharey="row", **ratios)
+    for axes, name in zip(panels[0], AXLES, strict=True):
+        axes.set_title(name)
+    return figure, panels
+
+
+def label_forces(panels: NDArray[Any], unit: "ForceUnit", *, residual: bool) -> None:
+    """Name the axes of rows of forces, the last row of residuals where there is one."""
+    for row, axes in enumerate(panels[:, 0]):
+        missed = residual and row == len(panels) - 1
+        axes.set_ylabel(f"{'residual' if missed else 'lateral force'} [{unit.name}]")
 
 
 def with_own_fonts() -> None:
@@ -105,28 +107,19 @@ def with_own_fonts() -> None:
 with_own_fonts()
 
 
-def _lay_out(figure: Figure) -> None:
-    """Fit labels into a figure, once: it is drawn more than once, and this takes as long as that.
-
-    Numbers of linear axes become words. A figure that was drawn keeps its places, until it is given
-    a layout engine again: matplotlib draws one that has an engine twice.
-    """
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
-            if type(axis.get_major_formatter()) is ScalarFormatter:
-                axis.set_major_formatter(_PlainNumbers())
-        resolution, figure.dpi = figure.dpi, _RESOLUTION  # at fewer dots letters are less exact
-        engine.execute(figure)
-        figure.dpi = resolution
-        figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
-
-
 @contextmanager
 def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
-    """Lay a figure out, and let it be drawn in the look of the project meanwhile."""
+    """Lay a figure out, and let it be drawn in the look of the project meanwhile.
+
+    It is laid out once: it is drawn more than once, and this takes as long as that.
+    """
     with style.context(["default", dict(look)]):
-        _lay_out(figure)
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            resolution, figure.dpi = figure.dpi, _RESOLUTION  # at fewer dots letters are less exact
+            engine.execute(figure)
+            figure.dpi = resolution
+            figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
         yield
 
 
@@ -226,16 +219,19 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
     """
     first, last = axes.get_xlim()
     if prediction and t_freeze < last:
-        axes.axvspan(
-            max(t_freeze, first),
-            last,
-            facecolor="#F1EDE4",
-            edgecolor="none",
-            zorder=0,
-            label=_PREDICTION,
-        )
+        shade: Mapping[str, Any] = {"facecolor": "#F1EDE4", "edgecolor": "none", "zorder": 0}
+        axes.axvspan(max(t_freeze, first), last, label=_PREDICTION, **shade)
     if first <= t_freeze <= last:
         axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=FREEZE)
+
+
+def few_ticks(axis: Axis) -> None:
+    """Number a logarithmic axis in plain numbers: at 1, 2 and 5 of decades, finer within one."""
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high > 10.0 * low else (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def note(axes: Axes, text: str) -> None:
@@ -257,28 +253,16 @@ def legend_above(
     for label in order:
         if label in entries:
             entries[label] = entries.pop(label)
-    legend = figure.legend(
-        list(entries.values()),
-        list(entries),
-        loc="outside upper center",
-        ncols=columns or len(entries),
-        borderaxespad=0.2,
-    )
-    _bolder(legend)
+    place: Mapping[str, Any] = {"loc": "outside upper center", "borderaxespad": 0.2}
+    columns = columns or len(entries)
+    _bolder(figure.legend(list(entries.values()), list(entries), ncols=columns, **place))
 
 
 def legend_beside(axes: Axes) -> None:
     """Put the legend of one panel to its right, where it covers no data."""
-    handles, labels = axes.get_legend_handles_labels()
-    entries = dict(zip(labels, handles, strict=True))
-    legend = axes.legend(
-        list(entries.values()),
-        list(entries),
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1.0),
-        borderaxespad=0.0,
-    )
-    _bolder(legend)
+    entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    place: Mapping[str, Any] = {"bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+    _bolder(axes.legend(list(entries.values()), list(entries), loc="upper left", **place))
 
 
 def _bolder(legend: Legend) -> None:

@@ -72,29 +72,18 @@ def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
 
 
 class DrawnRun:
-    """What is drawn of what a run recorded, gathered block by block.
+    """What is drawn of what a run recorded, gathered block by block."""
 
-    Parameters
-    ----------
-    ends : first and last time [s].
-    """
-
-    def __init__(
-        self, history: History, ends: tuple[float, float], tell: Callable[[Block], Sequence[Array]]
-    ) -> None:
-        self._recording, self._ends, self._tell = history.recording, ends, tell
-        t = self._recording.t
-        first, last = np.searchsorted(t, ends[0], side="left"), np.searchsorted(t, ends[1], "right")
-        self._width = 1 if last - first <= LONG else -(-int(last - first) // COLUMNS)
+    def __init__(self, history: History, tell: Callable[[Block], Sequence[Array]]) -> None:
+        self._recording, self._tell = history.recording, tell
+        n = len(self._recording)
+        self._width = 1 if n <= LONG else -(-n // COLUMNS)
         self._times: list[Array] = []
         self._values: list[list[Array]] = []
 
     def take(self, block: Block) -> None:
         told, here = self._tell(block), self._recording.t[block.part]
-        part: Samples = (here >= self._ends[0]) & (here <= self._ends[1])
-        if self._width > 1 and part.any():
-            part = np.flatnonzero(part)
-            part = part[farthest([one[part] for one in told], self._width)]
+        part: Any = slice(None) if self._width == 1 else farthest(told, self._width)
         self._times.append(here[part])
         self._values.append([one[part] for one in told])
 
@@ -108,13 +97,10 @@ class DrawnRun:
 
 
 def shown_of_run(
-    history: History, ends: tuple[float, float], tell: Callable[[Block], Sequence[Array]]
+    history: History, tell: Callable[[Block], Sequence[Array]]
 ) -> tuple[Array, list[Array]]:
-    """Return times and values of what a run recorded, as `DrawnRun` gathers them.
-
-    ends : first and last time [s].
-    """
-    drawn = DrawnRun(history, ends, tell)
+    """Return times and values of what a run recorded, as `DrawnRun` gathers them."""
+    drawn = DrawnRun(history, tell)
     for block in history.blocks():
         drawn.take(block)
     return drawn.curves()

@@ -65,45 +65,27 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     limits = style.force_range(reference, frozen)
     stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
 
-    ratios = [3.2] if known is None else [3.2, 1.3]
-    figure = style.new_figure(style.PAGE, sum(ratios))
-    panels = figure.subplots(
-        len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios
-    )
-    for axle, name in enumerate(style.AXLES):
-        axes, lowest = panels[0, axle], panels[-1, axle]
+    learnt: Mapping[str, Any] = {**_CLOUD, "color": style.ORANGE, "label": "frozen weights"}
+    figure, panels = style.axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
+    for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
         if known is not None:
-            axes.plot(
-                alpha[:, axle],
-                style.drawable(reference[:, axle], limits),
-                color=color,
-                label=label,
-                **{**_CLOUD, "markersize": 3.0, "alpha": 0.35},
-            )
+            look = {**_CLOUD, "color": color, "label": label, "markersize": 3.0, "alpha": 0.35}
+            axes.plot(alpha[:, axle], style.drawable(reference[:, axle], limits), **look)
             missed = np.clip(frozen[:, axle] - reference[:, axle], *limits)
             lowest.axhline(0.0, color=color, linewidth=0.6)
-            lowest.plot(alpha[:, axle], missed, color=style.ORANGE, **_CLOUD)
-        axes.plot(
-            alpha[:, axle],
-            style.drawable(frozen[:, axle], limits),
-            color=style.ORANGE,
-            label="frozen weights",
-            **_CLOUD,
-        )
+            lowest.plot(alpha[:, axle], missed, **learnt)
+        axes.plot(alpha[:, axle], style.drawable(frozen[:, axle], limits), **learnt)
         low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
         margin = 0.04 * (high - low) or 1.0
         ends = np.array([low - margin, high + margin])
         axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **style.LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
-            _shade_unknown(axes, float(np.rad2deg(model.known_slip[axle])), ends)
-            if known is not None:
-                _shade_unknown(lowest, float(np.rad2deg(model.known_slip[axle])), ends)
-        axes.set(xlim=ends, ylim=limits, title=name)
+            for panel in panels[:, axle]:
+                _shade_unknown(panel, float(np.rad2deg(model.known_slip[axle])), ends)
+        axes.set(xlim=ends, ylim=limits)
         _label_slip(lowest, axle)
-    panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
-    if known is not None:
-        panels[1, 0].set_ylabel(f"residual [{unit.name}]")
+    style.label_forces(panels, unit, residual=known is not None)
     labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
     style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(UNKNOWN,))
     return figure
@@ -116,37 +98,19 @@ def _label_slip(axes: Axes, axle: int) -> None:
 
 def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: float) -> None:
     """Draw the steady curve of an axle, in its band where it has one."""
-    slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
+    degrees = np.linspace(*ends, 200)
+    slip = np.deg2rad(degrees)
     band = model.band(slip)
-    if band is not None:
+    if band is not None:  # under the points, which it would make grey
+        edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in band)
-        axes.fill_between(
-            np.rad2deg(slip),
-            low,
-            high,
-            facecolor=(style.SKY, 0.6),
-            edgecolor=style.BLUE,
-            linewidth=0.4,
-            zorder=1.5,  # under the points, which it would make grey
-            label=BAND,
-        )
+        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=BAND, **edge)
+    look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
     for side in model.guaranteed_band(slip) or ():
-        axes.plot(
-            np.rad2deg(slip),
-            side[:, axle] / newtons,
-            color=style.PURPLE,
-            linewidth=0.9,
-            linestyle="--",
-            label=_GUARANTEED,
-        )
-    axes.plot(
-        np.rad2deg(slip),
-        model.force(slip)[:, axle] / newtons,
-        color=style.BLUE,
-        linewidth=1.2,
-        zorder=4,
-        label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
-    )
+        axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
+    label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
+    look = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
+    axes.plot(degrees, model.force(slip)[:, axle] / newtons, **look)
 
 
 def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
@@ -160,8 +124,6 @@ def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
 class TireCurve:
     """Steady axle forces over slip, one curve an axle.
 
-    Parameters
-    ----------
     alpha : slip in the paper's sign [rad], (k,).
     force : of front and rear axle [N], (k, 2).
     """
@@ -195,36 +157,22 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
     low, high = style.force_range(force, *steep)
     missed = _missed_of_truth(curves, reach, unit.newtons)
-    ratios = [3.3, 1.3] if missed else [3.3]
-    figure = style.new_figure(style.PAGE, sum(ratios))
-    panels = figure.subplots(
-        len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios
-    )
-    for axle, name in enumerate(style.AXLES):
-        axes = panels[0, axle]
-        axes.plot(
-            alpha[:, axle],
-            force[:, axle],
-            color=style.SKY,
-            label="this drive, true forces",
-            **{**_CLOUD, "markersize": 3.0, "alpha": 0.6},
-        )
+    cloud = {**_CLOUD, "markersize": 3.0, "alpha": 0.6, "label": "this drive, true forces"}
+    figure, panels = style.axle_panels([3.3, 1.3] if missed else [3.3], sharex="col")
+    for axle, axes in enumerate(panels[0]):
+        axes.plot(alpha[:, axle], force[:, axle], color=style.SKY, **cloud)
         for curve, part, values in zip(curves, shown, within, strict=True):
-            axes.plot(
-                np.rad2deg(curve.alpha[part]),
-                style.drawable(values[:, axle], (low, high)),
-                label=curve.label,
-                **tire_look(curve.label),
-            )
-        axes.set(title=name, xlim=(-reach, reach), ylim=(low, high))
+            drawn = style.drawable(values[:, axle], (low, high))
+            look = {**tire_look(curve.label), "label": curve.label}
+            axes.plot(np.rad2deg(curve.alpha[part]), drawn, **look)
+        axes.set(xlim=(-reach, reach), ylim=(low, high))
         for label, slip, residual in missed:
             panels[1, axle].plot(slip, residual[:, axle], **tire_look(label))
         _label_slip(panels[-1, axle], axle)
-    panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
     if missed:
         near = [one for label, _, one in missed if not label.startswith("linear")]
         panels[1, 0].set_ylim(style.force_range(np.zeros(1), *near))
-        panels[1, 0].set_ylabel(f"residual [{unit.name}]")
+    style.label_forces(panels, unit, residual=bool(missed))
     style.legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
     return figure
 
@@ -250,11 +198,7 @@ def drawn_tracks(history: History) -> DrawnRun | None:
     """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to."""
     if not history.tracks_over(next(history.blocks())):
         return None
-    t = history.recording.t
-    ends = (float(t[0]), float(t[-1]))
-    return DrawnRun(
-        history, ends, lambda block: [track.values for track in history.tracks_over(block)]
-    )
+    return DrawnRun(history, lambda block: [one.values for one in history.tracks_over(block)])
 
 
 @style.styled
@@ -282,9 +226,8 @@ def learnt_axles_figure(
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
         for axle, color in enumerate((style.GREEN, style.PURPLE)):
-            axes.plot(
-                at, values[:, axle], color=color, linewidth=1.0, label=style.AXLES[axle].lower()
-            )
+            look: Mapping[str, Any] = {"color": color, "label": style.AXLES[axle].lower()}
+            axes.plot(at, values[:, axle], linewidth=1.0, **look)
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for freeze in freeze_times:

@@ -58,8 +58,6 @@ EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError,
 class _Task:
     """A log to be learnt.
 
-    Parameters
-    ----------
     log : its name: absolute path or address, or where it lies under a root.
     address : absolute path or address, by which any process reads it.
     size : [bytes].
@@ -80,8 +78,6 @@ class _Task:
 class Telling:
     """What is told of all logs.
 
-    Parameters
-    ----------
     start : a fit or a prior that is believed before; None believes the table.
     judging : "motion" asks whether the frozen model gives the drive's motion back, "none" for
         nothing.
@@ -149,17 +145,10 @@ def find_logs(
 ) -> tuple[list[_Task], dict[str, str]]:
     """Return the logs that patterns name, in order, and why others are left out.
 
-    Parameters
-    ----------
     vehicle : path of the car's TOML; {name} in it is replaced by the tag of that name.
     tags : pattern of a path's end with {name} for its parts, as in
         "{vehicle}/{tires}/{date}-{drive}.csv"; empty says nothing.
     root : folder or address that names begin at; empty leaves them absolute.
-
-    Raises
-    ------
-    ValueError
-        Where a pattern names no log or one outside of the root, or {name} is no tag.
     """
     core = needed("fsspec.core")
     above = _absolute(root) if root else ""
@@ -204,14 +193,7 @@ def find_logs(
 def tag_pattern(tags: str) -> re.Pattern[str]:
     """Return the expression that finds tags at the end of a path.
 
-    Parameters
-    ----------
     tags : with {name} for what a name stands for; * is anything within a folder's name.
-
-    Raises
-    ------
-    ValueError
-        Where it names nothing, or a name twice.
     """
     names = _FIELD.findall(tags)
     if not names or len(set(names)) < len(names):
@@ -265,8 +247,6 @@ def _written(info: Mapping[str, Any]) -> str:
 def _learn_log(task: _Task, telling: Telling, car: Car, known: Set[str] = frozenset()) -> "Learnt":
     """Return the row of a log, one for each run of its file; where it cannot be used, it says why.
 
-    Parameters
-    ----------
     known : `LogRow.known` of logs that are not learnt again.
     """
     row = row_of(task, car)
@@ -331,14 +311,7 @@ def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogR
 def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling) -> LogRow:
     """Return the row with what is learnt of its log.
 
-    Parameters
-    ----------
     recording : the log, at `DT`.
-
-    Raises
-    ------
-    ValueError, ArithmeticError
-        Where nothing can be learnt of it.
     """
     counted_samples(recording, vehicle.lowest_speed)  # refuses a car that never drives
     begin, start = float(recording.t[0]), telling.start
@@ -430,8 +403,6 @@ class Learnt(NamedTuple):
 class LearnSome:
     """Work of a process: a few logs.
 
-    Parameters
-    ----------
     known : `LogRow.known` of logs that are not learnt again.
     """
 
@@ -478,8 +449,6 @@ def learn_fleet(
 ) -> _Done:
     """Learn the logs that a store has no row of, and keep what comes.
 
-    Parameters
-    ----------
     store : where rows are kept, some at a time, and sorted at the end.
     spread_map : does the work; results may come in any order.
     again : also learn logs whose row holds an error.
@@ -537,8 +506,6 @@ def _overcome(index: Sequence[LogRow]) -> list[LogRow]:
 def _others(index: Sequence[LogRow], names: Set[str], current: Set[str]) -> list[LogRow]:
     """Return rows of the same contents with another setting, or of the same names of other content.
 
-    Parameters
-    ----------
     current : `LogRow.known` of what these logs hold.
     """
     contents = {row.content for row in index if row.content and row.known in current}
@@ -552,8 +519,6 @@ def _others(index: Sequence[LogRow], names: Set[str], current: Set[str]) -> list
 def on_this_machine(jobs: int) -> Map:
     """Return a map over portions of logs that outlives processes that die; its order is any.
 
-    Parameters
-    ----------
     jobs : processes; one alone is this one.
     """
     if jobs == 1:
@@ -577,8 +542,6 @@ def on_this_machine(jobs: int) -> Map:
 def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     """Return a map over portions of logs that outlives workers that die; its order is any.
 
-    Parameters
-    ----------
     elsewhere : of `tireid.cluster.cluster`; tells `lost` what several workers died of.
     """
 

@@ -54,8 +54,6 @@ class MergeError(TireidError, ValueError):
 class Merged:
     """What the logs of a group say together.
 
-    Parameters
-    ----------
     key : what they have in common, by `BY` or tag.
     elsewhere : how many of them were driven on another road.
     """
@@ -75,14 +73,7 @@ class Merged:
 def key_of(row: LogRow, by: Sequence[str]) -> Key:
     """Return what a log belongs to.
 
-    Parameters
-    ----------
     by : names of `BY` or of tags.
-
-    Raises
-    ------
-    MergeError
-        Where a name is neither, or a date is needed and cannot be read.
     """
     return tuple((name, _value(row, name)) for name in by)
 
@@ -102,13 +93,7 @@ def _value(row: LogRow, name: str) -> str:
 
 
 def day_of(row: LogRow) -> date:
-    """Return the day of a log.
-
-    Raises
-    ------
-    MergeError
-        Where its date is none of ISO 8601.
-    """
+    """Return the day of a log."""
     try:
         return date.fromisoformat(row.date[:10])
     except ValueError:
@@ -120,8 +105,6 @@ def day_of(row: LogRow) -> date:
 def usable(row: LogRow, *, refused: bool = False) -> bool:
     """Return whether a model can be made of a row.
 
-    Parameters
-    ----------
     refused : also where the verdict refuses its answer.
     """
     return bool(not row.error and row.part_begin and (refused or row.valid is not False))
@@ -130,15 +113,7 @@ def usable(row: LogRow, *, refused: bool = False) -> bool:
 def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, LogRow]]:
     """Yield rows with what they belong to.
 
-    Parameters
-    ----------
     by : names of `BY` or of tags.
-
-    Raises
-    ------
-    MergeError
-        Where the logs of a group are of several cars, or a log is in it twice, learnt with two
-        settings.
     """
     cars: dict[Key, tuple[str, str]] = {}
     settings: dict[tuple[object, ...], str] = {}
@@ -163,15 +138,8 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, Lo
 def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merged]:
     """Return the model of each group of logs, by its key; rows are held one at a time.
 
-    Parameters
-    ----------
     rows : yields them, three times: what all say tells on which road each was, and most.
     by : what the logs of a group have in common; empty merges all.
-
-    Raises
-    ------
-    MergeError
-        As of `grouped`.
     """
     sums: dict[Key, _Sum] = {}
     for _ in range(ROUNDS):
@@ -249,15 +217,7 @@ class _Sum:
         p, covariance = self.settled()
         of_next = [INDEX[name] for name in CHANGES]  # its sensors are off by an error of its own
         covariance[of_next, of_next] += self.errors[1] ** 2
-        model = FittedModel(
-            vehicle=self.vehicle,
-            p=p,
-            covariance=covariance,
-            driven=self.reach.slip,
-            speeds=self.reach.speeds,
-            a_x=self.reach.a_x,
-            unexplained=self.reach.unexplained,
-        )
+        model = _model(self.vehicle, p, covariance, self.reach)
         return Merged(
             key=key, logs=self.logs, elsewhere=self.elsewhere, told=self.told, model=model
         )
@@ -278,8 +238,6 @@ def errors_of(beliefs: Priors) -> tuple[Array, Array]:
 class _FleetPrior:
     """What cars of a fleet have in common, and how they differ.
 
-    Parameters
-    ----------
     mean : m of `TIRES`, lengths in wheelbases (q,).
     spread : T + M (q, q).
     cars : V.
@@ -294,23 +252,19 @@ class _FleetPrior:
     def model(self, vehicle: Vehicle) -> FittedModel:
         """Return where a car starts: a model that `tireid identify --weights` begins with.
 
-        Parameters
-        ----------
         vehicle : the car; its cornering stiffness is not looked at.
         """
         usual, size = Priors.of(vehicle), sizes(vehicle)
         p, covariance = usual.mean.copy(), usual.covariance
         p[TIRES] = self.mean * size
         covariance[np.ix_(TIRES, TIRES)] = self.spread * np.outer(size, size)
-        return FittedModel(
-            vehicle=vehicle,
-            p=np.clip(p, usual.low, usual.high),
-            covariance=covariance,
-            driven=self.reach.slip,
-            speeds=self.reach.speeds,
-            a_x=self.reach.a_x,
-            unexplained=self.reach.unexplained,
-        )
+        return _model(vehicle, np.clip(p, usual.low, usual.high), covariance, self.reach)
+
+
+def _model(vehicle: Vehicle, p: Array, covariance: Array, reach: Reach) -> FittedModel:
+    reached = {"driven": reach.slip, "speeds": reach.speeds, "a_x": reach.a_x}
+    found: dict[str, Array] = {"p": p, "covariance": covariance, **reached}
+    return FittedModel(vehicle=vehicle, unexplained=reach.unexplained, **found)
 
 
 def sizes(vehicle: Vehicle) -> Array:
@@ -322,13 +276,7 @@ def sizes(vehicle: Vehicle) -> Array:
 
 
 def fleet_prior(cars: Sequence[Merged]) -> _FleetPrior:
-    """Return what many cars have in common.
-
-    Raises
-    ------
-    MergeError
-        Where there is none.
-    """
+    """Return what many cars have in common."""
     if not cars:
         raise MergeError("no log of the store can be used: nothing is known of where a car starts")
     listed = [_of_size(one) for one in cars]

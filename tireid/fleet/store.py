@@ -50,13 +50,7 @@ class StoreError(TireidError, ValueError):
 
 
 def needed(name: str, what: str = "a fleet's store") -> Any:
-    """Return a library of the extra [fleet].
-
-    Raises
-    ------
-    ImportError
-        Where it is not installed; the message says how.
-    """
+    """Return a library of the extra [fleet]."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -67,8 +61,6 @@ def needed(name: str, what: str = "a fleet's store") -> Any:
 class LogRow:
     """What was learnt of a log, or why nothing was.
 
-    Parameters
-    ----------
     log : its name: absolute path or address, or where it lies under a root.
     run : of the file, where it has several; else empty.
     content : hash of what the file holds; empty where it could not be read.
@@ -173,13 +165,7 @@ class LogRow:
 
     @property
     def parts(self) -> list[Information]:
-        """What its parts tell of the tires, in the order of time.
-
-        Raises
-        ------
-        StoreError
-            Where its columns do not fit one another, or a number is not finite.
-        """
+        """What its parts tell of the tires, in the order of time."""
         k, q = len(self.part_begin), len(TOLD)
         self.numbers("part_begin", k)
         triangles = self.numbers("matrix", k, q * (q + 1) // 2)
@@ -197,13 +183,7 @@ class LogRow:
         return found
 
     def numbers(self, name: str, *shape: int) -> Array:
-        """Return a column that is a list, in its shape.
-
-        Raises
-        ------
-        StoreError
-            Where it holds more numbers or fewer, or one that is not finite.
-        """
+        """Return a column that is a list, in its shape."""
         values, count = np.asarray(getattr(self, name), dtype=np.float64), math.prod(shape)
         if values.size != count:
             raise StoreError(f"{self._where}: {name} must hold {count} numbers, not {values.size}")
@@ -274,13 +254,7 @@ class Store:
         return bool(self._sizes("logs") or self._sizes("pending"))
 
     def require_ours(self) -> None:
-        """Refuse an address at which there is something else.
-
-        Raises
-        ------
-        StoreError
-            Where there is a file, or a folder that is not empty and no store.
-        """
+        """Refuse an address at which there is something else."""
         fs, path = self._place
         if fs.isfile(path):
             raise StoreError(f"{self.address} is a file: a store is a folder, choose another name")
@@ -288,13 +262,7 @@ class Store:
             raise StoreError(f"{self.address} holds something else: choose another folder")
 
     def require(self) -> None:
-        """Refuse an address without rows.
-
-        Raises
-        ------
-        StoreError
-            Where nothing was learnt there yet.
-        """
+        """Refuse an address without rows."""
         if not self.exists:
             raise StoreError(f"{self.address} is no store: tireid fleet learn LOGS --out makes one")
 
@@ -305,15 +273,8 @@ class Store:
     def stream(self, columns: Sequence[str] | None = None, *, where: str = "") -> Iterator[LogRow]:
         """Yield the rows as they lie in their files, a few of them in memory.
 
-        Parameters
-        ----------
         columns : that are read; others are as of a log without result. None reads all.
         where : a condition of SQL on the columns; empty takes every row.
-
-        Raises
-        ------
-        StoreError
-            Where a file is none of a store, or the condition is not right.
         """
         pyarrow = needed("pyarrow")
         files = {**self._sizes("logs"), **self._sizes("pending")}

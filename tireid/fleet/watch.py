@@ -47,8 +47,6 @@ TITLES = ("stiffness of the front axle", "stiffness of the rear axle", "friction
 class Watching:
     """What is looked for, and how many false alarms are accepted.
 
-    Parameters
-    ----------
     baseline : learning of a car that its baseline takes [s].
     false_alarms : in a thousand hours of learning, of all statistics of a car together.
     stiffness, friction : change of ln C and of ln μ that is looked for, δ [-].
@@ -68,8 +66,6 @@ class Watching:
     def threshold(self, part: float) -> float:
         """Return h.
 
-        Parameters
-        ----------
         part : learning of a part, on average [s].
         """
         statistics = 2.0 * len(TITLES)
@@ -106,8 +102,6 @@ class Seen(NamedTuple):
 class Alarm:
     """A change that was noticed.
 
-    Parameters
-    ----------
     statistic : index of `TITLES`.
     after : learning from the baseline to the alarm [s].
     change : of all statistics since it began, ln, (3,) [-].
@@ -180,8 +174,6 @@ class Alarm:
 class Watch:
     """What was seen of a fleet.
 
-    Parameters
-    ----------
     alarms : in the order of cars and time.
     """
 
@@ -198,14 +190,7 @@ class Watch:
 def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watch:
     """Return which cars' tires changed.
 
-    Parameters
-    ----------
     by : what tells cars, or their sets of tires, apart.
-
-    Raises
-    ------
-    MergeError
-        Where logs of a group are of several cars, or have no date.
     """
     cars: dict[str, Vehicle] = {}
     parts: dict[str, list[Part]] = {}
@@ -245,13 +230,7 @@ class _Compared(NamedTuple):
 
 
 def parts_of(row: LogRow) -> list[Part]:
-    """Return the parts of a log that tell of the tires.
-
-    Raises
-    ------
-    MergeError
-        Where it has no date to be ordered by.
-    """
+    """Return the parts of a log that tell of the tires."""
     day_of(row)
     return [
         Part(row.name, row.date, begin, told)
@@ -286,8 +265,6 @@ def change_from(told: Information, p: Array, beliefs: Priors) -> tuple[Array, Ar
 
     Sensors may be off otherwise than when the car was learnt: that is estimated beside it.
 
-    Parameters
-    ----------
     p : parameters of the car (p,).
     """
     u, slopes = coordinates(p)

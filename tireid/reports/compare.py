@@ -28,7 +28,7 @@ def write_compare_report(
 
     verdicts : on what the default learns, by recording.
     """
-    course = comparison.course
+    course, learnt = comparison.course, "recordings on which what the default learnt is valid"
     captions = {
         "methods": "Errors of every method.",
         "matrix": "Learnt on one recording, asked about another.",
@@ -47,7 +47,7 @@ def write_compare_report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Every method learns on each recording, is frozen at its end and asked about all "
         "of them.",
-        numbers=[*verdicts_headline(verdicts), *_compare_headlines(comparison)],
+        numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
         warnings=[
             *_compare_warnings(comparison),
             *(

@@ -130,20 +130,13 @@ def identify_headlines(
         if shares:
             meaning = f"of the rms force missed on drives {kind}, frozen"
             numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
-    if model.known_slip is not None:
-        front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
-        numbers.append(page.Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
-    return numbers
+    return [*numbers, *verdicts.known_headline(model)]
 
 
 def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
     """Return on how many drives that it was not learnt on a model is valid, and what it misses."""
-    if not asked:
-        return []
-    valid = sum(verdict.valid for verdict in asked.values())
-    tone: page.Tone = "" if valid == len(asked) else "bad"
     meaning = "replayed drives, not learnt on, whose motion the model gives back"
-    numbers = [page.Headline(f"{valid} of {len(asked)}", meaning, tone)]
+    numbers = verdicts.verdicts_headline(asked, meaning)
     shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
     if shares:
         front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))

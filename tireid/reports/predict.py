@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from identifier.measured import with_doubt
 from identifier.prediction import Prediction
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
@@ -20,6 +18,7 @@ from tireid.reports.identify import (
     guaranteed_sentence,
 )
 from tireid.verdicts import (
+    known_headline,
     missed_headline,
     of_answer,
     stored_warning,
@@ -95,10 +94,7 @@ def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
         numbers.append(
             page.Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
         )
-    if prediction.model.known_slip is not None:
-        front, rear = (with_doubt(float(x)) for x in np.degrees(prediction.model.known_slip))
-        numbers.append(page.Headline(f"{front} / {rear}°", "known up to this slip, front / rear"))
-    return numbers
+    return [*numbers, *known_headline(prediction.model)]
 
 
 def _errors(prediction: Prediction) -> list[page.Block]:
