@@ -2,7 +2,7 @@
 
 What a log shows of a drive is made in this order: the place of the sensor, the way it looks, its
 low pass, its delay, its offset, its factor. It is taken out backwards. Conventions are those of
-`models.faults`: a fault that is applied and repaired gives the drive back.
+`benchmarks.faults`: a fault that is applied and repaired gives the drive back.
 """
 
 import math

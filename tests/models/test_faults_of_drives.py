@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.faults import (
+from benchmarks.faults import (
     AnotherCar,
     Bank,
     ClockJump,
-    FaultError,
     Held,
     Jitter,
     Lagging,
@@ -19,13 +18,13 @@ from models.faults import (
     Misaligned,
     Passing,
     SensorElsewhere,
-    SensorFault,
     ShiftedCenter,
     SwappedAxles,
     Together,
     WrongNumber,
     WrongUnit,
 )
+from models.faults import FaultError, SensorFault
 from models.maneuvers import RandomSteer, StepSteer
 from models.plant import Plant
 from models.recordings import Recording

@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.faults import (
+from benchmarks.faults import (
     UNITS,
     Lagging,
     Late,
     Mirrored,
     Misaligned,
     SensorElsewhere,
-    SensorFault,
     ShiftedCenter,
     SwappedAxles,
     Together,
     WrongNumber,
     WrongUnit,
 )
+from models.faults import SensorFault
 from models.recordings import Recording, RecordingError, Repair
 from models.schema import Table
 from models.vehicle import VehicleError, sedan

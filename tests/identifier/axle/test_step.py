@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.faults import Bank
 from identifier.axle import AxleIdentifier
 from identifier.axle.covariance import unpacked
 from identifier.run import identify
-from models.faults import Bank
 
 G = 9.81
 

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.answers import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
+from benchmarks.faults import Lagging, Late, Misaligned, Together
 from identifier.doctor import Finding, diagnose, examine
 from identifier.doctor.faults import Candidate, Search, _all_move, prepared
 from identifier.doctor.pieces import stretches_of
@@ -16,7 +17,7 @@ from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
 from identifier.estimate.solve import descend, simulate
 from identifier.motion.parameters import INDEX
-from models.faults import Lagging, Late, Misaligned, SensorFault, Together
+from models.faults import SensorFault
 from models.recordings import Repair
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.conftest import areas_of, pressed
