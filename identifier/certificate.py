@@ -58,7 +58,6 @@ class Certificate:
         return "\n".join([*lines, f"verdict: {self.verdict}"])
 
     def __getitem__(self, name: str) -> Property:
-        """Return the property of that name."""
         for entry in self.properties:
             if entry.name == name:
                 return entry
@@ -87,8 +86,7 @@ class Certificate:
 def at_most(value: float, *, good: float, bad: float | None) -> Status:
     """Pass up to `good`, warn up to `bad`, fail beyond (never, where `bad` is None).
 
-    value : to be judged; nan fails.
-    bad : largest value that only warns.
+    value : to be judged; nan fails.   bad : largest value that only warns.
     """
     if value <= good:
         return "pass"
@@ -98,8 +96,7 @@ def at_most(value: float, *, good: float, bad: float | None) -> Status:
 def at_least(value: float, *, good: float, bad: float | None) -> Status:
     """Pass down to `good`, warn down to `bad`, fail below (never, where `bad` is None).
 
-    value : to be judged; nan fails.
-    bad : smallest value that only warns.
+    value : to be judged; nan fails.   bad : smallest value that only warns.
     """
     if value >= good:
         return "pass"

@@ -60,10 +60,7 @@ class _SteadyTires(Protocol):
 
 
 def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
-    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle.
-
-    refusal : class of the error to raise.
-    """
+    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle."""
     force = np.asarray(tires.force_at(np.array([-WIDE, -_PROBE, _PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
         raise refusal(

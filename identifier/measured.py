@@ -49,5 +49,4 @@ def printed_scale(unit: str) -> float:
 
 
 def printed_unit(unit: str) -> str:
-    """Return the unit that is printed for a unit of files."""
     return _PRINTED.get(unit, (1.0, unit))[1]

@@ -177,7 +177,6 @@ class OnnxModel(TireModel):
     A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
     where F_y = +C α; ISO 8855 has the opposite sign: for a network of that, set `slip_sign` to -1.
 
-    vehicle : the car, whose l_f and l_r make slip angles.
     min_speed : below this speed [m/s] the forces read zero.
     inputs : what the network's columns are, see `read_network`; None goes by names and number.
     slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -258,7 +257,6 @@ class OnnxModel(TireModel):
         return tuple(read_network(self.content, self.inputs).name_in())
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
         del dt
         return Setup(
             scan=_scan(self.content, self.inputs, self.slip_sign),
@@ -301,7 +299,6 @@ class OnnxModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":
-        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             return cls(

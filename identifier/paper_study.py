@@ -81,8 +81,7 @@ PAST_ONLINE, PAST, AFTER, ALL = MEASURES = (  # of frozen weights; the first is 
 def frozen_column(measure: str, t_freeze: float) -> str:
     """Return the column of a measure of frozen weights, "past_against_online_32".
 
-    measure : one of `MEASURES`.
-    t_freeze : time of the freeze [s].
+    measure : one of `MEASURES`.   t_freeze : time of the freeze [s].
     """
     return f"{measure}_{freeze_key(t_freeze)}"
 
@@ -121,8 +120,7 @@ def drive_maneuvers() -> dict[str, Recording]:
 def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> Trial:
     """Run one design.
 
-    maneuver : "step_steer" or "slalom".
-    design : from `paper_design`.
+    maneuver : "step_steer" or "slalom".   design : from `paper_design`.
     """
     history = identify(recording, sedan(), design)
     if history.diverged_at is not None:
@@ -174,8 +172,7 @@ class Study:
     def typical(self, maneuver: str, law: str) -> Trial | None:
         """Return the trial of median error over all of the drive at the first freeze, if any.
 
-        maneuver : "step_steer" or "slalom".
-        law : one of `LAWS`.
+        maneuver : "step_steer" or "slalom".   law : one of `LAWS`.
         """
         column = frozen_column(ALL, FREEZES[maneuver][0])
         seeds = [(e[column], seed) for seed, e in enumerate(self.errors[maneuver][law]) if e]
@@ -202,8 +199,7 @@ STEPS = 1 + 2 * len(LAWS)  # of `run_study`: the drives, and each law on both ma
 def run_study(seeds: int, progress: Callable[[str], None]) -> Study:
     """Run every law with every seed on both maneuvers.
 
-    seeds : number of seeds, counted from 0.
-    progress : told what is being done, `STEPS` times.
+    seeds : number of seeds, counted from 0.   progress : told what is being done, `STEPS` times.
     """
     progress("driving step steer and slalom with the sedan at 20 m/s")
     recordings = drive_maneuvers()

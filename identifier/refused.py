@@ -58,11 +58,8 @@ class SampleLimits(NamedTuple):
     ) -> bool:
         """Return whether a sample holds numbers within them; NaN is not.
 
-        v_x : longitudinal speed [m/s].
-        v_y : lateral velocity [m/s].
-        r : yaw rate [rad/s].
-        delta_f : steering in front [rad].
-        delta_r : steering at the rear [rad].
+        v_x : longitudinal speed [m/s].   v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
+        delta_f : steering in front [rad].   delta_r : steering at the rear [rad].
         needs_v_y : False accepts any v_y, of which `possible` is what is left.
         """
         return (
@@ -82,15 +79,13 @@ class SampleLimits(NamedTuple):
 
 
 def judges_samples(carry: Mapping[str, Any]) -> bool:
-    """Return whether a step judges samples itself."""
     return GATE in carry
 
 
 def stale_samples(stale_time: float, dt: float) -> int:
     """Return how many refused samples in a row make forces stale, at least one.
 
-    stale_time : [s].
-    dt : sampling interval [s].
+    stale_time : [s].   dt : sampling interval [s].
     """
     return max(1, int(stale_time / dt + 0.5))
 

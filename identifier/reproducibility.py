@@ -42,8 +42,7 @@ def axle_rms(
 ) -> AxleRmse:
     """Return the root mean square of axle forces, or of their errors; NaN of no samples.
 
-    force : (n, 2) [N].
-    where : samples that count (n,); None counts all.
+    force : (n, 2) [N].   where : samples that count (n,); None counts all.
     reference : forces that they are compared with (n, 2) [N]; None takes the forces themselves.
     """
     squares, count = np.zeros(2), 0

@@ -44,7 +44,6 @@ class Rerun:
     _found: dict[int, Found] = field(default_factory=dict, init=False)
 
     def __len__(self) -> int:
-        """Return the number of samples of the part."""
         return self.end - self.first
 
     def ports(self, kind: Kind) -> tuple[str, ...]:
@@ -76,7 +75,6 @@ class Rerun:
             yield Block(part, state, outputs, after)
 
     def _of_block(self, k: int, found: Found, kind: Kind, port: str) -> Array:
-        """Return a port of a block, and have all found that are wanted."""
         if port not in found.values[kind]:
             self._wanted.add(port)
             missing = self._wanted.difference(*found.values.values())
@@ -119,7 +117,6 @@ def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
 
 
 def _last_row(state: Mapping[str, Array], port: str) -> Array:
-    """Return what is carried on after a block."""
     last: Array = state[port][-1]
     return last
 

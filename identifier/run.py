@@ -366,8 +366,7 @@ class OnlineIdentifier:
         Where the sample is refused, those of the last one it took, and zero once it is `stale`.
 
         x : [v_y, r] (2,) [m/s, rad/s]; v_y NaN where there is none, if the method tells it itself.
-        u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
-        v_x : longitudinal speed [m/s].
+        u : [δ_f, δ_r] (2,), angles of the road wheels [rad].   v_x : longitudinal speed [m/s].
         a_y : of an accelerometer at the center of gravity, positive to the left [m/s²]; None, or a
             number that is not finite, where there is none. No sample is refused for it.
         """

@@ -20,8 +20,7 @@ COVARIANCE, FACTORS, NOT_NEGATIVE = "covariance", "factors of a covariance", "no
 class Port(NamedTuple):
     """An output or a carried value of a step: what stands in it.
 
-    name : of the port, in C, FMU and JSON.   unit : of its numbers, "U" the force unit.
-    words : what it is.   learnt : whether it holds its value while adaptation is off.
+    unit : of its numbers, "U" the force unit.
     rule : what its numbers must be to be taken over; empty: finite.
     """
 
@@ -53,8 +52,7 @@ def force_unit_name(force_unit: float) -> str:
 def in_force_unit(ports: Iterable[Port], force_unit: float) -> tuple[Port, ...]:
     """Return ports with the name of the force unit in place of U.
 
-    ports : with units in which U stands for it.
-    force_unit : U [N].
+    ports : with units in which U stands for it.   force_unit : U [N].
     """
     name = force_unit_name(force_unit)
     return tuple(port._replace(unit=port.unit.replace("U", name)) for port in ports)
@@ -162,7 +160,6 @@ class Setup(NamedTuple):
         return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
     def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
-        """Return what the step is shown of a recording."""
         judges = judges_samples(self.carry)
         return shown(recording, self.scan.over, rest=self.rest, judges=judges, part=part)
 

@@ -69,8 +69,7 @@ class Fact(NamedTuple):
 class Estimate(NamedTuple):
     """A number of one axle that a drive may have decided.
 
-    title, axle : what.   value, unit : how much.   sd : its standard deviation, None unknown.
-    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
+    sd : its standard deviation, None unknown.   told : what was said of it before, None nothing.
     """
 
     title: str
@@ -738,7 +737,6 @@ class TireModel(ABC):
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
     """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
 
-    vehicle : its wheelbase is L.
     min_speed : below which they do [m/s].
     """
     return max(4.0 * vehicle.froude_speed, min_speed)

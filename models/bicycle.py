@@ -74,8 +74,7 @@ def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:
     l_f : distance from the center of gravity to the front axle [m].
     l_r : distance from the center of gravity to the rear axle [m].
     v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r], lateral velocity [m/s] and yaw rate [rad/s].
-    u : [δ_f, δ_r], steering [rad].
+    x : [v_y, r], lateral velocity [m/s] and yaw rate [rad/s].   u : [δ_f, δ_r], steering [rad].
     """
     return ca.vertcat(u[0] - (x[0] + l_f * x[1]) / v_x, u[1] - (x[0] - l_r * x[1]) / v_x)
 
@@ -96,10 +95,8 @@ def measured_slip(
 
     l_f : distance from the center of gravity to the front axle [m].
     l_r : distance from the center of gravity to the rear axle [m].
-    v_x : longitudinal speed [m/s], (n,).
-    v_y : lateral velocity [m/s], (n,).
-    r : yaw rate [rad/s], (n,).
-    delta_f : steering in front [rad], (n,).
+    v_x : longitudinal speed [m/s], (n,).   v_y : lateral velocity [m/s], (n,).
+    r : yaw rate [rad/s], (n,).   delta_f : steering in front [rad], (n,).
     delta_r : at the rear [rad], (n,).
     """
     v_y, r = np.asarray(v_y), np.asarray(r)
@@ -111,9 +108,7 @@ def measured_slip(
 def linear_axle_force(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return the axle forces of the linear tire (3), (2,) [N].
 
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
     return ca.vertcat(parameters.C_f * alpha[0], parameters.C_r * alpha[1])

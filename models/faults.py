@@ -22,7 +22,6 @@ class FaultError(TireidError, ValueError):
 
 
 def channel_of(recording: Recording, channel: str) -> Array:
-    """Return a channel of a recording that has it."""
     signal: Array | None = getattr(recording, channel, None) if channel in CHANNELS else None
     if signal is None:
         raise FaultError(f"{recording.name} has no channel {channel!r}, a fault needs one it has")
@@ -36,8 +35,7 @@ class SensorFault:
     kind : one of `KINDS`: holds its value; shows 0; shows no number (NaN); has the other sign; is
         multiplied by the size; is off by the size; runs away by the size each second; has white
         noise of the size; shows the size beside the truth for one sample in `_SPIKE_EVERY`.
-    start : when it begins [s].
-    duration : how long it lasts [s]; infinite for ever.
+    start : when it begins [s].   duration : how long it lasts [s]; infinite for ever.
     size : in the unit of the channel, or a factor; only for the kinds of `SIZED`.
     seed : of the noise of `apply`.
     """
@@ -61,7 +59,6 @@ class SensorFault:
             raise FaultError(f"size must be finite, it is {self.size}")
 
     def __str__(self) -> str:
-        """Return it in words."""
         size = f" {self.size:g}" if self.kind in SIZED else ""
         for_long = "" if math.isinf(self.duration) else f" for {self.duration:g} s"
         since = f" from {self.start:g} s on" if self.start or for_long else ""
@@ -78,7 +75,6 @@ class SensorFault:
         """Return what the broken channel shows.
 
         t : time [s], a number or (n,).
-        value : what a good sensor would show, like t.
         """
         since = t - self.start
         match self.kind:

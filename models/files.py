@@ -53,10 +53,7 @@ def resolved(path: str | PathLike[str]) -> Path:
 
 
 def digest(content: Any) -> str:
-    """Return twelve characters that stand for a content.
-
-    content : ready for JSON.
-    """
+    """Return twelve characters that stand for a content."""
     return digest_of_bytes([json.dumps(content, sort_keys=True).encode()])
 
 

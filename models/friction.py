@@ -78,7 +78,6 @@ class Friction:
 
     @property
     def by_place(self) -> bool:
-        """Whether the changes are over the place."""
         return bool(self.changes) and self.changes[0].at_time is None
 
     def over_time(self, t: Array) -> Array:
@@ -110,8 +109,7 @@ class Friction:
 def place_change(table: Any, place: Any) -> Any:
     """Return the sum of the changes over the place as a CasADi expression [-].
 
-    table : from `Friction.over_place`, (3, 4).
-    place : coordinate X of the wheel [m].
+    table : from `Friction.over_place`, (3, 4).   place : coordinate X of the wheel [m].
     """
     change = 0.0
     for k in range(MAX_PLACES):

@@ -22,8 +22,6 @@ class ManeuverError(TireidError, ValueError):
 
 
 class Maneuver(Protocol):
-    """What a plant asks of a maneuver."""
-
     @property
     def duration(self) -> float:
         """Length [s]."""
@@ -55,7 +53,6 @@ def _check(maneuver: Any, *, steepest: float) -> None:
 
 
 def _check_sine(maneuver: Any) -> None:
-    """Check a maneuver that is as steep as a sine of its frequency and amplitude."""
     _check(maneuver, steepest=2.0 * math.pi * maneuver.frequency * abs(maneuver.amplitude))
 
 
@@ -67,10 +64,8 @@ def _both(front: Any, rear_ratio: float) -> Array:
 class StepSteer:
     """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
 
-    amplitude : final angle [rad].
-    onset : start of the ramp [s].
-    rate_limit : largest steering rate of either axle [rad/s].
-    duration : length [s].
+    amplitude : final angle [rad].   onset : start of the ramp [s].
+    rate_limit : largest steering rate of either axle [rad/s].   duration : length [s].
     rear_ratio : rear over front angle [-].
     """
 
@@ -106,8 +101,7 @@ class TwoStepSteer:
     second_share : angle held after the second ramp, over `amplitude` [-].
     onset : start of the first ramp [s].
     second_onset : start of the second ramp [s], not before the first has arrived.
-    rate_limit : largest steering rate of either axle [rad/s].
-    duration : length [s].
+    rate_limit : largest steering rate of either axle [rad/s].   duration : length [s].
     rear_ratio : rear over front angle [-].
     """
 
@@ -149,12 +143,9 @@ class TwoStepSteer:
 class Slalom:
     """A sine from onset to the end.
 
-    amplitude : of the sine [rad].
-    frequency : of the sine [Hz].
-    onset : start [s].
+    amplitude : of the sine [rad].   frequency : of the sine [Hz].   onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    duration : length [s].   rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -177,13 +168,10 @@ class Slalom:
 class DoubleLaneChange:
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
 
-    amplitude : of both sines [rad].
-    frequency : of both sines [Hz].
-    pause : time straight ahead between them [s].
-    onset : start of the first [s].
+    amplitude : of both sines [rad].   frequency : of both sines [Hz].
+    pause : time straight ahead between them [s].   onset : start of the first [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    duration : length [s].   rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -210,13 +198,10 @@ class DoubleLaneChange:
 class SineWithDwell:
     """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
 
-    amplitude : of the sine [rad].
-    frequency : of the sine [Hz]; the test uses 0.7.
-    dwell : time at the second peak [s]; the test uses 0.5.
-    onset : start [s].
+    amplitude : of the sine [rad].   frequency : of the sine [Hz]; the test uses 0.7.
+    dwell : time at the second peak [s]; the test uses 0.5.   onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    duration : length [s].   rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -243,12 +228,10 @@ class SineWithDwell:
 class SlowlyIncreasingSteer:
     """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
 
-    amplitude : final angle [rad].
-    rate : slope of the ramp of the front axle [rad/s].
+    amplitude : final angle [rad].   rate : slope of the ramp of the front axle [rad/s].
     onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s]; `rate` must keep it.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    duration : length [s].   rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -275,12 +258,9 @@ class RandomSteer:
     half period, so that the steepest path between two is that of a sine of `frequency`. The same
     seed is the same maneuver, at any sampling.
 
-    amplitude : largest angle [rad].
-    frequency : of the fastest swing [Hz].
-    onset : start [s].
+    amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].   onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    duration : length [s].   rear_ratio : rear over front angle [-].
     """
 
     amplitude: float

@@ -54,8 +54,7 @@ class Sensor:
     def measure(self, t: Array, signal: Array, rng: np.random.Generator) -> Array:
         """Return what the sensor makes of a signal (n,).
 
-        t : time [s], (n,).
-        signal : the exact signal, (n,).
+        t : time [s], (n,).   signal : the exact signal, (n,).
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
         measured = np.interp(t - self.delay, t, signal) if self.delay > 0.0 else signal
@@ -69,8 +68,7 @@ class Sensor:
 class Sensors:
     """The sensors of a car; a channel left out is exact.
 
-    v_x, v_y : speed over ground [m/s].
-    r : yaw rate [rad/s].
+    v_x, v_y : speed over ground [m/s].   r : yaw rate [rad/s].
     delta : steering angle [rad], of each axle that steers.
     """
 
@@ -99,8 +97,7 @@ class Sensors:
 def is_shown(channel: str, value: float) -> bool:
     """Return whether a channel shows a number.
 
-    channel : one of `LARGEST_SHOWN`.
-    value : in its SI unit.
+    channel : one of `LARGEST_SHOWN`.   value : in its SI unit.
     """
     return abs(value) <= LARGEST_SHOWN[channel]
 

@@ -111,7 +111,6 @@ class DoubleTrackCar:
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
-        """Return the car one period later."""
         return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
     def _state(self, plant: PlantState) -> CarState:

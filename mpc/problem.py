@@ -113,8 +113,7 @@ class Limits:
     """Bounds, symmetric, all positive.
 
     steering : angle of the front road wheels [rad], kept exactly.
-    steering_rate : [rad/s], kept exactly.
-    e_y : deviation from the path [m], soft.
+    steering_rate : [rad/s], kept exactly.   e_y : deviation from the path [m], soft.
     slip : kinematic slip angle in front and at the rear [rad], soft. A tire whose curves are flat
         before that has its own, see `mpc.tires.tire`.
     soft_e_y : Z of ½ Z s² where the deviation is s beyond its bound [1/m²].
@@ -147,7 +146,6 @@ class Limits:
 class Problem:
     """The problem; only the horizon is compiled.
 
-    horizon : number of stages N.
     dt : length of a stage [s].
     """
 

@@ -103,8 +103,7 @@ class CurveEkf(Method):
 
     With them the lag of the tire and the zeros of both sensors, which the default learns too.
 
-    walk : of every parameter [1/√s].
-    v_y_noise : standard deviation of measured v_y [m/s].
+    walk : of every parameter [1/√s].   v_y_noise : standard deviation of measured v_y [m/s].
     r_noise : standard deviation of the measured yaw rate [rad/s].
     v_y_disturbance : what the curve misses, as random change of v_y [m/s/√s].
     r_disturbance : what the curve misses, as random change of the yaw rate [rad/s/√s].
@@ -117,9 +116,7 @@ class CurveEkf(Method):
     stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
     shape_spread : standard deviation of the Magic Formula's shape at first, as its logit [-].
     friction_spread : standard deviation of the logarithm of friction at first [-].
-    outlier : standard deviations from which an innovation teaches no more.
-    dt : sampling interval [s].
-    learning_speed : below this speed [m/s] learning rests.
+    dt : sampling interval [s].   learning_speed : below this speed [m/s] learning rests.
     min_speed : below this speed [m/s] forces read zero.
     """
 
@@ -275,7 +272,6 @@ class CurveEkf(Method):
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
     """Return the method for a car.
 
-    vehicle : the car; its stiffness B C D is the prior.
-    dt : sampling interval [s].
+    vehicle : the car; its stiffness B C D is the prior.   dt : sampling interval [s].
     """
     return CurveEkf.for_vehicle(vehicle, dt=dt, textbook=textbook)

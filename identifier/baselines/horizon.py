@@ -76,11 +76,7 @@ class Sampled(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """What the forward pass leaves of a sample: filtered z and P, and what the way back needs.
-
-    ahead, ahead_P : before its measurement.   pull : Hᵀ S⁻¹ times the innovation.
-    keep : I - K H.   F : of the step that led to it.
-    """
+    """What the forward pass leaves of a sample: filtered z and P, and what the way back needs."""
 
     z: Any
     P: Any
@@ -214,8 +210,6 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     window first, window (7, N + 1), running. Below the learning speed, and after an estimate that
     slides by more than `MOST_SLIDING`, the window is empty, and x begins anew in a steady turn;
     θ and its covariance are kept.
-
-    samples : N of the window.
     """
     stage, constants = build_stage(), ("vehicle", "sampling", "numbers")
     rows = {"trajectory": (Z, samples + 1), "window": (len(Sampled._fields), samples + 1)}
@@ -309,7 +303,6 @@ class HorizonEstimator(Method):
 
     @property
     def samples(self) -> int:
-        """N of the window."""
         return round(self.window / self.dt)
 
     @classmethod

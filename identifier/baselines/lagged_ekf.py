@@ -65,8 +65,7 @@ class Numbers(NamedTuple):
 def _curve_parameters(theta: Any, loads: Any) -> Any:
     """Return B [1/rad], C [-] and D [N] of both axles, (2, 3).
 
-    theta : ln C and ln μ of both axles (4,).
-    loads : static, (2,) [N].
+    theta : ln C and ln μ of both axles (4,).   loads : static, (2,) [N].
     """
     stiffness, friction = ca.exp(theta[:2]), ca.exp(theta[2:])
     shape = ca.DM.ones(2) * TYPICAL_SHAPE
@@ -147,13 +146,11 @@ class LaggedEkf(Method):
     v_y_noise, r_noise : standard deviations of what is measured [m/s], [rad/s].
     v_y_disturbance, r_disturbance : what the tires miss, as random change [m/s/√s], [rad/s/√s].
     relaxation_length : of both axles [m].
-    a_y_noise : standard deviation of the accelerometer [m/s²].
-    walk : of ln C and ln μ [1/√s].
+    a_y_noise : standard deviation of the accelerometer [m/s²].   walk : of ln C and ln μ [1/√s].
     stiffness_spread, friction_spread : standard deviations of ln C and ln μ at first [-].
     steering_spread : standard deviation of the zero of the front steering at first [rad].
     a_y_spread : standard deviation of the bias of a_y at first [m/s²].
-    dt : sampling interval [s].
-    learning_speed : below this speed [m/s] learning rests.
+    dt : sampling interval [s].   learning_speed : below this speed [m/s] learning rests.
     min_speed : below this speed [m/s] forces read zero.
     """
 
@@ -202,7 +199,6 @@ class LaggedEkf(Method):
 
     @property
     def remark(self) -> str:
-        """Say what it is given."""
         return "two numbers an axle, one relaxation length for all cars of a size"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:

@@ -19,8 +19,7 @@ from models.vehicle import Vehicle
 class LinearBaseline(Method):
     """F = C α of (3) with the stiffness that the vehicle states.
 
-    dt : sampling interval [s].
-    min_speed : below this speed [m/s] forces read zero.
+    dt : sampling interval [s].   min_speed : below this speed [m/s] forces read zero.
     """
 
     dt: float = 0.01
@@ -31,7 +30,6 @@ class LinearBaseline(Method):
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
-        """Return the method for a car."""
         return cls(dt=dt, min_speed=vehicle.lowest_speed)
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
@@ -40,7 +38,6 @@ class LinearBaseline(Method):
         return self.frozen(vehicle, {}).setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the linear tire itself."""
         del state
         stiffness = [[vehicle.cornering_stiffness_front], [vehicle.cornering_stiffness_rear]]
         return CurveModel(

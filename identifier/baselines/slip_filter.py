@@ -109,8 +109,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     Carried: estimate (n,) = [v_y, r, θ], its covariance P, before (3,), running. Below the learning
     speed, and after an estimate that slides by more than `MOST_SLIDING`, x begins anew in a steady
     turn; θ and its covariance are kept.
-
-    tire : forces by θ.
     """
     heard, n = heard_ports(), 2 + tire.unknowns
     s, estimate, P = heard.sample, ca.SX.sym("estimate", n), ca.SX.sym("P", n, n)
@@ -181,9 +179,7 @@ class SlipFilter(Method):
     friction : what friction is held for at first [-]; as all that follow, not of the linear tire.
     stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
     friction_spread : standard deviation of the logarithm of friction at first [-].
-    outlier : standard deviations from which an innovation counts no more.
-    dt : sampling interval [s].
-    learning_speed : below this speed [m/s] the filter rests.
+    dt : sampling interval [s].   learning_speed : below this speed [m/s] the filter rests.
     min_speed : below this speed [m/s] forces and v_y read zero.
     """
 
@@ -236,7 +232,6 @@ class SlipFilter(Method):
 
     @property
     def learns(self) -> bool:
-        """Whether there is a tire to learn."""
         return TIRES[self.tire].unknowns > 0
 
     @property
@@ -304,7 +299,6 @@ def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
 def joint_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the naive joint filter of v_y, r and a tire of Dugoff per axle.
 
-    vehicle : the car; its stiffness is the prior.
-    dt : sampling interval [s].
+    vehicle : the car; its stiffness is the prior.   dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="dugoff", dt=dt)

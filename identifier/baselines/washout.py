@@ -77,8 +77,7 @@ def _scan() -> Scan:
 class Washout(Method):
     """Lateral velocity by integration, with what is slow taken from the linear tires.
 
-    cutoff : ω, below which the linear model counts [1/s].
-    dt : sampling interval [s].
+    cutoff : ω, below which the linear model counts [1/s].   dt : sampling interval [s].
     min_speed : below this speed [m/s] forces and v_y read zero.
     """
 
@@ -109,7 +108,6 @@ class Washout(Method):
 
     @property
     def remark(self) -> str:
-        """Say what it stands on."""
         return "by integration, and below its cutoff on the vehicle's linear tires"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:

@@ -69,7 +69,6 @@ class Course:
 
     @property
     def measure(self) -> str:
-        """What errors are, in words."""
         by = ", means over 0.3 s by the motion" if self.by_motion else ""
         return f"RMSE of the axle force{by}"
 
@@ -150,8 +149,6 @@ def cross_replay(
     method: Method, course: Course, seen: Callable[[History], None] | None = None
 ) -> Trial:
     """Learn on each recording afresh, freeze at its end and replay on all.
-
-    seen : called with each run.
 
     A method that tells lateral velocity learns without that of the recording; the frozen tires of
     all are asked at the same slip.

@@ -19,7 +19,6 @@ Frozen = Mapping[str, Mapping[str, AxleRmse]]
 class Comparison:
     """Methods side by side.
 
-    trials : by method, its errors with the numbers that follow from the vehicle.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them, a method
         that learns from whole logs never.
     """
@@ -32,7 +31,6 @@ class Comparison:
 
     @property
     def names(self) -> list[str]:
-        """Names of the recordings."""
         return [recording.name for recording in self.course.recordings]
 
     def shares(self, method: str) -> Shares:

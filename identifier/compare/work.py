@@ -40,7 +40,6 @@ def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
 def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
     """Return a pool of new processes that end with this one, however it ends.
 
-    workers : number of processes.
     prepare : what each does first; a function of a module.
     """
     return ProcessPoolExecutor(

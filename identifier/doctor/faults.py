@@ -122,9 +122,7 @@ class _Taken(NamedTuple):
 class Search:
     """The search for what is wrong with some stretches of a drive.
 
-    problem : of them, with slopes over all parameters.
-    accelerometer : None where there is none.
-    wide, mean : standard deviations and means of what was taken in, by parameter.
+    problem : of them, with slopes over all parameters.   accelerometer : None where there is none.
     """
 
     problem: Problem

@@ -89,7 +89,6 @@ def _unbroken(recording: Recording, part: slice) -> list[slice]:
 
 
 def _taken(recording: Recording, places: list[slice]) -> tuple[Recording, ...]:
-    """Return pieces of a recording, itself where it is all of it."""
     if places == [slice(0, len(recording))]:
         return (recording,)
     return tuple(recording.taken(place) for place in places)

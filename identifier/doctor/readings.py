@@ -55,7 +55,6 @@ class Change:
     channels : concerned; none where it is the car.
     unit : in which they are logged, "" where that is right.
     factors : by field of a `Reading`, what takes it out.
-    sideslip : whether v_y is the sideslip angle.
     arm : how far ahead of the center of gravity v_y is measured [m].
     price : that it must earn beside that of every change, where it is less usual.
     """
@@ -82,7 +81,6 @@ class Change:
         return self.code not in ("unit", "sideslip") or not motion.hidden >= {*self.channels}
 
     def on(self, reading: Reading) -> Reading:
-        """Return a reading with this change."""
         factors = {name: getattr(reading, name) * factor for name, factor in self.factors}
         sideslip, arm = reading.sideslip or self.sideslip, reading.arm + self.arm
         return reading._replace(**factors, sideslip=sideslip, arm=arm)
@@ -162,7 +160,6 @@ class _Explanation:
 class Read:
     """How a log is best read, and what else it could be.
 
-    other : the next best that means something else.
     without : the same with the velocity sensor where it should be, if elsewhere it makes a reading
         the best that nothing gross is in; None else.
     """
@@ -225,7 +222,6 @@ def _means_else(one: _Explanation, best: _Explanation) -> bool:
 def _longer(
     one: _Explanation, changes: Sequence[Change], motion: Motion, vehicle: Vehicle
 ) -> list[_Explanation]:
-    """Return an explanation with each change that it does not have yet."""
     taken = frozenset[str]().union(*(change.fields for change in one.changes))
     free = [change for change in changes if not change.fields & taken]
     if "delta ratio" not in taken:
@@ -300,7 +296,6 @@ def _arms(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
 
 
 def _refined(factor: float, left: Callable[[float], float]) -> float:
-    """Return a factor nearer to the least, in its logarithm."""
     step = math.log(STEERING[1] / STEERING[0])
     finer = _least(lambda by: left(factor * math.exp(by)), -step, step, FINEST)
     return factor * math.exp(finer)

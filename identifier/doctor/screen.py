@@ -43,11 +43,9 @@ SLOW = 1.0  # s between samples, from which a clock is in ms
 class Screened:
     """What is grossly wrong.
 
-    findings : the most certain first.
     repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
-    unseen : what gross faults this log cannot tell, a line each.
     without : the same if the velocity sensor is where it should be, where that alone makes gross
         findings of it: to be asked where no size tells that it is elsewhere; None else.
     """
@@ -222,7 +220,6 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
 
 
 def _reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
-    """Return a change of the best reading as findings, of units one for each channel."""
     if change.code != "unit" or len(change.channels) == 1:
         return [_reading_finding(change, found, vehicle)]
     parts = [
@@ -243,7 +240,6 @@ def _one_steering(gross: list[Finding]) -> list[Finding]:
 
 
 def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
-    """Return a change of the best reading as a finding."""
     confidence = found.confidence
     if len(found.best.gross) > _SEVERAL:
         confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise

@@ -80,7 +80,6 @@ class Suspect(NamedTuple):
         return float(value * (vehicle.wheelbase / SEDAN) ** _POWERS[self.grows])
 
     def size(self, value: float) -> float:
-        """Return the size of a finding of a value of its parameter."""
         match self.code:
             case "factor" if self.channel != "a_y":
                 return 1.0 / (1.0 + value)
@@ -129,7 +128,6 @@ class Suspect(NamedTuple):
         return True
 
     def words(self, size: float, deviation: float, vehicle: Vehicle) -> str:
-        """Return it in words."""
         text = self.text
         if self.code == "center_of_gravity":
             swapped = abs(vehicle.l_f - vehicle.l_r - size) < 1.5 * abs(deviation)

@@ -114,7 +114,6 @@ class CompiledPackage:
         raise PackageFileError(f"{folder}: no package, a JSON file of format {FORMAT!r} is missing")
 
     def _source(self, files: Mapping[str, str]) -> str:
-        """Return the package as one file, with what Python asks of it."""
         texts = [files[path.format(self.name)] for path in ORDER]
         (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: self.name}).values()
         return one_file([*texts, glue], defines={f"{self.name.upper()}_SINGLE": int(self.single)})
@@ -157,11 +156,8 @@ class CompiledPackage:
     ) -> tuple[Status, Array]:
         """Take one sample; return its status and the axle forces (2,) [N].
 
-        v_x : longitudinal speed [m/s].
-        v_y : lateral velocity [m/s].
-        r : yaw rate [rad/s].
-        delta_f : steering in front [rad].
-        delta_r : steering at the rear [rad].
+        v_x : longitudinal speed [m/s].   v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
+        delta_f : steering in front [rad].   delta_r : steering at the rear [rad].
         a_y : of an accelerometer [m/s²], NaN where there is none; not read where it is no input.
         """
         sample = [v_x, v_y, r, delta_f, delta_r, a_y]
@@ -232,10 +228,7 @@ class CompiledPackage:
             raise ValueError("weights must be finite, and covariances and errors not negative")
 
     def set_adaptation(self, adapts: bool) -> None:
-        """Learn, or hold what is learnt.
-
-        adapts : False freezes.
-        """
+        """Learn, or hold what is learnt."""
         if not self._weights:
             raise ValueError(f"{self.name} estimates a signal: there is nothing to freeze")
         self._call("instance_adapt")(self._instance, int(adapts))

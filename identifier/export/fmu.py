@@ -81,7 +81,6 @@ def build_binary(
 
 @lru_cache(maxsize=4)
 def _objects(target: Target, model: Files) -> Files:
-    """Return object files of the C files."""
     with _folder_of(dict(model)) as folder:
         sources = _c_files(dict(model))
         _compile(target, ["-c", *sources], folder)
@@ -121,8 +120,7 @@ TOKEN = "token.h"
 def token_header(token: str, version: int) -> str:
     """Return token.h, which tells this FMU from every other one.
 
-    token : GUID of FMI 2.0, instantiation token of FMI 3.0.
-    version : of FMI, 2 or 3.
+    token : GUID of FMI 2.0, instantiation token of FMI 3.0.   version : of FMI, 2 or 3.
     """
     standard = f"#ifndef MODEL_FMI\n#define MODEL_FMI {version} /* of the standard */\n#endif\n"
     return header(TOKEN, "Generated.", [f'#define MODEL_TOKEN "{token}"\n', standard])
@@ -292,10 +290,7 @@ TOOL = "tireid"
 
 
 def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
-    """Return modelDescription.xml of FMI 2.0.
-
-    sources : names of the C files.
-    """
+    """Return modelDescription.xml of FMI 2.0."""
     table = variables(specialized)
     unknowns = [
         element("Unknown", {"index": i})
@@ -352,10 +347,7 @@ def _description(
     listed: Iterable[Element],
     structure: Iterable[Element],
 ) -> str:
-    """Return modelDescription.xml.
-
-    said : version, what it calls the token, the token.
-    """
+    """Return modelDescription.xml."""
     version, key, token = said
     table = variables(specialized)
     about = {
@@ -380,10 +372,7 @@ def _description(
 
 
 def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
-    """Return sources/buildDescription.xml of FMI 3.0.
-
-    sources : names of the C files.
-    """
+    """Return sources/buildDescription.xml of FMI 3.0."""
     files = (element("SourceFile", {"name": name}) for name in sources)
     build = element(
         "fmiBuildDescription",
@@ -467,8 +456,7 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     interval after the start, whatever the communication step; a step from t to t + h takes those in
     [t, t + h).
 
-    specialized : the step; its name is the model identifier.
-    version : of FMI, 2 or 3.
+    specialized : the step; its name is the model identifier.   version : of FMI, 2 or 3.
     """
     if version not in OF_VERSION:
         raise ValueError(f"version must be 2 or 3, it is {version}")

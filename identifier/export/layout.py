@@ -35,7 +35,6 @@ class Member(NamedTuple):
         return f"{'weights' if self.learnt else 'signals'}.{self.signal.name}"
 
     def declaration(self, real: str) -> str:
-        """Return what declares it, with a comment."""
         sizes = "".join(f"[{size}]" for size in self.dimensions)
         unit, description = self.signal.unit, self.signal.description
         code, words = f"    {real} {self.signal.name}{sizes};", f"/* {description} [{unit}] */"
@@ -43,10 +42,7 @@ class Member(NamedTuple):
         return line if len(line) <= 100 else f"    {words}\n{code}\n"
 
     def element(self, entry: int) -> str:
-        """Return the C index of an entry.
-
-        entry : counted by columns, as CasADi does.
-        """
+        """Return the C index of an entry."""
         row, column = entry % self.shape[0], entry // self.shape[0]
         pair = zip((row, column), self.shape, strict=True)
         return "".join(f"[{index}]" for index, size in pair if size > 1)
@@ -61,7 +57,6 @@ def carried_members(specialized: SpecializedStep) -> list[Member]:
 
 
 def output_members(specialized: SpecializedStep) -> list[Member]:
-    """Return the outputs in their order."""
     return [
         Member(signal, specialized.function.size_out(signal.name), False)
         for signal in specialized.outputs
@@ -69,10 +64,7 @@ def output_members(specialized: SpecializedStep) -> list[Member]:
 
 
 def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
-    """Return the C expression of an entry of an input of the step.
-
-    port : number of the input.
-    """
+    """Return the C expression of an entry of an input of the step."""
     name = specialized.function.name_in(port)
     if name in SAMPLED:
         return f"in->{READS[name][entry]}"
@@ -82,10 +74,7 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
 
 
 def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
-    """Return the C lvalue of an entry of an output of the step.
-
-    port : number of the output.
-    """
+    """Return the C lvalue of an entry of an output of the step."""
     state = carried_members(specialized)
     if port < len(state):
         part = "learnt" if state[port].learnt else "next"
@@ -98,7 +87,6 @@ def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
     """Return a nested initializer by rows.
 
     value : the numbers (of any shape).
-    dimensions : of the C array.
     """
     if not dimensions:
         return literal(float(value.ravel()[0]), prefix)

@@ -46,7 +46,6 @@ class MissingOnnxError(TireidError, ImportError):
 
 
 def onnx_package() -> Any:
-    """Return the package onnx, which is an extra."""
     try:
         import onnx
     except ImportError as error:
@@ -216,7 +215,6 @@ def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | No
     Of a car with downforce those of the static loads.
 
     single : whether numbers are float32; else they are float64.
-    add_band : adds half the width of their bands, at the speed of the drive that taught the model.
     """
     graph = Graph(single)
     scales = graph.constant("inverse_scales", 1.0 / np.array(model.ladder)[None])
@@ -261,7 +259,6 @@ class _Nodes:
         return self.node("Mul", row, row)
 
     def variance(self, h: str, P: Array) -> str:
-        """Return h P h' of rows h."""
         by = root(P)
         product = self.node("MatMul", h, self.number(by))
         return self.node("MatMul", self.square(product), self.number(np.ones((by.shape[1], 1))))
@@ -362,8 +359,6 @@ def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = Fals
     model : the whole model for a network, the static force curves for an axle model and, in hidden
         units, for a fit, the network itself for one that came from an ONNX file.
     single : whether numbers are float32; else they are float64.
-    with_band : whether half the width of the band is told, too, which axle models and
-        fits have.
     """
     if model.kind not in GRAPHS:
         raise NoOnnxError(

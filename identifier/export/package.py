@@ -256,7 +256,6 @@ def vectors(specialized: SpecializedStep) -> Vectors:
 
 
 def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
-    """Return the vectors as a C header."""
     double, single = tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     names = ", ".join(port.name for port in specialized.inputs)
@@ -328,10 +327,7 @@ def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
 
 
 def readme(package: Package, about_figures: str) -> str:
-    """Return the README of a package.
-
-    about_figures : flash, RAM, stack and instructions, as Markdown.
-    """
+    """Return the README of a package."""
     specialized = package.specialized
     state = carried_members(specialized)
     carry_table = "".join(

@@ -39,8 +39,7 @@ from models.vehicle import GRAVITY, Vehicle
 class _Variant(NamedTuple):
     """A law of the paper as it is compared: its law, and where its gains come from.
 
-    title : what a reader is told.   law : one of `LAWS`.
-    gains_of : the law that they are found for.   scaled : whether η/λ stands in place of η.
+    law : one of `LAWS`.
     """
 
     title: str
@@ -276,7 +275,6 @@ def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
     """Return ξ = K⁻¹ x of (7), (2,) [N s].
 
     x : [v_y, r] (2,).
-    vehicle : the car, which gives K.
     """
     impulse: Array = _K_inv(vehicle.bicycle) @ x
     return impulse
@@ -319,10 +317,8 @@ def design_for(
 
     driving : how hard it is driven; it is stored with the design.
     law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
-    network : structure; None takes `natural_network`.
-    phase_margin : of the sampled loop [deg].
-    input_source : "measured" or "estimated".
-    integrator : "euler" or "rk4".
+    network : structure; None takes `natural_network`.   phase_margin : of the sampled loop [deg].
+    input_source : "measured" or "estimated".   integrator : "euler" or "rk4".
     dt : sampling interval [s].
     """
     network = network or natural_network(vehicle)
@@ -367,8 +363,7 @@ def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> Pap
     """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
 
     design : of the paper's leakage, as `design_for` finds it.
-    known : where it runs, `PaperIdentifier.operation`.
-    keeping : one of `KEEPINGS`.
+    known : where it runs, `PaperIdentifier.operation`.   keeping : one of `KEEPINGS`.
     """
     if keeping not in KEEPINGS:
         raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")

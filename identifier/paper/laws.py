@@ -30,8 +30,7 @@ _Direction = Callable[[Any, Any], Any]
 def _static_direction(A_d: Any, drive: Any) -> Any:
     """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
 
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    drive : the error that drives the laws (2,).
+    A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
     """
     return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
 
@@ -42,8 +41,7 @@ def lyapunov_direction(A_d: Any, drive: Any) -> Any:
     P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
     2x2 matrix in closed form.
 
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    drive : the error that drives the laws (2,).
+    A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
     """
     trace = A_d[0, 0] + A_d[1, 1]
     determinant = A_d[0, 0] * A_d[1, 1] - A_d[0, 1] * A_d[1, 0]
@@ -61,22 +59,13 @@ class DrivingError(NamedTuple):
     xi_tilde: Any
 
     def drive(self, z: Any, xi_tilde: Any) -> Any:
-        """Return the driving error.
-
-        z : filtered error.
-        """
+        """Return the driving error."""
         return self.z * z + self.xi_tilde * xi_tilde
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Law:
-    """A law: the error z z + (xi + lead τ) ξ̃ drives (11)-(12) along a direction.
-
-    z : share of the filtered error.
-    xi : share of the error.
-    lead : share of the lead time τ of the gains in what multiplies the error.
-    direction : of the descent, from A_d and the driving error.
-    """
+    """A law: the error z z + (xi + lead τ) ξ̃ drives (11)-(12) along a direction."""
 
     name: str
     z: float = 0.0
@@ -112,10 +101,7 @@ LAWS: Mapping[str, Law] = {
 
 
 def unbounded(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: the leakage alone bounds them.
-
-    radius : ignored.
-    """
+    """Return the weights as they are: the leakage alone bounds them."""
     del radius
     return weights
 
@@ -129,10 +115,7 @@ def ball(weights: Any, radius: Any) -> Any:
 
 
 def whole(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: all of them leak, as in (11)-(12).
-
-    radius : ignored.
-    """
+    """Return the weights as they are: all of them leak, as in (11)-(12)."""
     del radius
     return weights
 
@@ -173,17 +156,11 @@ def weight_rates(
     """Return (11)-(12), each a descent along the static gradient with a leakage.
 
     drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
-    xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.
-    W : weights (2, n_h).
-    V : weights (n_h, n_in).
-    x_bar : network input (n_in,).
-    sigma : hidden layer tanh(V x̄) (n_h,).
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    eta_W : learning rate η1.
-    eta_V : learning rate η2.
-    rho_W : leakage ρ1.
+    xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.   W : weights (2, n_h).
+    V : weights (n_h, n_in).   x_bar : network input (n_in,).
+    sigma : hidden layer tanh(V x̄) (n_h,).   A_d : Hurwitz matrix (2, 2) [1/s].
+    eta_W : learning rate η1.   eta_V : learning rate η2.   rho_W : leakage ρ1.
     rho_V : leakage ρ2.
-    direction : of the descent, from A_d and the driving error.
     leaking : what of the weights leaks, from them and the radius: `whole` or `beyond_ball`.
     W_free : radius of the dead zone of W, which `whole` does not read [U].
     V_free : radius of the dead zone of V, which `whole` does not read [-].
@@ -207,12 +184,9 @@ _InputSource = Callable[[Any, Any], Any]
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
 
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
-    B_xi : B_ξ of (7) (2, 2) [U/rad].
-    xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).
-    u : steering (2,) [rad].
+    A_d : Hurwitz matrix (2, 2) [1/s].   A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
+    B_xi : B_ξ of (7) (2, 2) [U/rad].   xi : measured axle impulse (2,).
+    xi_hat : estimated axle impulse (2,).   u : steering (2,) [rad].
     f_hat : network output (2,) [U].
     """
     return A_d @ xi_hat + (A_xi @ xi + B_xi @ u - A_d @ xi) + f_hat  # (8)
@@ -221,9 +195,7 @@ def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, 
 def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
     """Return dz/dt of (10), (2,) [U s].
 
-    forgetting : λ [1/s].
-    z : filtered error (2,) [U s²].
-    xi_tilde : error (2,) [U s].
+    forgetting : λ [1/s].   z : filtered error (2,) [U s²].   xi_tilde : error (2,) [U s].
     """
     return -forgetting * z + xi_tilde  # (10)
 
@@ -231,8 +203,7 @@ def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
 def measured(xi: Any, xi_hat: Any) -> Any:
     """Read the network's input from the measured state, which opens the loop through x̂.
 
-    xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).
+    xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).
     """
     del xi_hat
     return xi
@@ -243,8 +214,7 @@ def estimated(xi: Any, xi_hat: Any) -> Any:
 
     It closes a loop: A_d must then be fast against the slope of the tire.
 
-    xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).
+    xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).
     """
     del xi
     return xi_hat
@@ -264,7 +234,6 @@ def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
 
 
 def free(state: list[Any]) -> list[Any]:
-    """Return the state as it is: nothing bounds it."""
     return state
 
 
@@ -273,7 +242,6 @@ def euler(
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
 
-    derivative : time derivative of each part of the state.
     dt : step [s].
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
     """
@@ -287,7 +255,6 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
     The inner stages are projected: else a high gain leaves the bounds within the step, and the
     slopes there carry it beyond them.
 
-    derivative : time derivative of each part of the state.
     dt : step [s].
     """
     k1 = derivative(state)

@@ -107,7 +107,6 @@ def natural_network(
 ) -> Network:
     """Return a network whose input scales fit the size of the car.
 
-    vehicle : its wheelbase sets the scales of speeds and yaw rate.
     hidden : number of hidden units.
     """
     ratio = np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
@@ -119,8 +118,7 @@ def natural_network(
 def hidden_layer(V: Any, x_bar: Any) -> Any:
     """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
 
-    V : weights (n_h, n_in).
-    x_bar : scaled input (n_in,).
+    V : weights (n_h, n_in).   x_bar : scaled input (n_in,).
     """
     return tanh(V @ x_bar)
 
@@ -128,9 +126,7 @@ def hidden_layer(V: Any, x_bar: Any) -> Any:
 def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> dict[str, Any]:
     """Return every signal that a network may read, by name, SI.
 
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
     return {
@@ -203,8 +199,7 @@ def _replay_scan(network: Network) -> Scan:
 class NetworkModel(TireModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
 
-    weights : W (2, n_h) in the force unit and V (n_h, n_in).
-    force_unit : U [N].
+    weights : W (2, n_h) in the force unit and V (n_h, n_in).   force_unit : U [N].
     min_speed : below this speed [m/s] the forces read zero.
     """
 
@@ -234,7 +229,6 @@ class NetworkModel(TireModel):
         require_within(ValueError, 0.0, _LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
         del dt
         return Setup(
             scan=_replay_scan(self.network),
@@ -284,7 +278,6 @@ class NetworkModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":
-        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             return cls(
@@ -303,8 +296,7 @@ def first_weights(
 ) -> Weights:
     """Return the weights that learning begins with.
 
-    start : stored weights to begin with; None draws them.
-    force_unit : U of what learns [N].
+    start : stored weights to begin with; None draws them.   force_unit : U of what learns [N].
     """
     if start is None:
         return network.initial_weights(np.random.default_rng(seed))

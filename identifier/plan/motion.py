@@ -118,8 +118,7 @@ def simulate(
     """Return the motion of all tires under all steerings.
 
     planned : angles asked of the front wheels at steps of `time_step` [rad], (n, m).
-    v_x : speed [m/s].
-    guide : what is planned follows it; None plans the angles as they are.
+    v_x : speed [m/s].   guide : what is planned follows it; None plans the angles as they are.
     """
     car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)
     n, m, k = *planned.shape, len(tires.W)

@@ -221,7 +221,6 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
     """Return the hardest of maneuvers that keeps the share of the grip, with the likely tires.
 
     space : speed and share; its sides are not looked at.
-    of : the maneuver by its amplitude.
     """
     sizes = _AMPLITUDES * Search(tires=tires, space=space, duration=1.0, guided=False).largest_angle
     every = [of(float(size)) for size in sizes]
@@ -235,8 +234,7 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
 def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None) -> Steering:
     """Return slaloms by their amplitude.
 
-    duration : [s].
-    frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
+    duration : [s].   frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
     """
     f = SLALOM / vehicle.froude_time if frequency is None else frequency
     return lambda amplitude: Slalom(
@@ -280,7 +278,6 @@ def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> t
 def _rated(
     tires: PlausibleTires, space: Space, maneuvers: Sequence[Maneuver], time: float
 ) -> Rival:
-    """Return the median of maneuvers."""
     t = steps_of(tires, time)
     delta = np.column_stack([one.steering(t)[:, 0] for one in maneuvers])
     motion = free_motion(tires, delta, space.speed)

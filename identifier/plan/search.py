@@ -51,8 +51,7 @@ class PlanError(TireidError, ValueError):
 class Space:
     """Where, how fast and how hard it is driven.
 
-    length, width : of the area [m], the longer side first.
-    speed : that is held [m/s].
+    length, width : of the area [m], the longer side first.   speed : that is held [m/s].
     share : of the grip that the likely tires take at most, at both axles [-].
     margin : between any part of the car and the edge of the area [m].
     rate_limit : largest steering rate of the front wheels [rad/s].
@@ -88,7 +87,6 @@ class Body(NamedTuple):
 
 
 def body_of(tires: PlausibleTires) -> Body:
-    """Return the size of the body of a car."""
     car = tires.vehicle
     over = OVERHANG * car.wheelbase
     side = _HALF_WIDTH * car.wheelbase
@@ -287,10 +285,7 @@ class Search:
     def best(
         self, rng: np.random.Generator, progress: Callable[[float], None] | None = None
     ) -> Pass:
-        """Return the pass that teaches most.
-
-        progress : called with the share of the generations.
-        """
+        """Return the pass that teaches most."""
         least: list[float] = []  # cost, after each generation
 
         def costs(numbers: Array) -> Array:
@@ -327,7 +322,6 @@ class Search:
         return self.as_pass(np.array([found.x]))
 
     def as_pass(self, numbers: Array) -> Pass:
-        """Return the pass that numbers stand for."""
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
         P = covariance_after(self.tires, motion, self.space.speed)

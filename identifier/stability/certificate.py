@@ -50,9 +50,7 @@ def judged_loop(
 
     It is the proven bound, or where the margins do not hold up to it `W_large`.
 
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
-    kept : |W_hat| that is proven [U].
+    gains : of (8) to (12).   direction : (2, 2) D [s].   kept : |W_hat| that is proven [U].
     """
     loop = worst_loop(gains, law, operation, direction, kept)
     margins = margin_checks(loop, operation)

@@ -119,8 +119,7 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
     Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
     the weights at which the margins were judged.
 
-    gains : of (8) to (12).
-    kept : |W_hat| that is proven [U].
+    gains : of (8) to (12).   kept : |W_hat| that is proven [U].
     judged : |W_hat| at which the margins were judged [U].
     """
     limit = math.inf
@@ -160,8 +159,7 @@ def drift_check(
 ) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
 
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
+    gains : of (8) to (12).   direction : (2, 2) D [s].
     """
     found = drift_frequency(
         A_d=gains.matrix, forgetting=gains.forgetting, law=law, direction=direction
@@ -253,9 +251,7 @@ def bound_checks(
 ) -> list[Property]:
     """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
 
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
-    proven : of `proven_bounds`.
+    gains : of (8) to (12).   direction : (2, 2) D [s].   proven : of `proven_bounds`.
     """
     A_d = gains.matrix
     if not operation.resolves(A_d):

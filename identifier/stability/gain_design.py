@@ -44,9 +44,7 @@ class DesignError(TireidError, ValueError):
 class GainDesign:
     """Gains and what is proved of them.
 
-    gains : of (8) to (12).
-    bounds : proven bounds of |ξ̃| and |W_hat|.
-    V_max : bound on |V_hat|, kept by ρ_V.
+    gains : of (8) to (12).   bounds : proven bounds of |ξ̃| and |W_hat|.
     """
 
     gains: Gains
@@ -63,8 +61,7 @@ def gain_for_phase_margin(
     The loop is (g/a) (c_ξ + c_z/(s + λ))/((s + a) s); the frequency where its phase is PM - 180° is
     found by bisection, g is the inverse of its magnitude there.
 
-    a : decay rate [1/s].
-    lam : forgetting factor λ [1/s].
+    a : decay rate [1/s].   lam : forgetting factor λ [1/s].
     phase_margin : wanted [deg], above 0 and below 90.
     dt : step of explicit Euler [s]; None for continuous time (RK4 at a dt <= 0.2 comes to it).
     """
@@ -119,11 +116,8 @@ def design_gains(
 ) -> GainDesign:
     """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
 
-    bandwidth : highest frequency of steering that matters [Hz].
-    dt : sampling interval T_s [s].
-    disturbance : what acts on the error, for the proven bounds.
+    bandwidth : highest frequency of steering that matters [Hz].   dt : sampling interval T_s [s].
     needed_force : that the network is expected to hold [U].
-    V_max : wanted bound on |V_hat|, at least its initial norm.
     phase_margin : wanted phase margin of the sampled loop at the worst regressor [deg].
     capacity : force that W can hold at |s|² = n_h, in units of needed_force.
     integrator : "euler" or "rk4", as in the step.

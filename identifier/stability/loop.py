@@ -64,8 +64,7 @@ INSTANTANEOUS = DrivingError(0.0, 1.0)
 def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
 
-    law : of `identifier.paper.laws.LAWS`.
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    law : of `identifier.paper.laws.LAWS`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     found: Array = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
     return found
@@ -75,11 +74,9 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
 class Loop:
     """The loop at one frozen regressor.
 
-    A_d : (2, 2) error dynamics [1/s].
-    forgetting : λ of (9) and (10) [1/s].
+    A_d : (2, 2) error dynamics [1/s].   forgetting : λ of (9) and (10) [1/s].
     law : coefficients of z and ξ̃ in the driving error.
-    G : (2, 2) loop gain, symmetric positive semidefinite.
-    leakage : l = ρ |ξ̃| [1/s].
+    G : (2, 2) loop gain, symmetric positive semidefinite.   leakage : l = ρ |ξ̃| [1/s].
     input_feedback : (2, 2) J_f K [1/s], None where the network reads the measured x.
     direction : (2, 2) matrix D that replaces -A_d⁻ᵀ [s], None for (11) and (12) as printed.
     """
@@ -154,8 +151,7 @@ def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
 def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float = 1.0) -> Array:
     """Log max|R(μ dt)| / dt [1/s]: negative is stable; the spectral abscissa for `exact`.
 
-    matrices : (..., n, n) loop matrices.
-    dt : step [s]; irrelevant for `exact`.
+    matrices : (..., n, n) loop matrices.   dt : step [s]; irrelevant for `exact`.
     """
     mu = eigenvalues(matrices)
     growth = np.max(mu.real, axis=-1)
@@ -167,8 +163,7 @@ def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float =
 def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> Array:
     """max|R(μ dt)|: below one the sampled loop is stable.
 
-    matrices : (..., n, n) loop matrices.
-    dt : step [s].
+    matrices : (..., n, n) loop matrices.   dt : step [s].
     """
     return np.exp(growth_rate(matrices, integrator, dt) * dt)
 
@@ -190,10 +185,8 @@ def worst_gain(
     W: the worst is at a corner, where every unit is saturated but perhaps the one that holds all
     of W. So V learns at no cost in margin while η_V x_bar_max² W_max² <= η_W.
 
-    eta_W : learning rate of (11).
-    eta_V : learning rate of (12).
-    n_h : hidden units; |s|² <= n_h.
-    W_max : bound on |W| (Frobenius) [U]; needed where V learns.
+    eta_W : learning rate of (11).   eta_V : learning rate of (12).
+    n_h : hidden units; |s|² <= n_h.   W_max : bound on |W| (Frobenius) [U]; needed where V learns.
     """
     if not (eta_W >= 0.0 and eta_V >= 0.0 and n_h >= 1):
         raise ValueError(f"eta_W, eta_V >= 0 and n_h >= 1, they are {(eta_W, eta_V, n_h)}")
@@ -215,10 +208,8 @@ def regressor_gains(
 ) -> Array:
     """G along a run, (n, 2, 2).
 
-    eta_W : learning rate of (11).
-    eta_V : learning rate of (12).
-    s : (n, n_h) hidden units tanh(V x_bar).
-    x_bar : (n, n_in) network input.
+    eta_W : learning rate of (11).   eta_V : learning rate of (12).
+    s : (n, n_h) hidden units tanh(V x_bar).   x_bar : (n, n_in) network input.
     W : (n, 2, n_h) or (2, n_h) output weights [U].
     """
     s, x_bar, W = np.atleast_2d(s), np.atleast_2d(x_bar), np.asarray(W, dtype=np.float64)
@@ -255,7 +246,6 @@ def root(
 ) -> float:
     """Return x between two ends at which f is zero, by Brent's method.
 
-    f : continuous, of other sign at either end.
     xtol, rtol : how near it must be, absolute and over its size.
     """
     from scipy.optimize import brentq  # takes longer to import than a log of a minute to learn from

@@ -22,10 +22,8 @@ class LyapunovError(TireidError, ValueError):
 class LyapunovPair:
     """P and Q of A_dᵀ P + P A_d = -Q, with the residual found by substitution.
 
-    A_d : (2, 2) error dynamics [1/s].
-    P : (2, 2) solution [s, for Q without unit].
-    Q : (2, 2) right-hand side [-].
-    residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
+    A_d : (2, 2) error dynamics [1/s].   P : (2, 2) solution [s, for Q without unit].
+    Q : (2, 2) right-hand side [-].   residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
     """
 
     A_d: Array
@@ -61,8 +59,7 @@ def require_hurwitz(A_d: ArrayLike) -> Array:
 def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
     """Substitute P back: |A_dᵀ P + P A_d + Q| / |Q|.
 
-    A_d : (2, 2) error dynamics [1/s].
-    P : (2, 2) candidate solution.
+    A_d : (2, 2) error dynamics [1/s].   P : (2, 2) candidate solution.
     Q : (2, 2) right-hand side.
     """
     A_d, P, Q = np.asarray(A_d), np.asarray(P), np.asarray(Q)
@@ -72,8 +69,7 @@ def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
 def lyapunov(A_d: ArrayLike, Q: ArrayLike) -> LyapunovPair:
     """Solve A_dᵀ P + P A_d = -Q (the P and Q of (14)) and check the answer by substitution.
 
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    Q : (2, 2) symmetric positive definite matrix.
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   Q : (2, 2) symmetric positive definite matrix.
     """
     A_d, Q = require_hurwitz(A_d), require_square(Q)
     if not np.allclose(Q, Q.T, rtol=1e-12) or not np.linalg.eigvalsh(Q)[0] > 0.0:
@@ -144,8 +140,7 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
 def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
     """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
 
-    A_d : (2, 2) error dynamics [1/s].
-    dt : step [s].
+    A_d : (2, 2) error dynamics [1/s].   dt : step [s].
     """
     step = np.eye(2) + dt * require_hurwitz(A_d)
     radius = float(np.max(np.abs(np.linalg.eigvals(step))))
@@ -157,8 +152,7 @@ def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
 def power_norms(step: Array, entry: Array) -> tuple[float, float]:
     """Largest and sum of |step^k entry| over k = 0, 1, ...
 
-    step : (2, 2) with every eigenvalue inside the unit circle.
-    entry : (2, 2).
+    step : (2, 2) with every eigenvalue inside the unit circle.   entry : (2, 2).
     """
     radius, size = float(np.max(np.abs(np.linalg.eigvals(step)))), np.linalg.norm(entry, 2)
     scalar = np.linalg.norm(step - step[0, 0] * np.eye(2), 2) <= 1e-14

@@ -148,9 +148,7 @@ def passivity(
 ) -> Array:
     """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
 
-    frequency : (n,) ω [rad/s].
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
+    frequency : (n,) ω [rad/s].   A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
     dynamics = require_hurwitz(A_d)
@@ -172,8 +170,7 @@ def drift_frequency(
     For A_d = -a I: sqrt(a λ) for the integral law, inf for the instantaneous law and for the
     PI-lead law with τ >= 1/a.
 
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
 
@@ -240,10 +237,8 @@ def sufficient_leakage(
 
     The leakage ρ |ξ̃| of (11) reaches it where |ξ̃| = s0/ρ: about the error at which a drift ends.
 
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    eta_W : learning rate of (11).
-    n_h : hidden units; |s|² <= n_h.
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
+    eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
     shortage = passivity_shortage(A_d=A_d, forgetting=forgetting, law=law, direction=direction)

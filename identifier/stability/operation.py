@@ -56,19 +56,16 @@ class Sampled(Protocol):
 class Operation:
     """Where and how the identifier runs: what the certificate must know besides the gains.
 
-    n_h : hidden units.
-    dt : sampling interval T_s [s].
-    integrator : "euler", "rk4" or "exact".
+    n_h : hidden units.   dt : sampling interval T_s [s].   integrator : "euler", "rk4" or "exact".
     bandwidth : highest frequency of steering that matters [Hz].
-    disturbance : sup|f|, noise and rates that act on the error.
     needed_force : that the network should be able to hold against its leakage [U].
     x_bar_max : bound on |x_bar| [-], without what the error adds where the network reads x_hat.
     input_feedback : (2, 2) J_f K [1/s] where the network reads x_hat; None where it reads x.
     W_M : bound on the ideal weights (Frobenius) [U], for (14).
     w_bar : bound on the approximation error [U], for (14).
     V_start : largest |V_hat| to begin with (Frobenius) [-].
-    W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this
-        one (Frobenius) [U]; the V layer's share of the loop gain grows with it.
+    W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this one
+        (Frobenius) [U]; the V layer's share of the loop gain grows with it.
     input_per_error : what an error adds to |x_bar| where the network reads x_hat [1/(U s)].
     """
 
@@ -107,7 +104,6 @@ class Operation:
 
     @property
     def step(self) -> Integrator:
-        """The integrator as a function of eigenvalues."""
         return INTEGRATORS[self.integrator]
 
     def resolves(self, A_d: Array) -> bool:
@@ -122,11 +118,9 @@ class Operation:
 class Proven:
     """What is proven of a design; None and inf where nothing is.
 
-    leakage : bounds that the leakage of W gives.
-    projection : bounds that the projection of W gives.
     V : bound on |V_hat| [-].
-    leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no
-        bound is proven.
+    leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no bound
+        is proven.
     """
 
     leakage: SampledBounds | None
@@ -163,8 +157,7 @@ def proven_bounds(
 ) -> Proven:
     """Return all bounds that are proven, for the start of `sampled_bound.py`.
 
-    gains : of (8) to (12).
-    direction : (2, 2) D [s], of `direction_matrix`.
+    gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.
     """
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
     if not operation.resolves(A_d):
@@ -221,8 +214,7 @@ def worst_loop(
 
     Where W is infinite, the V layer cannot be counted and is left out.
 
-    gains : of (8) to (12).
-    direction : (2, 2) D [s], of `direction_matrix`.
+    gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
     """
     g = worst_gain(
@@ -254,9 +246,7 @@ def worst_loop(
 def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
     """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
 
-    m : mass [kg].
-    I_z : yaw inertia [kg m²].
-    l_f : center of gravity to front axle [m].
+    m : mass [kg].   I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
     l_r : center of gravity to rear axle [m].
     """
     require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
@@ -277,9 +267,7 @@ def estimated_input_feedback(
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
 
-    m : mass [kg].
-    I_z : yaw inertia [kg m²].
-    l_f : center of gravity to front axle [m].
+    m : mass [kg].   I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
     l_r : center of gravity to rear axle [m].
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
     v_x : speed [m/s].
@@ -317,9 +305,7 @@ def largest_signals(
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI.
 
-    v_x : speed [m/s].
-    slip : largest slip angle [rad].
-    friction : μ [-].
+    v_x : speed [m/s].   slip : largest slip angle [rad].   friction : μ [-].
     """
     require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
@@ -364,8 +350,7 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
     No bound, but what the network must be able to hold where both axles are at the slip [N].
 
-    slip : largest slip angle [rad].
-    friction : μ [-].
+    slip : largest slip angle [rad].   friction : μ [-].
     """
     require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)
@@ -377,8 +362,7 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -> Disturbance:
     """Return bounds of all that acts on the error dynamics, proven for the declared driving.
 
-    dt : sampling interval [s].
-    unit : force unit U [N].
+    dt : sampling interval [s].   unit : force unit U [N].
     """
     C, lever = _stiffness(vehicle), np.array([vehicle.l_f, vehicle.l_r])
     K_inv = np.abs(np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv)))

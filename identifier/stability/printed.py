@@ -31,10 +31,8 @@ from models.rules import require_positive
 def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h (|P| + (η/ρ) |A_d⁻¹|)]/2, the one that gives (14) as printed [U].
 
-    W_M : bound on the ideal weights (Frobenius) [U].
-    n_h : hidden units; |s| <= √n_h.
-    eta_W : learning rate of (11).
-    rho_W : leakage gain of (11) [1/(U s²)].
+    W_M : bound on the ideal weights (Frobenius) [U].   n_h : hidden units; |s| <= √n_h.
+    eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, rho_W=rho_W)
     inverse = float(np.linalg.norm(np.linalg.inv(pair.A_d), 2))
@@ -56,8 +54,7 @@ def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: 
 def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
 
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    eta_W : learning rate of (11).
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, eta_W=eta_W, rho_W=rho_W)
@@ -88,13 +85,9 @@ def k_b_with_V(
     layer costs nothing, because w_bar already holds what V_hat does to the force, and V_hat itself
     is bounded by its leakage.
 
-    k_b : K1, of `printed_k_b` or `tight_k_b` [U].
-    A_d : (2, 2) error dynamics [1/s].
-    W_M : bound on the ideal W (Frobenius) [U].
-    V_M : bound on the ideal V (Frobenius) [-].
-    eta_V : learning rate of (12).
-    rho_V : leakage gain of (12) [1/(U s²)].
-    weight : c > 0.
+    k_b : K1, of `printed_k_b` or `tight_k_b` [U].   A_d : (2, 2) error dynamics [1/s].
+    W_M : bound on the ideal W (Frobenius) [U].   V_M : bound on the ideal V (Frobenius) [-].
+    eta_V : learning rate of (12).   rho_V : leakage gain of (12) [1/(U s²)].   weight : c > 0.
     """
     require_positive(ValueError, rho_V=rho_V, weight=weight)
     inverse = float(np.linalg.norm(np.linalg.inv(np.asarray(A_d, dtype=np.float64)), 2))
@@ -120,8 +113,7 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
 
     A bound above this one says nothing about learning.
 
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    residual_bound : sup|f| [U].
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   residual_bound : sup|f| [U].
     """
     return peak_gain(A_d) * residual_bound
 
@@ -145,8 +137,7 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     x(y) = max(0, b - (2/λ_min(Q)) (y - k_b)²) and w_b = k_b + sqrt(k_b² + |P| w_bar). The objective
     is a quartic where x > 0: its stationary points are roots of a cubic, none is missed.
 
-    w_bar : bound on the approximation error [U].
-    k_b : of `printed_k_b` or `tight_k_b` [U].
+    w_bar : bound on the approximation error [U].   k_b : of `printed_k_b` or `tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, rho_W=rho_W)

@@ -87,10 +87,8 @@ class SampledBounds:
 class ErrorGains:
     """How large an error what acts on it can hold.
 
-    start : τ, largest growth of an error that is left alone [-].
-    force : γ_f of the residual [s].
-    rate : γ_ξ of ξ' [s].
-    weights : γ_i of the force of the network at each stage [s].
+    start : τ, largest growth of an error that is left alone [-].   force : γ_f of the residual [s].
+    rate : γ_ξ of ξ' [s].   weights : γ_i of the force of the network at each stage [s].
     inner : for stages 2 to 4, the factors on |ξ̃|, and on |A_ξ ξ + B_ξ u| and each f_hat before.
     """
 
@@ -105,8 +103,7 @@ def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
     """Return the gains of the error dynamics.
 
     A_d : (2, 2) error dynamics [1/s], which the step keeps stable.
-    integrator : "euler", "rk4" or "exact" (continuous time).
-    dt : sampling interval [s].
+    integrator : "euler", "rk4" or "exact" (continuous time).   dt : sampling interval [s].
     """
     if integrator == "exact":
         gamma = peak_gain(A_d)
@@ -148,10 +145,8 @@ def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
 class Learning:
     """How the weights of one layer are driven and leak.
 
-    law : coefficients of z and ξ̃ in the driving error.
-    forgetting : λ [1/s].
-    leakage : ρ [1/(U s²)].
-    drive : g', what |driving error| moves the weights by.
+    law : coefficients of z and ξ̃ in the driving error.   forgetting : λ [1/s].
+    leakage : ρ [1/(U s²)].   drive : g', what |driving error| moves the weights by.
     dt : sampling interval [s]; 0 in continuous time.
     staged : whether the step has inner stages (RK4).
     free : radius of the dead zone of the leakage, in the unit of the weights.
@@ -201,9 +196,7 @@ def output_layer(
 ) -> Learning:
     """Return how W is driven: g' = η_W |D| √n_h.
 
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
-    integrator : "euler", "rk4" or "exact".
+    gains : of (8) to (12).   direction : (2, 2) D [s].   integrator : "euler", "rk4" or "exact".
     dt : sampling interval [s].
     """
     return Learning(
@@ -224,9 +217,7 @@ def by_leakage(
 
     The smallest X >= F(X), F increasing and convex, by Newton from below.
 
-    error : of `error_gains`.
-    learning : of `output_layer`.
-    A_d : (2, 2) error dynamics [1/s].
+    error : of `error_gains`.   learning : of `output_layer`.   A_d : (2, 2) error dynamics [1/s].
     """
 
     def around(X: float) -> tuple[float, float, float]:
@@ -260,8 +251,7 @@ def by_projection(
 ) -> SampledBounds:
     """Return the bounds while |W_hat| <= W_max at every stage: for any law and any gain.
 
-    error : of `error_gains`.
-    A_d : (2, 2) error dynamics [1/s].
+    error : of `error_gains`.   A_d : (2, 2) error dynamics [1/s].
     W_max : radius of the projection (Frobenius) [U].
     """
     forces = (math.sqrt(n_h) * W_max,) * len(error.weights)

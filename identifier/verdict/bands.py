@@ -136,7 +136,6 @@ def calibration(
     """Return factors and color of errors on stretches that did not teach; None: too few windows.
 
     noise : variance of the sensors' white noise in them (2,).
-    told : what else is kept of the drive, and factors of an axle that has too few windows.
     """
     factors, speeds = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
     for i in range(2):
@@ -174,8 +173,7 @@ def _shared(values: Array, share: Array, everywhere: float) -> float:
 def quantile(values: Array, share: Array) -> float:
     """Return what the next value stays below in a share `LEVEL` of cases; inf: too few to tell.
 
-    values : of windows that overlap by half (m,).
-    share : of each that counts (m,).
+    values : of windows that overlap by half (m,).   share : of each that counts (m,).
     """
     order = np.argsort(values)
     count = np.cumsum(share[order])

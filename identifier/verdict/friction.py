@@ -59,7 +59,6 @@ class Road(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The stretch in words."""
         return (
             f"from {self.first:.4g} to {self.last:.4g} s the road has "
             f"{with_doubt(self.ratio, self.sd)} of the friction of the drive that taught"

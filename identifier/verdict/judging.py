@@ -81,7 +81,6 @@ class Asked(NamedTuple):
 
     @property
     def recording(self) -> Recording:
-        """What is asked of the drive."""
         return self.portion.recording
 
     @property
@@ -351,7 +350,6 @@ def _roads(found: RoadFriction | None) -> list[Objection]:
 
 
 def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict:
-    """Return the verdict of what was found."""
     model, recording, found = asked.model, asked.recording, asked.found
     if len(recording) < len(whole):
         minutes = len(recording) * whole.dt / 60.0, whole.duration / 60.0

@@ -30,9 +30,7 @@ _CONFINED = 0.6  # and of what is missed with the piece
 class Windows:
     """Where means are taken: half-overlapping windows of n samples in which the car drives.
 
-    starts : index of the first sample of each window (m,).
-    n : steps in a window.
-    duration : T [s].
+    starts : index of the first sample of each window (m,).   duration : T [s].
     """
 
     starts: NDArray[np.intp]
@@ -57,8 +55,7 @@ class Windows:
     ) -> "Windows":
         """Return the windows of a length in one stretch of which every sample counts.
 
-        counts : which samples do (n,).
-        length : of a window [s].
+        counts : which samples do (n,).   length : of a window [s].
         """
         n = max(2, round(length / recording.dt))
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
@@ -68,7 +65,6 @@ class Windows:
         return cls(starts=starts[whole], n=n, duration=n * recording.dt)
 
     def __len__(self) -> int:
-        """Return how many there are."""
         return int(self.starts.size)
 
     def mean(self, signal: Array) -> Array:
@@ -212,8 +208,7 @@ class Evidence:
 def clean_rms(signal: Array, noise: Array) -> Array:
     """Return the root mean square of a signal whose noise has a known variance, (2,).
 
-    signal : (m, 2).
-    noise : its variance (2,).
+    signal : (m, 2).   noise : its variance (2,).
     """
     rms: Array = np.sqrt(np.maximum(np.mean(signal**2, axis=0) - noise, 0.0))
     return rms
@@ -222,8 +217,7 @@ def clean_rms(signal: Array, noise: Array) -> Array:
 def clean_share(missed: Array, force: Array, noise: Array) -> Array:
     """Return the rms of what is missed over that of the force, (2,); one where there is no force.
 
-    missed, force : (m, 2).
-    noise : variance in `missed` (2,).
+    missed, force : (m, 2).   noise : variance in `missed` (2,).
     """
     size = np.sqrt(np.mean(force**2, axis=0))
     share: Array = np.divide(clean_rms(missed, noise), size, out=np.ones(2), where=size > 0.0)

@@ -39,7 +39,6 @@ class Objection(NamedTuple):
 
     @property
     def line(self) -> str:
-        """The finding as a line of text."""
         where = f"{self.axle} axle: " if self.axle else ""
         return f"{'not valid' if self.refuses else 'note'}: {where}{self.text}"
 
@@ -47,8 +46,7 @@ class Objection(NamedTuple):
 class Number(NamedTuple):
     """A number that was learnt, or not.
 
-    title, axle : what.   value, unit : how much.   sd : its standard deviation ±, None unknown.
-    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
+    sd : its standard deviation ±, None unknown.   told : what was said of it before, None nothing.
     valid : whether it is learnt, within its bounds, and nothing was found against its axle.
     """
 

@@ -54,8 +54,7 @@ def _of_arrow(block: bytes) -> Any:
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
 
-    block : whole lines in UTF-8.
-    wanted : column from 0 -> how its cells are read.
+    block : whole lines in UTF-8.   wanted : column from 0 -> how its cells are read.
     """
     import pyarrow
     import pyarrow.csv

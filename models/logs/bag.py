@@ -224,7 +224,6 @@ def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
 
 
 def _plugin(path: Path) -> str:
-    """Return what rosbags reads a path by."""
     if path.is_dir():
         return "dir"
     with path.open("rb") as file:
@@ -390,7 +389,6 @@ class _Reading:
             self._read()
 
     def _read(self) -> None:
-        """Read the messages that were taken."""
         raws, stamp = self.raws, self.topic.stamp
         ns = np.array(self.times, dtype=np.int64)
         values = {name: np.empty(len(raws)) for name in self.fields}
@@ -465,7 +463,6 @@ def _unit(field: Field) -> str:
 
 
 def _said(topics: Sequence[_Topic], skipped: Mapping[str, str]) -> tuple[str, ...]:
-    """Return what is left out or taken for granted."""
     received = [topic.name for topic in topics if topic.stamp is None]
     return (
         *noted("no stamp in the message, its clock is when the bag received it", received),

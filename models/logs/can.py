@@ -82,7 +82,6 @@ class _Dbc(NamedTuple):
 
 
 def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
-    """Read signals, frame by frame."""
     groups: dict[_Group, dict[str, Any]] = {}
     for listed, place in asked:
         if place.fault:

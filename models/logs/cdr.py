@@ -76,7 +76,6 @@ def fields_of(
 
 
 def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
-    """Return the layout of a message."""
     order = ORDERS.get(bytes(raw[:2]))
     if order is None:
         raise CdrError("a message is not plain CDR")
@@ -170,7 +169,6 @@ class _Walk:
         return size
 
     def length(self) -> int:
-        """Read a length."""
         self.align("uint32")
         place = self.place + PREFIX
         if place + 4 > len(self.raw):

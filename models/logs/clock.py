@@ -78,8 +78,7 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
 
-    t : rising time stamps [s], (n,).
-    longest : time without a sample that is none yet [s].
+    t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
     limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
     found = [part.start + 1 + np.flatnonzero(steps > limit) for part, steps in _steps(t)]
@@ -108,10 +107,7 @@ def _steps(t: Array) -> Iterator[tuple[slice, Array]]:
 
 
 def are_one_clock(raws: Sequence[Raw]) -> bool:
-    """Whether all signals are sampled at the same instants.
-
-    raws : at least one.
-    """
+    """Whether all signals are sampled at the same instants."""
     first = raws[0].t
     return all(raw.t is first or np.array_equal(raw.t, first) for raw in raws[1:])
 
@@ -121,8 +117,7 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
 
     Clocks of the calendar are compared since their first instant, to the microsecond.
 
-    raws : by signal; times rise.
-    dt : step of the clock [s].
+    raws : by signal; times rise.   dt : step of the clock [s].
     longest : time without a sample that is no gap yet [s].
     """
     zero = min(float(raw.t[0]) for raw in raws.values())
@@ -188,8 +183,7 @@ def _intersection(
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:
     """Return a signal at the instants of a clock, of samples that were there by then.
 
-    raw : the signal; a sample lies at or before the first instant.
-    grid : instants [s], (m,).
+    raw : the signal; a sample lies at or before the first instant.   grid : instants [s], (m,).
     dt : step of the clock [s].
     """
     interval = _interval(raw.t)
@@ -211,7 +205,6 @@ def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
 
 
 def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) -> Array:
-    """Return means of samples from first to last."""
     begin = int(first[0])
     total = np.concatenate([[0.0], np.cumsum(values[begin : int(last[-1]) + 1])])
     means: Array = (total[last + 1 - begin] - total[first - begin]) / (last + 1 - first)

@@ -44,7 +44,6 @@ def open_log(
     """Open a log of any format; nothing but its beginning is read.
 
     path : of a file; of a folder, where a format keeps a log in one.
-    dbc : of the file that tells the signals in the frames of a CAN bus.
     mend : whether stamps that do not rise are mended, and not refused.
     clock, clock_unit : channel that is the time, where it is not what the format takes for it.
     rate : of the samples [Hz], where no channel is a time; 0 where none is told.
@@ -83,7 +82,6 @@ def open_log(
 
 
 def _function(place: str) -> Any:
-    """Import a function by its place."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)
 

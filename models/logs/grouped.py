@@ -135,7 +135,6 @@ class GroupedLog(Generic[P]):
         return tuple(listed for listed, _ in self.channels)
 
     def runs(self) -> tuple[str, ...]:
-        """Return no names: such a log is one run."""
         return ()
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
@@ -173,7 +172,6 @@ class GroupedLog(Generic[P]):
         return tuple(result)
 
     def _timed(self, names: Sequence[str]) -> tuple[Channel, ...]:
-        """Return channels on the time that one of them tells."""
         clock, *found = replace(self, clock_name="").read([self.clock_name, *names])
         label = f"{self.path}: t (channel {clock.name!r})"
         t = clock.values * to_si(self.clock_unit or clock.unit, TIME, label)

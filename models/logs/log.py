@@ -125,7 +125,6 @@ class LogFile(Protocol):
 
 
 def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
-    """Return what is known by names."""
     for name in names:
         if name not in known:
             similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)

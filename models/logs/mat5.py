@@ -50,8 +50,6 @@ class DamagedError(TireidError, ValueError):
 
 
 class _Element(NamedTuple):
-    """An element: type and data."""
-
     kind: int
     data: memoryview
 
@@ -98,8 +96,6 @@ def read_tree(path: Path) -> dict[str, Tree]:
 
 
 class _Variable(NamedTuple):
-    """Where a variable lies in a file."""
-
     path: Path
     place: int
     length: int
@@ -155,7 +151,6 @@ class _Read(NamedTuple):
 
 
 def _elements(data: memoryview, order: str) -> Iterator[_Element]:
-    """Yield the elements of data one by one."""
     place = 0
     while place + 8 <= len(data):
         kind, length = struct.unpack(order + "II", data[place : place + 8])
@@ -168,7 +163,6 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
 
 
 def _beginning(data: memoryview, order: str) -> _Beginning:
-    """Return what a variable says of itself."""
     if not data:
         return _Beginning(6, False, (0, 0), 2, "", data)
     place, parts = 0, []
@@ -231,7 +225,6 @@ def _load(path: Path, begin: _Beginning, order: str) -> Array:
 
 
 def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
-    """Return what a variable holds."""
     require_few(RecordingError, str(path), depth, "depth", "levels of structs and cells")
     begin = _beginning(data, order)
     if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
@@ -270,7 +263,6 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
 
 
 def _take(elements: Iterator[_Element], count: int) -> list[_Element]:
-    """Return so many variables."""
     result = []
     for _ in range(count):
         element = next(elements, None)

@@ -73,7 +73,6 @@ class ArrayLog:
 
     @property
     def format(self) -> str:
-        """What it is."""
         return "arrays"
 
     @property

@@ -130,7 +130,6 @@ WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
 
 
 def _with_corner(word: str) -> tuple[str, ...]:
-    """Return a word, or what it is made of where a corner of the car is written with it."""
     for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
         if corner in CORNERS and stem in _BOTH:
             return stem, corner
@@ -164,7 +163,6 @@ class Guess:
     """A channel, or the channels of two wheels, that may be a signal.
 
     confidence : from 0 to 1.
-    hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
     sign : channel that has the sign of the amounts in this one; empty where there is none.
     factor : -1 of an axis that points the other way.
@@ -537,7 +535,6 @@ def _with_told_unit(one: Heading) -> Heading:
 
 
 def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
-    """Return a guess by what the unit says of it."""
     quantity = quantity_of(signal, one.unit)
     if not is_told(one.unit):
         if guess.confidence == _STANDARD:  # names of ours are in SI, as the documents say
@@ -592,7 +589,6 @@ def _said(guess: Guess, why: str) -> Guess:
 
 
 def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
-    """Return a guess by what the numbers say of it."""
     size = usual = 0.0
     for name in guess.channel:
         if name not in seen:
@@ -715,6 +711,5 @@ def _usual(values: Array) -> float:
 
 
 def _root_mean_square(values: Array) -> float:
-    """Return it of the finite ones."""
     finite = values[np.isfinite(values)]
     return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else 0.0

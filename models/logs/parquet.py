@@ -23,7 +23,6 @@ BATCH = 1 << 16  # rows that are read at once
 
 
 def open_parquet(path: Path) -> TableLog:
-    """Return the log in a Parquet file."""
     parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
     with one_line(path, WHAT), parquet.ParquetFile(path) as file:
@@ -43,10 +42,7 @@ def open_parquet(path: Path) -> TableLog:
 
 @dataclass(frozen=True, kw_only=True)
 class _ParquetTable:
-    """A table in a Parquet file.
-
-    schema : of its columns, as pyarrow gives it.
-    """
+    """A table in a Parquet file."""
 
     path: Path
     schema: Any
@@ -58,7 +54,6 @@ class _ParquetTable:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
         return tuple(self.schema.names)
 
     @cached_property
@@ -143,7 +138,6 @@ class _ParquetTable:
         return tuple(result)
 
     def _column(self, column: int, kind: Kind, cells: Any, rows: Any) -> Any:
-        """Return the cells of a batch as their kind asks."""
         import pyarrow
 
         found = self.schema.field(column).type
@@ -217,7 +211,6 @@ def _as_text(cells: Any, kind: Any) -> list[str]:
 
 
 def _unit(field: Any) -> str:
-    """Return the unit of a column, by its metadata or its name."""
     about = field.metadata or {}
     for key in (b"unit", b"units", b"Unit", b"Units"):
         if key in about:

@@ -168,7 +168,6 @@ class Signal:
         )
 
     def _value(self, parts: Sequence[Array], quantity: str) -> Array:
-        """Return the signal of some samples of its channels."""
         total: Array = parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
         if len(parts) > 1 and quantity != FORCE:
             total = total / len(parts)

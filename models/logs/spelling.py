@@ -23,7 +23,6 @@ _LENKRAD = re.compile("(?i:lenk_?rad)$")  # German for a wheel: no angle in rad
 
 
 def is_unit(word: str) -> bool:
-    """Return whether a word is a unit, or stands where one would."""
     return is_known(word) or word.strip("[](){} ").lower() in _OTHERS
 
 
@@ -47,7 +46,6 @@ def unit_in_name(name: str) -> str:
 
 
 def _split(name: str) -> tuple[str, str]:
-    """Return a name without the unit that it holds, and the unit; it and ""."""
     if len(name) > LONGEST_NAME:
         return name, ""
     held = _BRACKETS.fullmatch(name)

@@ -87,7 +87,6 @@ class Stamps(NamedTuple):
     order: NDArray[np.intp] | None = None
 
     def of(self, column: NDArray[Any]) -> NDArray[Any]:
-        """Return the cells of a column that the stamps are of."""
         return column if self.order is None else column[self.order]
 
 
@@ -101,8 +100,6 @@ def find_clock(
 
     Of several that are called so it is the first whose stamps hardly ever repeat, as one that is
     rounded to seconds does. One that counts samples, or the way, is none.
-
-    head : gives the first cells of a column, with decimal points.
     """
     named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
     named.sort(key=lambda k: NAMES.index(_plain(names[k])))
@@ -159,7 +156,6 @@ def _even(
 
 
 def _is_way(name: str, unit: str) -> bool:
-    """Whether a column is the distance driven, by its name, or by that and its unit."""
     plain = _plain(name)
     return plain in WAYS or (plain.endswith(("distance", "dist")) and unit in ("", "m", "km", "ft"))
 
@@ -187,8 +183,6 @@ def own_clocks(
     of the others, called alike or of another rate, rises without a rest from about the same instant
     on: what a receiver tells of the same rows has another name and the same steps. What stands
     behind a time that is none of its own has the first.
-
-    head : gives the first cells of a column, with decimal points.
     """
     found = {}
     for k, name in enumerate(names):
@@ -275,7 +269,6 @@ def _clock(
 
 
 def _is_any(_: Array) -> bool:
-    """Return that any steps will do."""
     return True
 
 
@@ -300,7 +293,6 @@ def _rises_evenly(steps: Array) -> bool:
 
 
 def _unit(t: Array, told: str) -> tuple[str, bool]:
-    """Return the unit of times and whether they count from 1970, by what is told or by steps."""
     finite = t[np.isfinite(t)]
     largest = float(np.abs(finite).max()) if finite.size else 0.0
     for unit, (low, high) in _EPOCHS.items():
@@ -436,8 +428,7 @@ def seconds(
     Dates and times of day count from the first of them; numbers stay as they stand, in seconds,
     those since 1970 too.
 
-    values : (n,) as in the file.
-    rows : (n,) where each is in the file.
+    values : (n,) as in the file.   rows : (n,) where each is in the file.
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
         and what follows where the clock goes back for long is put after the rest; refused else.
     restarts : whether a clock that goes back for long is mended, too: not one of several.
@@ -475,8 +466,7 @@ def risen(
 ) -> Stamps:
     """Return times in seconds as `seconds` does.
 
-    t : times [s], (n,).
-    rows : (n,) where each is in the file.
+    t : times [s], (n,).   rows : (n,) where each is in the file.
     """
     clock = Clock(0, name, "s", False, "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
@@ -525,8 +515,7 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
 def _starts_again(first: float, before: float, after: float) -> bool:
     """Return whether a clock that fell starts again; else its samples are out of order.
 
-    first : stamp since which it rose [s].
-    before, after : stamps between which it fell [s].
+    first : stamp since which it rose [s].   before, after : stamps between which it fell [s].
     """
     return bool(after - first <= 0.5 * (before - first) and before > first)
 
@@ -544,8 +533,7 @@ def typical_rate(t: Array) -> float:
 def since(t: Array, first: float) -> Array:
     """Return times of the calendar since an instant, (n,); doubles hold them to the microsecond.
 
-    t : times since 1970 [s], (n,).
-    first : instant since 1970 [s].
+    t : times since 1970 [s], (n,).   first : instant since 1970 [s].
     """
     return filled(t.size, lambda part: np.round((t[part] - first) * _MICROSECONDS) / _MICROSECONDS)
 
@@ -568,17 +556,13 @@ def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
 
 
 def started(clock: Clock, cell: str) -> float:
-    """Return the instant that a clock of the calendar counts from [s]; 0 of any other.
-
-    cell : its first one.
-    """
+    """Return the instant that a clock of the calendar counts from [s]; 0 of any other."""
     if clock.unit == "instant":
         return (nanoseconds(cell) or 0) / 1e9
     return float(_of_digits(np.array([float(cell)]))[0]) if clock.unit == "hhmmss" else 0.0
 
 
 def _of_digits(values: Array) -> Array:
-    """Return hhmmss.ss in seconds."""
     hours, rest = np.divmod(values, 10000.0)
     minutes, whole = np.divmod(rest, 100.0)
     total: Array = hours * 3600.0 + minutes * 60.0 + whole
@@ -594,7 +578,6 @@ def _past_midnight(t: Array) -> Array:
 
 
 def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) -> int | None:
-    """Return the first place where something is wrong."""
     for part in blocks(values.size, overlap=1):
         found = np.flatnonzero(wrong(values[part]))
         if found.size:
@@ -603,7 +586,6 @@ def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) 
 
 
 def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
-    """Return the sample before the first step with which something is wrong."""
     return _first(t, lambda part: wrong(np.diff(part)))
 
 
@@ -731,7 +713,6 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
 
     t : stamps [s], one of which is not above the one before, (n,).
     rows : (n,) where each is in the file.
-    restarts : whether a clock that starts again can be mended.
     """
     k = _first_step(t, lambda step: ~(step > 0.0))
     assert k is not None

@@ -61,7 +61,6 @@ class Words(NamedTuple):
 
     @classmethod
     def of(cls, cells: Sequence[str]) -> "Words":
-        """Return the words of cells."""
         codes: dict[str, int] = {}
         coded = [codes.setdefault(cell, len(codes)) for cell in cells]
         return cls(list(codes), np.array(coded, dtype=np.int32))
@@ -154,8 +153,7 @@ class Gathered:
     def extend(self, rows: NDArray[np.int64], columns: Mapping[int, Any]) -> None:
         """Add the rows of a block.
 
-        rows : (n,) where they are in the file.
-        columns : column -> (n,) values, or `Words`.
+        rows : (n,) where they are in the file.   columns : column -> (n,) values, or `Words`.
         """
         self._seen += rows.size
         if self._seen > self._most:
@@ -214,12 +212,10 @@ class TableLog:
 
     @property
     def path(self) -> Path:
-        """The file."""
         return self.table.path
 
     @property
     def format(self) -> str:
-        """Its format as users call it."""
         return self.table.format
 
     @property
@@ -287,7 +283,6 @@ class TableLog:
 
     @cached_property
     def _own_clocks(self) -> dict[int, Clock]:
-        """By column the clock of those that have one of their own."""
         if self.clock_name or self.clock is None or self._run_column is not None:
             return {}
         return own_clocks(self.names, self.table.units, self.table.first_rows, self.clock)
@@ -411,7 +406,6 @@ class TableLog:
         return {name: k for k, name in enumerate(self.names)}
 
     def _one_run(self, run: str | None) -> tuple[int, str] | None:
-        """Return column and word of a run."""
         found = one_run(self.path, self.runs(), run)
         if self._run_column is None or found is None or (run is None and len(self.runs()) == 1):
             return None

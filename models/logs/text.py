@@ -61,17 +61,14 @@ class TextTable:
 
     @property
     def format(self) -> str:
-        """The format as users call it."""
         return "VBO" if self.layout.made_by == "Racelogic VBOX" else "CSV"
 
     @property
     def place(self) -> str:
-        """What a sample is in."""
         return "line"
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns as in the file."""
         return self.layout.names
 
     @property
@@ -280,7 +277,6 @@ class _Python:
     def _column(
         self, column: int, kind: Kind, cells: list[str], lines: Sequence[int], marked: bool
     ) -> Any:
-        """Return the cells of one column as numbers, words or instants."""
         if kind is Kind.WORD:
             return Words.of(cells)
         if kind is Kind.INSTANT:
@@ -309,7 +305,6 @@ class _Python:
         dtype: Any,
         what: str,
     ) -> NDArray[Any]:
-        """Return what each cell is read as; refuse the first that cannot be."""
         values = [read(cell) for cell in cells]
         if None in values:
             k = values.index(None)

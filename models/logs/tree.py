@@ -134,8 +134,6 @@ _Clockless = tuple[str, str, Leaf, tuple[list[str], list[str]] | None]
 
 
 class _Walk:
-    """Collects what a tree holds."""
-
     def __init__(self) -> None:
         self.signals: list[Signal] = []
         self.clockless: dict[str, _Clockless] = {}
@@ -255,7 +253,6 @@ def line_of(values: Array, signal: Signal) -> Array:
 
 
 def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
-    """Yield the clocks of a struct."""
     for key, child in node.items():
         unit = _unit_of_clock(key)
         name = f"{path}.{key}" if path else key

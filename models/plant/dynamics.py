@@ -41,8 +41,7 @@ class Wheel(NamedTuple):
     def velocity(self, v_x: Any, v_y: Any, r: Any) -> tuple[Any, Any]:
         """Velocity of the wheel center [m/s] in the body frame.
 
-        v_x, v_y : velocity of the center of gravity, body frame [m/s].
-        r : yaw rate [rad/s].
+        v_x, v_y : velocity of the center of gravity, body frame [m/s].   r : yaw rate [rad/s].
         """
         return v_x - self.y * r, v_y + self.x * r
 
@@ -76,10 +75,8 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     of the wheel (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 7.2; no division by speed,
     so it is well posed down to standstill).
 
-    slip : lagged slip tan(α') [-].
-    delta : steering angle of the wheel [rad].
-    velocity : of the wheel, body frame [m/s].
-    length : relaxation length σ [m].
+    slip : lagged slip tan(α') [-].   delta : steering angle of the wheel [rad].
+    velocity : of the wheel, body frame [m/s].   length : relaxation length σ [m].
     """
     v_x, v_y = velocity
     along = v_x * ca.cos(delta) + v_y * ca.sin(delta)
@@ -90,11 +87,9 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
 def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
     """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
 
-    slip : lagged slip tan(α') [-].
-    camber : γ > 0 when the top leans right [rad].
+    slip : lagged slip tan(α') [-].   camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
-    load : vertical load [N].
-    mu : friction over the tire's own [-].
+    load : vertical load [N].   mu : friction over the tire's own [-].
     """
     floored = ca.fmax(load, _LEAST_LOAD)
     # A tire may push at zero slip (its shifts); a free wheel then slips to where it does not.
@@ -137,8 +132,7 @@ def wheel_loads(
 
     roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
     axle_force : side force of the front and the rear axle, body frame, (2,) [N].
-    a_x : longitudinal acceleration [m/s^2].
-    pressed : downforce of front and rear axle [N].
+    a_x : longitudinal acceleration [m/s^2].   pressed : downforce of front and rear axle [N].
     """
     c = vehicle.require_chassis()
     total = vehicle.weight + pressed[0] + pressed[1]
@@ -182,8 +176,7 @@ class Driver:
     def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
         """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
 
-        error : wanted minus actual speed [m/s].
-        integral : of the error [m].
+        error : wanted minus actual speed [m/s].   integral : of the error [m].
         """
         unlimited = self.gain * error + self.integral_gain * integral
         limit = self.acceleration_limit
@@ -200,7 +193,6 @@ OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "accelerat
 def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
     """Return the components of a wheel-frame vector in the body frame.
 
-    x, y : components in the frame of the wheel.
     angle : steering angle of the wheel [rad].
     """
     c, s = ca.cos(angle), ca.sin(angle)
@@ -287,8 +279,7 @@ def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
 
     Its outputs are those of the state before the step.
 
-    car : from `dynamics`.
-    dt : step [s].
+    car : from `dynamics`.   dt : step [s].
     """
     x = ca.MX.sym("x", N_STATES)
     rest = [ca.MX.sym(car.name_in(i), *car.size_in(i)) for i in range(1, car.n_in())]

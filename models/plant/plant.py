@@ -72,8 +72,7 @@ class PlantRun:
     ) -> "PlantRun":
         """Name the columns of what the compiled loop recorded.
 
-        t : time [s], (n,).
-        command : steering asked for [rad], (n, 2).
+        t : time [s], (n,).   command : steering asked for [rad], (n, 2).
         record : state "x" (n, 18) in the order of `models.plant.dynamics`, and its outputs.
         """
         names = ("v_x", "v_y", "r", "roll", "roll_rate", "X", "Y", "psi")
@@ -133,11 +132,7 @@ FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
 
 
 class _CompiledLoop(NamedTuple):
-    """A plant over time: the library of all cars that are built alike, and the numbers of this one.
-
-    scan : of one step of the integration.
-    constants : its input of that name.
-    """
+    """A plant over time: library of cars that are built alike, and the numbers of this one."""
 
     scan: Scan
     constants: Array
@@ -344,9 +339,7 @@ class StepwisePlant:
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
 
-        v_x : speed [m/s].
-        X, Y : position of the center of gravity [m].
-        psi : heading [rad].
+        v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
         """
         if not v_x > 0.0:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
@@ -357,8 +350,7 @@ class StepwisePlant:
     def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
         """Return the plant one period later.
 
-        command : steering angles asked for, [δ_f, δ_r] [rad].
-        v_ref : wanted speed [m/s].
+        command : steering angles asked for, [δ_f, δ_r] [rad].   v_ref : wanted speed [m/s].
         """
         if not np.isfinite([*command, v_ref]).all():
             raise ValueError(f"command and v_ref must be finite, they are {command} and {v_ref}")

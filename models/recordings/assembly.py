@@ -311,7 +311,6 @@ def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
 
 
 def _gap_notes(stretches: list[Stretch]) -> tuple[str, ...]:
-    """Return what is to be said of gaps."""
     if len(stretches) < 2:
         return ()
     times = [after.t[0] - before.t[-1] for before, after in pairwise(stretches)]

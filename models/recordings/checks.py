@@ -408,7 +408,6 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
 
 
 def _larger_steering(recording: Recording) -> str:
-    """Name the axle that steers more."""
     some = slice(None, None, thinning(len(recording)))
     front, rear = (np.mean(angle[some] ** 2) for angle in (recording.delta_f, recording.delta_r))
     return "delta_f" if front >= rear else "delta_r"

@@ -169,7 +169,6 @@ class _Piece(NamedTuple):
 
 
 def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
-    """Return a piece on an even clock, smoothed."""
     step = float((t[-1] - t[0]) / (t.size - 1))
     even = t[0] + step * np.arange(t.size)
     even = t if np.abs(even - t).max() < 1e-6 * step else even

@@ -153,7 +153,6 @@ class Recording:
                 )
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return int(self.t.size)
 
     @property
@@ -390,8 +389,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     Each keeps its own time where it begins after the one before; else its time is moved to begin
     `PAUSE` after it. Signals that one lacks are left out of all.
 
-    recordings : sampled alike; at least one.
-    name : of the drive; None takes all their names.
+    recordings : sampled alike; at least one.   name : of the drive; None takes all their names.
     """
     first = recordings[0]
     name = " + ".join(one.name for one in recordings) if name is None else name
@@ -536,7 +534,6 @@ def _columns(recording: Recording) -> dict[str, Array]:
 
 
 def _csv(columns: Mapping[str, Array]) -> Iterator[bytes]:
-    """Yield a table as CSV, block by block."""
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(columns)
@@ -571,8 +568,7 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     Time stamps that are that grid keep their bits. Those that only jitter about it, or drift by
     less than 1 % of a step, are replaced by it, and the values stay.
 
-    t : rising time stamps [s], shape (n,).
-    columns : name -> values, shape (n,).
+    t : rising time stamps [s], shape (n,).   columns : name -> values, shape (n,).
     dt : step of the grid [s].
     """
     off = _off_grid(t, dt)

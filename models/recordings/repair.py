@@ -75,7 +75,6 @@ class Repair:
             _require_finite(name, getattr(self, name))
 
     def __bool__(self) -> bool:
-        """Whether there is anything to repair."""
         return self != Repair()
 
     def apply(self, recording: Recording, vehicle: Vehicle) -> tuple[Recording, Vehicle]:
@@ -315,7 +314,6 @@ def _by_stretches(recording: Recording, compute: Callable[[slice, slice], Array]
 
 
 def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:
-    """Return samples of a part of a stretch of a signal a delay earlier."""
     return np.interp(t[part] + delay, t[whole], signal[whole])
 
 

@@ -56,8 +56,7 @@ def rolled(
     """Return the forward speed at the center of gravity; no sample looks at a later one.
 
     speeds : at which wheels roll [m/s], by names of `WHEELS`, each (n,); at least one.
-    r : yaw rate [rad/s], (n,).
-    delta_f, delta_r : angles of the road wheels [rad], (n,).
+    r : yaw rate [rad/s], (n,).   delta_f, delta_r : angles of the road wheels [rad], (n,).
     dt : sample time [s].
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
@@ -210,10 +209,7 @@ def _mean(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
 
 @cache
 def trust_scan(k: int) -> Scan:
-    """Return the compiled loop over samples.
-
-    k : wheels, and axles that count as one.
-    """
+    """Return the compiled loop over samples."""
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
     rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)
     after = trusted(

@@ -28,8 +28,6 @@ class Scale(NamedTuple):
     """Speed over ground per what a wheel shows.
 
     value : radius [m] of one that shows turns, factor [-] of one that shows a speed.
-    turns : which of both.
-    seconds : of straight and even driving that tell it.
     """
 
     value: float
@@ -91,9 +89,7 @@ def learnt_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, f
 
     None where straight and even driving is too short, or does not agree on one number.
 
-    t : time [s], (n,), rising.
-    v_x : speed over ground [m/s], (n,).
-    r : yaw rate [rad/s], (n,).
+    t : time [s], (n,), rising.   v_x : speed over ground [m/s], (n,).   r : yaw rate [rad/s], (n,).
     wheel : what the wheel shows [rad/s or m/s], (n,).
     """
     step = float(np.median(np.diff(t)))

@@ -41,10 +41,8 @@ class Tire(Protocol):
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
 
-        alpha : slip angle, paper's sign [rad].
-        kappa : longitudinal slip [-].
-        gamma : camber [rad].
-        F_z : wheel load [N]; no force at F_z <= 0.
+        alpha : slip angle, paper's sign [rad].   kappa : longitudinal slip [-].
+        gamma : camber [rad].   F_z : wheel load [N]; no force at F_z <= 0.
         mu : friction of the road over that of the measurement [-].
         """
         ...
@@ -118,8 +116,7 @@ def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) 
 
     alpha : slip angle, paper's sign [rad].
     kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-    C_alpha : cornering stiffness [N/rad].
-    C_kappa : longitudinal slip stiffness [N].
+    C_alpha : cornering stiffness [N/rad].   C_kappa : longitudinal slip stiffness [N].
     """
     tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR)
     p_x = C_kappa * kappa

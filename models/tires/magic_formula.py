@@ -38,10 +38,7 @@ def _magic_curve(
 ) -> Expression:
     """D sin(C atan(B x - E (B x - atan B x))), (4.49) without shifts.
 
-    x : slip, shifted.
-    B, C : stiffness and shape factor.
-    D : peak value [N].
-    E : curvature factor.
+    B, C : stiffness and shape factor.   D : peak value [N].
     """
     Bx = B * x
     return D * ca.sin(C * ca.atan(Bx - E * (Bx - ca.atan(Bx))))
@@ -83,9 +80,7 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
 def _lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> _Shape:
     """All of the curve that does not depend on slip.
 
-    c : coefficients of the tire file.
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
+    gamma : camber [rad].   F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
     df_z = c.load_increment(F_z)  # (4.E2)
@@ -109,9 +104,7 @@ def _lateral_curvature(
 ) -> Expression:
     """E_y, at most 1.
 
-    c : coefficients of the tire file.
-    alpha_y : slip angle, ISO sign, shifted [rad].
-    gamma : camber [rad].
+    alpha_y : slip angle, ISO sign, shifted [rad].   gamma : camber [rad].
     F_z : wheel load, not negative [N].
     """
     df_z = c.load_increment(F_z)
@@ -124,9 +117,7 @@ def pure_lateral(
 ) -> Expression:
     """F_y0 [N] of a wheel that rolls freely, (4.E19).
 
-    c : coefficients of the tire file.
-    alpha : slip angle, ISO sign [rad].
-    gamma : camber [rad].
+    alpha : slip angle, ISO sign [rad].   gamma : camber [rad].
     F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
@@ -146,10 +137,7 @@ def combined_lateral(
 ) -> Expression:
     """F_y [N] at any slip, (4.E58).
 
-    c : coefficients of the tire file.
-    alpha : slip angle, ISO sign [rad].
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
+    alpha : slip angle, ISO sign [rad].   kappa : longitudinal slip [-].   gamma : camber [rad].
     F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
@@ -169,7 +157,6 @@ def combined_lateral(
 def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0.
 
-    c : coefficients of the tire file.
     F_z : wheel load, not negative [N].
     """
     B_y, C_y, D_y, S_Hy, _ = _lateral_shape(c, 0.0, F_z, 1.0)
@@ -189,9 +176,7 @@ def _longitudinal_shape(
 ) -> _Shape:
     """All of the curve that does not depend on slip.
 
-    c : coefficients of the tire file.
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
+    gamma : camber [rad].   F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
     df_z = c.load_increment(F_z)  # (4.E2)
@@ -210,9 +195,7 @@ def _longitudinal_shape(
 def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:
     """E_x, at most 1.
 
-    c : coefficients of the tire file.
-    kappa_x : slip, shifted [-].
-    F_z : wheel load, not negative [N].
+    kappa_x : slip, shifted [-].   F_z : wheel load, not negative [N].
     """
     df_z = c.load_increment(F_z)
     E_0 = c.PEX1 + c.PEX2 * df_z + c.PEX3 * df_z**2
@@ -224,10 +207,7 @@ def _pure_longitudinal(
 ) -> Expression:
     """F_x0 [N] of a wheel that runs straight, (4.E9).
 
-    c : coefficients of the tire file.
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
+    kappa : longitudinal slip [-].   gamma : camber [rad].   F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
     B_x, C_x, D_x, S_Hx, S_Vx = _longitudinal_shape(c, gamma, F_z, mu)
@@ -257,7 +237,6 @@ def _combined_longitudinal(
 def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0.
 
-    c : coefficients of the tire file.
     F_z : wheel load, not negative [N].
     """
     B_x, C_x, D_x, S_Hx, _ = _longitudinal_shape(c, 0.0, F_z, 1.0)

@@ -163,7 +163,6 @@ class TirFile:
         return next(iter(values)) * self._unit(key)
 
     def error(self, reason: str) -> TirError:
-        """A TirError that names this file."""
         return TirError(f"{self.path}: {reason}")
 
     def _parsed(self, key: str, entry: Entry) -> float:
@@ -299,9 +298,7 @@ class ValidRange:
     """What the tire was measured for, as (least, greatest); infinite where the file does not say.
 
     alpha : slip angle, paper's sign [rad]; the file has the ISO sign, so its limits change places.
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
-    F_z : wheel load [N].
+    kappa : longitudinal slip [-].   gamma : camber [rad].   F_z : wheel load [N].
     """
 
     alpha: tuple[float, float]

@@ -179,9 +179,7 @@ TOLERANCE_DOUBLE, TOLERANCE_SINGLE = 1e-9, 1e-3
 class MpcPackage(NamedTuple):
     """A package before it is written.
 
-    name : prefix of every symbol.   tire : of the prediction.   problem : what is minimized.
     params : the numbers that it begins with, of `mpc.realtime.instance.c_types`.
-    files : texts by path.   vectors : of the self-test.   about : title, version, hash, as text.
     """
 
     name: str
@@ -291,7 +289,6 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
 
 
 def _tables(name: str, params: _Params, about: Values) -> str:
-    """Return the numbers of the export as C."""
     return packaging.header(
         f"{name}_tables.h",
         f"The numbers of the export.\n\n{packaging.generated(about)}",

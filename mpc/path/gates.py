@@ -35,10 +35,8 @@ _OPTIONS: dict[str, Any] = {
 class Gate:
     """A lane between two rows of cones, or beside one row where a side is infinite.
 
-    start : where it begins along x [m].
-    end : where it ends [m].
-    right : y of the right cones [m].
-    left : y of the left cones [m].
+    start : where it begins along x [m].   end : where it ends [m].
+    right : y of the right cones [m].   left : y of the left cones [m].
     """
 
     start: float
@@ -120,7 +118,6 @@ def _coefficients(
     clearance: float,
     easing: float,
 ) -> Array:
-    """Solve for the coefficients of the spline."""
     n = t.size - DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)

@@ -108,7 +108,6 @@ def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]
 
 
 def _equations(structure: TireStructure, name: str, sentence: str) -> str:
-    """Return the prediction and its derivatives."""
     real, params = f"{name}_real", f"const {name}_params *params"
     bodies = {
         f"void {name}_linearize({params}, const {real} *q,\n    const {real} *x, {real} u, {real} "

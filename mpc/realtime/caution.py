@@ -42,6 +42,5 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
 
 
 def _offers_friction(tire: PredictionTire) -> bool:
-    """Return whether the tire can be told for another friction."""
     numbers = Car(*tire.car)
     return tire.structure.similar(Point(0.0, 0.0, 0.0, 1.0, numbers, tire.weights), 1.0) is not None

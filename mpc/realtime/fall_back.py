@@ -119,7 +119,6 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
 
 
 def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
-    """Return A and B of samples with u held."""
     from scipy.linalg import expm  # takes longer to import than the rest of the tracker
 
     n, m = B.shape

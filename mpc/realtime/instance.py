@@ -172,11 +172,7 @@ class NoCompilerError(TireidError, RuntimeError):
 
 
 class Instance:
-    """State, parameters, input and work memory, which the C reads and writes in place.
-
-    horizon : number of stages.
-    single : whether numbers are float.
-    """
+    """State, parameters, input and work memory, which the C reads and writes in place."""
 
     def __init__(self, structure: TireStructure, horizon: int, *, single: bool) -> None:
         library = load_library(tracker_source(structure, horizon, single=single), "tracker", FLAGS)

@@ -82,7 +82,6 @@ class LaggedAxles(TireStructure):
 
     @property
     def n_weights(self) -> int:
-        """Those of the curve and 4."""
         return self.curve.n_weights + 4
 
     def slip(self, at: Point) -> Pair:

@@ -50,7 +50,6 @@ def _curve_tire(model: CurveModel) -> PredictionTire:
 
 
 def _plain_curve(model: CurveModel) -> PredictionTire:
-    """Return the curve without its lag and offsets."""
     q = model.parameters
     if model.curve == "linear":
         return linear_tire(model.vehicle, q[:, 0])

@@ -43,8 +43,6 @@ class LadderAxles(TireStructure):
     the same sensors.
 
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
-    pressed : whether the loads of the axles change with speed.
-    mounted : whether v_y is off by more with speed, and the steering by more with its angle.
     """
 
     saturates = True

@@ -29,7 +29,6 @@ class NetworkAxles(SmallSlip):
 
     @property
     def n_weights(self) -> int:
-        """2 + 2 n_h + n_h n_in."""
         return 2 + self.hidden * (2 + len(self.inputs))
 
     def at_friction(self, weights: Array, ratio: float) -> Array | None:
@@ -163,7 +162,6 @@ def _evaluated(
 
 
 def _nodes(results: Any, operation: int) -> list[Any]:
-    """Return the nodes of an operation in the graph of some results."""
     graph = ca.Function("graph", ca.symvar(ca.veccat(*results)), results)
     return [
         graph.instruction_MX(k)

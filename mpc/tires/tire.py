@@ -49,7 +49,6 @@ class TireStructure:
 
     @property
     def n_weights(self) -> int:
-        """Numbers in w."""
         raise NotImplementedError
 
     @property
