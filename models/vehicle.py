@@ -406,10 +406,7 @@ class Vehicle:
     @property
     def axle_loads(self) -> tuple[float, float]:
         """Static vertical load of the front and the rear axle [N]."""
-        return (
-            self.weight * self.l_r / self.wheelbase,
-            self.weight * self.l_f / self.wheelbase,
-        )
+        return (self.weight * self.l_r / self.wheelbase, self.weight * self.l_f / self.wheelbase)
 
     @property
     def downforce(self) -> tuple[float, float]:

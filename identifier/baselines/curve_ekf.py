@@ -83,11 +83,7 @@ def _filtered_tire(textbook: bool) -> FilteredTire:
 
     own, prior = (0, 0) if textbook else (OWN, len(_OWN_PRIOR))
     return FilteredTire(
-        slip=slip,
-        force=force,
-        lag=None if textbook else lag,
-        unknowns=n + own,
-        prior=1 + prior,
+        slip=slip, force=force, lag=None if textbook else lag, unknowns=n + own, prior=1 + prior
     )
 
 

@@ -26,14 +26,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CurveModel
-from identifier.baselines.slip_filter import (
-    LIMITS,
-    PORTS,
-    TIRES,
-    Numbers,
-    SlipFilter,
-    joint_ekf,
-)
+from identifier.baselines.slip_filter import LIMITS, PORTS, TIRES, Numbers, SlipFilter, joint_ekf
 from identifier.baselines.without_v_y import (
     MOST_SLIDING,
     OVER,
@@ -318,9 +311,7 @@ class HorizonEstimator(Method):
         joint = joint_ekf(vehicle, dt=dt)
         return cls(
             filter=replace(
-                joint,
-                a_y_noise=1.3 * joint.a_y_noise,
-                r_disturbance=0.36 * joint.r_disturbance,
+                joint, a_y_noise=1.3 * joint.a_y_noise, r_disturbance=0.36 * joint.r_disturbance
             ),
             window=window,
         )

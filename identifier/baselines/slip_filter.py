@@ -88,13 +88,7 @@ def _tire(curve: str, force: Any, unknowns: int) -> FilteredTire:
         del known, theta
         return CURVES[curve].slip(p, v_x, x, u)
 
-    return FilteredTire(
-        slip=slip,
-        force=force,
-        lag=None,
-        unknowns=unknowns,
-        prior=1,
-    )
+    return FilteredTire(slip=slip, force=force, lag=None, unknowns=unknowns, prior=1)
 
 
 TIRES: Mapping[str, FilteredTire] = {

@@ -14,12 +14,7 @@ import numpy as np
 
 from codegen import Scan
 from identifier.baselines.curves import CURVES
-from identifier.baselines.without_v_y import (
-    OVER,
-    V_Y,
-    heard_ports,
-    steady_v_y,
-)
+from identifier.baselines.without_v_y import OVER, V_Y, heard_ports, steady_v_y
 from identifier.method import Method
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel

@@ -173,10 +173,7 @@ def cross_replay(
         except ValueError:  # the last update left weights that are not finite
             diverged_at[recording.name] = end
     return Trial(
-        online=online,
-        frozen=frozen if freezes else None,
-        diverged_at=diverged_at,
-        side_slip=told,
+        online=online, frozen=frozen if freezes else None, diverged_at=diverged_at, side_slip=told
     )
 
 

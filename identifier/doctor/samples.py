@@ -116,12 +116,7 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
             f"{there[0].duration:.3g} s: frozen; cut the log there"
         )
         yield Finding(
-            code="frozen",
-            channel=name,
-            size=length,
-            unit="s",
-            confidence=CERTAIN,
-            text=text,
+            code="frozen", channel=name, size=length, unit="s", confidence=CERTAIN, text=text
         )
 
 

@@ -12,13 +12,7 @@ import numpy as np
 
 from identifier.doctor.consistency import Motion
 from identifier.doctor.finding import Finding
-from identifier.doctor.pieces import (
-    SLOWEST,
-    driven_pieces,
-    driven_windows,
-    looked_at,
-    usual_speed,
-)
+from identifier.doctor.pieces import SLOWEST, driven_pieces, driven_windows, looked_at, usual_speed
 from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia

@@ -141,10 +141,7 @@ class Suspect(NamedTuple):
 WORDS = {  # of a channel, and the parameter of its factor
     "v_x": ("v_x", "v_x_factor"),
     "v_y": ("v_y", ""),  # to shrink it shrinks its noise, which looks like a better model
-    "r": (
-        "the yaw rate",
-        "",
-    ),  # of gyroscopes within a percent, and like that of v_x
+    "r": ("the yaw rate", ""),  # of gyroscopes within a percent, and like that of v_x
     "delta_f": ("the steering angle", "steering_gain"),
     "a_y": ("the lateral acceleration", "a_y.factor"),
 }

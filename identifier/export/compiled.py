@@ -60,11 +60,7 @@ class CompiledPackage:
     """
 
     def __init__(
-        self,
-        manifest: Mapping[str, Any],
-        files: Mapping[str, str],
-        *,
-        single: bool | None = None,
+        self, manifest: Mapping[str, Any], files: Mapping[str, str], *, single: bool | None = None
     ) -> None:
         table = Table(manifest, "", PackageFileError)
         self.name = table.text("name")

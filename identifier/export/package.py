@@ -172,9 +172,7 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     a_y = np.gradient(v_y, specialized.dt) + v_x * r
     a_y[5 * n // 8 : 6 * n // 8] = np.nan
     measured = v_y if not specialized.tells_v_y else np.where(k < 7 * n // 8, np.nan, v_y)
-    return np.column_stack(
-        [v_x, measured, r, delta_f, delta_r, *[a_y] * specialized.reads_a_y],
-    )
+    return np.column_stack([v_x, measured, r, delta_f, delta_r, *[a_y] * specialized.reads_a_y])
 
 
 def _triangle(phase: Array) -> Array:

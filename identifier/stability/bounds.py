@@ -21,12 +21,7 @@ from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.lyapunov import (
-    lyapunov,
-    peak_gain,
-    require_hurwitz,
-    sampled_peak_gain,
-)
+from identifier.stability.lyapunov import lyapunov, peak_gain, require_hurwitz, sampled_peak_gain
 from models.rules import require_positive
 
 

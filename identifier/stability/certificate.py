@@ -16,10 +16,7 @@ from identifier.stability.checks import (
     margin_checks,
     weight_check,
 )
-from identifier.stability.loop import (
-    Loop,
-    direction_matrix,
-)
+from identifier.stability.loop import Loop, direction_matrix
 from identifier.stability.operation import Operation, proven_bounds, worst_loop
 
 

@@ -199,12 +199,7 @@ def worst_gain(
 
 
 def regressor_gains(
-    *,
-    eta_W: float,
-    eta_V: float,
-    s: ArrayLike,
-    x_bar: ArrayLike,
-    W: ArrayLike,
+    *, eta_W: float, eta_V: float, s: ArrayLike, x_bar: ArrayLike, W: ArrayLike
 ) -> Array:
     """G along a run, (n, 2, 2).
 

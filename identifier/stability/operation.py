@@ -257,13 +257,7 @@ def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
 
 
 def estimated_input_feedback(
-    *,
-    m: float,
-    I_z: float,
-    l_f: float,
-    l_r: float,
-    stiffness_lost: ArrayLike,
-    v_x: float,
+    *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
 

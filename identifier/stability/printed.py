@@ -179,14 +179,8 @@ def printed_bounds(
     k_b = printed_k_b(pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
     tight = tight_k_b(tight_pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
     entries = {
-        "printed_bound": (
-            "bound (14), printed route",
-            bound_14(pair, w_bar=w_bar, k_b=k_b),
-        ),
-        "tight_bound": (
-            "bound (14), tight route",
-            bound_14(tight_pair, w_bar=w_bar, k_b=tight),
-        ),
+        "printed_bound": ("bound (14), printed route", bound_14(pair, w_bar=w_bar, k_b=k_b)),
+        "tight_bound": ("bound (14), tight route", bound_14(tight_pair, w_bar=w_bar, k_b=tight)),
         "ultimate_bound": (
             "true ultimate bound behind (14)",
             ultimate_bound(pair, w_bar=w_bar, k_b=k_b, rho_W=rho_W).xi_tilde,

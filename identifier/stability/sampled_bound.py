@@ -124,11 +124,7 @@ def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
     inner = (  # ξ̃ of each stage = first ξ̃ - second dt known - third dt f_hat
         (eye + Z / 2.0, eye / 2.0, (eye / 2.0,)),
         (eye + Z / 2.0 + Z2 / 4.0, eye / 2.0 + Z / 4.0, (Z / 4.0, eye / 2.0)),
-        (
-            eye + Z + Z2 / 2.0 + Z3 / 4.0,
-            eye + Z / 2.0 + Z2 / 4.0,
-            (Z2 / 4.0, Z / 2.0, eye),
-        ),
+        (eye + Z + Z2 / 2.0 + Z3 / 4.0, eye + Z / 2.0 + Z2 / 4.0, (Z2 / 4.0, Z / 2.0, eye)),
     )
     return ErrorGains(
         start=power_norms(R, eye)[0],

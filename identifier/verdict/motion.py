@@ -47,11 +47,7 @@ class Windows:
 
     @classmethod
     def where(
-        cls,
-        counts: NDArray[np.bool_],
-        recording: Recording,
-        length: float,
-        overlapping: int = 2,
+        cls, counts: NDArray[np.bool_], recording: Recording, length: float, overlapping: int = 2
     ) -> "Windows":
         """Return the windows of a length in one stretch of which every sample counts.
 

@@ -54,8 +54,7 @@ class _Group:
         """Return a signal in its unit, (n,)."""
         data, sent = self.data, self.sent
         return filled(
-            self.t.size,
-            lambda part: values_of(data[part if sent is None else sent[part]], signal),
+            self.t.size, lambda part: values_of(data[part if sent is None else sent[part]], signal)
         )
 
 

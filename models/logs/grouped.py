@@ -14,16 +14,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import (
-    Channel,
-    Clock,
-    Heading,
-    Listed,
-    RecordingError,
-    chosen,
-    one_run,
-    some,
-)
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
 from models.schema import require_few

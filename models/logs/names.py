@@ -22,16 +22,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
-from models.logs.signals import (
-    BETA,
-    COLUMNS,
-    NEEDED,
-    POSE,
-    QUANTITIES,
-    WHEELS,
-    Signal,
-    quantity_of,
-)
+from models.logs.signals import BETA, COLUMNS, NEEDED, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_ending
 from models.logs.stamps import typical_rate
 from models.logs.units import (

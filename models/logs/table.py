@@ -13,16 +13,7 @@ from numpy.typing import NDArray
 
 from codegen.escape import shown
 from models.logs.growing import Growing
-from models.logs.log import (
-    Channel,
-    Clock,
-    Heading,
-    Listed,
-    RecordingError,
-    chosen,
-    one_run,
-    some,
-)
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,

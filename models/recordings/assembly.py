@@ -73,12 +73,7 @@ class Stretches(NamedTuple):
 
 
 def recording_of(
-    log: LogFile,
-    name: str,
-    log_map: LogMap,
-    *,
-    run: str | None,
-    dt: float,
+    log: LogFile, name: str, log_map: LogMap, *, run: str | None, dt: float
 ) -> Recording:
     """Return one run of a log on a uniform clock, not yet judged by physics.
 
@@ -144,11 +139,7 @@ def _notes(log: LogFile) -> tuple[str, ...]:
 
 
 def _channels(
-    log: LogFile,
-    label: str,
-    signals: Mapping[str, Signal],
-    log_map: LogMap,
-    run: str | None,
+    log: LogFile, label: str, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
 ) -> dict[str, list[Raw]]:
     """Return by signal its channels in SI, each on its own clock.
 

@@ -46,12 +46,7 @@ class _Rolled(NamedTuple):
 
 
 def rolled(
-    speeds: Mapping[str, Array],
-    r: Array,
-    delta_f: Array,
-    delta_r: Array,
-    wheels: Wheels,
-    dt: float,
+    speeds: Mapping[str, Array], r: Array, delta_f: Array, delta_r: Array, wheels: Wheels, dt: float
 ) -> _Rolled:
     """Return the forward speed at the center of gravity; no sample looks at a later one.
 

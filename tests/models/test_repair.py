@@ -58,10 +58,7 @@ REPAIRS = {
         SensorFault(channel="delta_f", kind="scaled", size=16.0),
         Repair(factor={"delta_f": 1.0 / 16.0}),
     ),
-    "sign": (
-        Mirrored(channels=("v_y", "a_y")),
-        Repair(factor={"v_y": -1.0, "a_y": -1.0}),
-    ),
+    "sign": (Mirrored(channels=("v_y", "a_y")), Repair(factor={"v_y": -1.0, "a_y": -1.0})),
     "unit": (WrongUnit(channel="a_y", unit="g"), Repair(factor={"a_y": 1.0 / UNITS["g"]})),
     "misaligned": (Misaligned(angle=0.02), Repair(velocity_sensor_angle=0.02)),
     "ahead": (SensorElsewhere(sensor="velocity", x=0.7), Repair(velocity_sensor_x=0.7)),

@@ -127,7 +127,7 @@ def test_speeds_in_kmh_and_angles_in_degrees_with_a_steering_wheel_are_all_found
     faults = [scaled("v_x", 3.6), scaled("v_y", 3.6), scaled("r", DEGREES)]
     broken = Together(faults=(*faults, scaled("delta_f", -15.0 * DEGREES))).apply(log)
     assert set(named(broken, car)) == {
-        *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f"),
+        *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f")
     }
 
 

@@ -145,7 +145,7 @@ def test_units_at_the_end_of_names_hide_no_signal() -> None:
     )
     assert found.unsure() == ()
     assert {one.channel[0].split("_")[0] for one in found.signals().values()} == {
-        *("vehicle", "vy", "yaw", "road", "lat"),
+        *("vehicle", "vy", "yaw", "road", "lat")
     }
 
 
