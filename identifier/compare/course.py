@@ -85,19 +85,18 @@ class Course:
         force : (n, 2) [N].
         """
         if self.by_motion:
-            return self._error_by_motion(recording, force)
+            vehicle, windows = self.vehicle, self._windows(recording)
+            loads = np.array(vehicle.axle_loads)
+            with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
+                missed = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
+                front, rear = loads * clean_rms(missed, noise_variance(recording, vehicle, windows))
+            return (
+                AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
+            )
         assert recording.axle_force is not None
         counted = counted_samples(recording, self.min_speed)
         found = axle_rms(force, counted, recording.axle_force)
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
-
-    def _error_by_motion(self, recording: Recording, force: Array) -> AxleRmse:
-        vehicle, windows = self.vehicle, self._windows(recording)
-        loads = np.array(vehicle.axle_loads)
-        with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
-            missed = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
-            front, rear = loads * clean_rms(missed, noise_variance(recording, vehicle, windows))
-        return AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
         """Return by recording the error of a frozen model."""
@@ -140,11 +139,6 @@ class Shares(NamedTuple):
     other: float | None
 
 
-def _shown_to(method: Method, recording: Recording) -> Recording:
-    """Return what a comparison shows a method: no lateral velocity, where it tells one."""
-    return recording if method.needs_v_y else replace(recording, v_y=None)
-
-
 def cross_replay(
     method: Method, course: Course, seen: Callable[[History], None] | None = None
 ) -> Trial:
@@ -156,7 +150,9 @@ def cross_replay(
     online, frozen, diverged_at, freezes = {}, {}, {}, True
     told: dict[str, SideSlip] = {}
     for recording in course.recordings:
-        history = identify(_shown_to(method, recording), course.vehicle, method)
+        history = identify(
+            recording if method.needs_v_y else replace(recording, v_y=None), course.vehicle, method
+        )
         end = float(recording.t[-1])
         if seen is not None:
             seen(history)

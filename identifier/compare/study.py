@@ -86,17 +86,12 @@ def run_comparison(
     )
 
 
-def _frozen_share(found: Shares) -> float | None:
-    """Return the frozen error on other recordings, or where learnt if there is only one [%]."""
-    return found.in_sample if found.other is None else found.other
-
-
 def ranking(comparison: Comparison) -> list[str]:
     """Return the methods, smallest frozen error elsewhere first; those that cannot freeze last."""
 
     def key(name: str) -> tuple[bool, float]:
         found = comparison.shares(name)
-        error = _frozen_share(found)
+        error = found.in_sample if found.other is None else found.other
         return (error is None, found.online if error is None else error)
 
     return sorted(comparison.trials, key=key)

@@ -160,24 +160,17 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
         first = t[np.concatenate([[0], cuts])]
         last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
         own = list(zip(first.tolist(), last.tolist(), strict=True))
-        spans = _intersection(spans, own)
+        found, i, j = [], 0, 0
+        while i < len(spans) and j < len(own):
+            begin, end = max(spans[i][0], own[j][0]), min(spans[i][1], own[j][1])
+            if begin < end:
+                found.append((begin, end))
+            if spans[i][1] < own[j][1]:
+                i += 1
+            else:
+                j += 1
+        spans = found
     return spans
-
-
-def _intersection(
-    one: list[tuple[float, float]], other: list[tuple[float, float]]
-) -> list[tuple[float, float]]:
-    """Return where both lists of rising spans hold."""
-    found, i, j = [], 0, 0
-    while i < len(one) and j < len(other):
-        begin, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
-        if begin < end:
-            found.append((begin, end))
-        if one[i][1] < other[j][1]:
-            i += 1
-        else:
-            j += 1
-    return found
 
 
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:

@@ -154,7 +154,12 @@ class ArrayLog:
                 f"{self._name}: {name} must have one axis, its shape is {value.shape}"
             )
         if name == self._clock and value.dtype.kind in "Mm":
-            return _since_first(value)
+            there = value[~np.isnat(value)]
+            seconds = np.full(value.size, np.nan)
+            if there.size:
+                since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
+                seconds[~np.isnat(value)] = since / _NANOSECONDS
+            return seconds
         try:
             if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
                 raise TypeError
@@ -164,16 +169,6 @@ class ArrayLog:
             raise RecordingError(
                 f"{self._name}: {name} must be numeric, its type is {value.dtype}"
             ) from None
-
-
-def _since_first(stamps: NDArray[Any]) -> Array:
-    """Return times of the calendar, or durations, since the first [s]; those missing are NaN."""
-    there = stamps[~np.isnat(stamps)]
-    seconds = np.full(stamps.size, np.nan)
-    if there.size:
-        since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
-        seconds[~np.isnat(stamps)] = since / _NANOSECONDS
-    return seconds
 
 
 def _array(name: str, column: str, value: Any) -> NDArray[Any]:

@@ -176,17 +176,13 @@ class Signal:
         if self.offset != 0.0:
             total = total - self.offset
         if self.table:
-            return self._by_table(total)
+            hand, road = np.array(self.table).T
+            inside: Array = np.interp(total, hand, road)
+            first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
+            below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
+            road_wheel: Array = inside + first * below + last * above
+            return road_wheel
         return total if self.ratio == 1.0 else total / self.ratio
-
-    def _by_table(self, angle: Array) -> Array:
-        """Return the angle of the road wheels; beyond the table its last slope goes on."""
-        hand, road = np.array(self.table).T
-        inside: Array = np.interp(angle, hand, road)
-        first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
-        below, above = np.minimum(angle - hand[0], 0.0), np.maximum(angle - hand[-1], 0.0)
-        road_wheel: Array = inside + first * below + last * above
-        return road_wheel
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:

@@ -439,7 +439,10 @@ def seconds(
     t = in_seconds(clock, values)
     fall = _first_step(t, lambda step: step < 0.0)
     if fall is not None and clock.unit in ("instant", "hhmmss"):
-        t = _past_midnight(t)
+        steps = np.diff(t)
+        days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * DAY) & (steps > -1.1 * DAY))])
+        later: Array = np.round(t + DAY * days, 6)
+        t = later
         fall = _first_step(t, lambda step: step < 0.0)
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
     even = None if fall is not None else _even_clock(t)
@@ -567,14 +570,6 @@ def _of_digits(values: Array) -> Array:
     minutes, whole = np.divmod(rest, 100.0)
     total: Array = hours * 3600.0 + minutes * 60.0 + whole
     return total
-
-
-def _past_midnight(t: Array) -> Array:
-    """Return times of day that go on after midnight."""
-    steps = np.diff(t)
-    days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * DAY) & (steps > -1.1 * DAY))])
-    later: Array = np.round(t + DAY * days, 6)
-    return later
 
 
 def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) -> int | None:

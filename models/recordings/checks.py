@@ -313,7 +313,9 @@ def _check_steering(recording: Recording, w: Means, turn: Steering) -> str | Non
     steering says the same as large, since a car that slides over its front wheels reads long;
     lower bound 0.03 m (half a 1:43 car) rising to 0.12 m at 8 m/s (a sedan in degrees/s 0.05).
     """
-    column = _larger_steering(recording)
+    some = slice(None, None, thinning(len(recording)))
+    front, rear = (np.mean(angle[some] ** 2) for angle in (recording.delta_f, recording.delta_r))
+    column = "delta_f" if front >= rear else "delta_r"
     L = turn.wheelbase
     if turn.correlation < 0.7:
         return None
@@ -405,12 +407,6 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
             f"an effective wheelbase of {L:.3g} m; kN? multiply by 1000"
         )
     return None
-
-
-def _larger_steering(recording: Recording) -> str:
-    some = slice(None, None, thinning(len(recording)))
-    front, rear = (np.mean(angle[some] ** 2) for angle in (recording.delta_f, recording.delta_r))
-    return "delta_f" if front >= rear else "delta_r"
 
 
 # The checks that need the axle positions: slip angles against accelerations and forces.

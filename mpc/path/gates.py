@@ -57,11 +57,6 @@ class Gate:
         return np.vstack([row for row in rows if np.isfinite(row).all()])
 
 
-def _cones_of(gates: Sequence[Gate]) -> Array:
-    """Return X, Y of all cones [m], (k, 2)."""
-    return np.vstack([gate.cones() for gate in gates])
-
-
 def line_through_gates(
     gates: Sequence[Gate],
     *,
@@ -270,7 +265,7 @@ def _path(
         easing=easing,
         spacing=spacing,
     )
-    return Path.from_line(line, name=name, cones=_cones_of(gates))
+    return Path.from_line(line, name=name, cones=np.vstack([gate.cones() for gate in gates]))
 
 
 _EASING = 6.0  # m
