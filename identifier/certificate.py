@@ -14,7 +14,6 @@ _SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Property:
     """A property of a design, its limit, and what to do.
-
     limit : what the value is held against; None where it is a statement only.
     margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
     advice : one line; empty where there is nothing to say.
@@ -33,7 +32,6 @@ class Property:
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate:
     """All properties of a design, and what its construction holds.
-
     properties : in the order of the table; none where nothing is proven of stability and errors.
     held : by name and unit, what holds after every sample whatever is measured: plain data.
     """
@@ -85,7 +83,6 @@ class Certificate:
 
 def at_most(value: float, *, good: float, bad: float | None) -> Status:
     """Pass up to `good`, warn up to `bad`, fail beyond (never, where `bad` is None).
-
     value : to be judged; nan fails.   bad : largest value that only warns.
     """
     if value <= good:
@@ -95,7 +92,6 @@ def at_most(value: float, *, good: float, bad: float | None) -> Status:
 
 def at_least(value: float, *, good: float, bad: float | None) -> Status:
     """Pass down to `good`, warn down to `bad`, fail below (never, where `bad` is None).
-
     value : to be judged; nan fails.   bad : smallest value that only warns.
     """
     if value >= good:

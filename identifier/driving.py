@@ -71,7 +71,6 @@ _PEAK_NOISE = {"v_x": 0.12, "v_y": 0.12, "r": 0.012, "delta": 0.002}
 
 def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Driving:
     """Return hard driving on a dry road: both axles slide, at 4 sqrt(g L) (20 m/s for a sedan).
-
     vehicle : the car; the slip is twice that at which its linear tire reaches the friction limit.
     bandwidth : highest frequency of steering that matters [Hz].
     """

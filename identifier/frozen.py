@@ -54,7 +54,6 @@ class _SteadyTires(Protocol):
 
     def force_at(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
-
         alpha : slip angles in the paper's sign [rad], (k,).
         """
 
@@ -84,7 +83,6 @@ def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
 
 def require_min_speed(speed: float) -> None:
     """Refuse a lowest speed [m/s] that is not positive, or that no car drives at.
-
     speed : below which forces read zero.
     """
     if not 0.0 < speed <= _LARGEST_MIN_SPEED:

@@ -36,7 +36,6 @@ def _places(size: float, digits: int) -> int:
 
 def printed_value(value: float, sd: float | None, unit: str) -> str:
     """Return a value with its standard deviation in the unit that is printed.
-
     unit : of both; "N/rad" is printed as kN/rad.
     """
     scale = printed_scale(unit)

@@ -35,7 +35,6 @@ Model = TypeVar("Model", bound=TireModel)
 
 def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any) -> Model:
     """Return a stored model to begin with, of the kind and structure that a method learns.
-
     structure : what the method and the model must agree on, by attribute of the model.
     """
     if not fits(start, kind, **structure):
@@ -78,13 +77,11 @@ class Run(Protocol):
 
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
         """Yield state and outputs over parts of the recording.
-
         samples : rising indices; blocks without one are left out. None yields all.
         """
 
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time.
-
         t : time in the recording's own clock [s].
         """
 

@@ -93,7 +93,6 @@ def _installed() -> dict[str, EntryPoint]:
 
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
-
     name : one of `methods`.
     """
     return name in VARIANTS
@@ -128,10 +127,7 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
 
 
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
-    """Return the method that goes on learning from a model.
-
-    dt : sampling interval [s].
-    """
+    """Return the method that goes on learning from a model.   dt : sampling interval [s]."""
     if model.kind not in LEARNERS:
         raise ValueError(f"no method can go on learning from a {type(model).__name__}")
     return LEARNERS[model.kind](model, vehicle, dt)

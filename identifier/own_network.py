@@ -223,7 +223,6 @@ class OnnxModel(TireModel):
         slip_sign: int = 1,
     ) -> "OnnxModel":
         """Read a network file.
-
         min_speed : below this speed [m/s] the forces read zero.
         inputs : what the network's columns are; None goes by names and number.
         slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -275,7 +274,6 @@ class OnnxModel(TireModel):
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
-
         slip : empty.
         """
         del slip, least_lag
@@ -350,7 +348,6 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrozenMethod(Method):
     """A frozen model that takes part in a comparison of methods.
-
     dt : sampling interval of recordings [s]; the model has none of its own.
     """
 
@@ -368,7 +365,6 @@ class FrozenMethod(Method):
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
-
         vehicle : the car; the model keeps its own.
         start : None; there is nothing that a stored model could begin.
         """
@@ -378,9 +374,6 @@ class FrozenMethod(Method):
         return self.model.setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:
-        """Return the model itself.
-
-        vehicle : the car; the model keeps its own.
-        """
+        """Return the model itself.   vehicle : the car; the model keeps its own."""
         del vehicle, state
         return self.model

@@ -77,7 +77,6 @@ class Prediction:
 
 def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
     """Replay a recording with frozen weights and compare with its true forces, where it has any.
-
     model : the frozen model; samples below its minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
     """

@@ -29,7 +29,6 @@ class Found(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Rerun:
     """A run that is computed again, block by block, or a part of it.
-
     last : values carried after the last sample of the recording, by port.
     """
 
@@ -89,7 +88,6 @@ class Rerun:
 
     def state_at(self, index: int) -> dict[str, Array]:
         """Return the carried values in effect at a sample, or after the last.
-
         index : of the sample, counted from the first of the part; as many as there are is the end.
         """
         sample, after = self.first + index, int(index == len(self))
@@ -107,7 +105,6 @@ class Rerun:
 
 def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
     """Return whether one of the samples lies in a part.
-
     samples : rising indices; None are all.
     """
     if samples is None:
@@ -146,7 +143,6 @@ class _OnDemand(Mapping[str, Array]):
 
 class Recalled(_OnDemand):
     """By port, what a run records: computed again when it is asked for.
-
     kind : "state" or "outputs".
     """
 

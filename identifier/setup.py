@@ -19,7 +19,6 @@ COVARIANCE, FACTORS, NOT_NEGATIVE = "covariance", "factors of a covariance", "no
 
 class Port(NamedTuple):
     """An output or a carried value of a step: what stands in it.
-
     unit : of its numbers, "U" the force unit.
     rule : what its numbers must be to be taken over; empty: finite.
     """
@@ -42,16 +41,12 @@ HALF_BAND = Port(
 
 
 def force_unit_name(force_unit: float) -> str:
-    """Return the name of a unit of force.
-
-    force_unit : U [N].
-    """
+    """Return the name of a unit of force.   force_unit : U [N]."""
     return {1.0: "N", 1000.0: "kN"}.get(force_unit, f"{force_unit:g} N")
 
 
 def in_force_unit(ports: Iterable[Port], force_unit: float) -> tuple[Port, ...]:
     """Return ports with the name of the force unit in place of U.
-
     ports : with units in which U stands for it.   force_unit : U [N].
     """
     name = force_unit_name(force_unit)
@@ -89,7 +84,6 @@ class Setup(NamedTuple):
 
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.
-
         x : [v_y, r] of the first sample (2,) [m/s, rad/s].
         """
         if self.observe is None:
@@ -136,7 +130,6 @@ class Setup(NamedTuple):
 
     def output(self, recording: Recording, port: str) -> Array:
         """Return an output that is a column, over a recording, (n, size).
-
         recording : its signals are the input; its forces are not looked at.
         """
         told = large((len(recording), self.scan.step.numel_out(port)))
@@ -146,7 +139,6 @@ class Setup(NamedTuple):
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.
-
         n : samples that are taken.
         """
         following = self.begun(recording)
@@ -185,7 +177,6 @@ class Block(NamedTuple):
 
 class Before(Mapping[str, Array]):
     """Carried values in effect at each sample, of those that have a row after the last.
-
     state : by port (k + 1, ...).
     """
 
@@ -205,7 +196,6 @@ class Before(Mapping[str, Array]):
 
 class Shown(NamedTuple):
     """What a step is shown of a part of a recording: samples, and rests between its stretches.
-
     signals : by port of `over`, (N, ...).   samples : N, rests included.
     at : which of these each sample of the part is (n,); None where there is no rest.
     """
@@ -216,7 +206,6 @@ class Shown(NamedTuple):
 
     def place(self, k: int) -> int:
         """Return which of what is shown a sample of the part is.
-
         k : from 0 to n, that after the last.
         """
         if self.at is None:
@@ -225,7 +214,6 @@ class Shown(NamedTuple):
 
     def of_recording(self, values: Array) -> Array:
         """Return what was recorded at the samples of the part, without rests.
-
         values : of all that was shown, (N, ...) or (N + 1, ...) with that after the last.
         """
         if self.at is None:
@@ -235,7 +223,6 @@ class Shown(NamedTuple):
 
     def with_rests(self, values: Array) -> Array:
         """Return values of the part's samples with zeros at rests, (N, ...).
-
         values : (n, ...).
         """
         if self.at is None:

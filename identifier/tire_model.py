@@ -68,7 +68,6 @@ class Fact(NamedTuple):
 
 class Estimate(NamedTuple):
     """A number of one axle that a drive may have decided.
-
     sd : its standard deviation, None unknown.   told : what was said of it before, None nothing.
     """
 
@@ -100,7 +99,6 @@ class Estimate(NamedTuple):
 
 class Reached(NamedTuple):
     """A learnt number at its bound: of which axle (None: the car), what, how much, what that means.
-
     refuses : whether an answer that rests on it is not valid.
     """
 
@@ -736,7 +734,6 @@ class TireModel(ABC):
 
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
     """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
-
     min_speed : below which they do [m/s].
     """
     return max(4.0 * vehicle.froude_speed, min_speed)
@@ -744,7 +741,6 @@ def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
 
 def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
     """Return x = [v_y, r] at which straight wheels meet the road at some slopes, (2,).
-
     slope : -(v_y ± l r)/v_x at the axles, (2,): the slip angle where it is small.
     v_x : longitudinal speed [m/s].
     """
@@ -764,10 +760,7 @@ MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported 
 
 
 def load_model(path: str | PathLike[str]) -> TireModel:
-    """Read a frozen model of any kind.
-
-    path : a file that the `save` of a frozen model wrote.
-    """
+    """Read a frozen model of any kind.   path : a file that the `save` of a frozen model wrote."""
     path = Path(path)
     table = _stored(path)
     _verdict_of(table)
@@ -787,7 +780,6 @@ def load_model(path: str | PathLike[str]) -> TireModel:
 
 def stored_verdict(path: str | PathLike[str]) -> bool | None:
     """Return whether a stored model was found valid when it was learnt; None where nobody judged.
-
     path : a file that the `save` of a frozen model wrote.
     """
     return _verdict_of(_stored(Path(path)))

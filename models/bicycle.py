@@ -49,7 +49,6 @@ def _matrix(a: Any, b: Any, c: Any, d: Any) -> Any:
 
 def bicycle(parameters: BicycleParameters, v_x: Any) -> _Bicycle:
     """Return the matrices of the bicycle at a speed.
-
     parameters : numbers or CasADi expressions, see `BicycleParameters`.
     v_x : longitudinal speed [m/s], not zero.
     """
@@ -70,7 +69,6 @@ def bicycle(parameters: BicycleParameters, v_x: Any) -> _Bicycle:
 
 def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:
     """Return [α_f, α_r] = δ - (v_y ± l r)/v_x [rad], (2,), in the paper's sign, as used in (3).
-
     l_f : distance from the center of gravity to the front axle [m].
     l_r : distance from the center of gravity to the rear axle [m].
     v_x : longitudinal speed [m/s], not zero.
@@ -107,7 +105,6 @@ def measured_slip(
 
 def linear_axle_force(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return the axle forces of the linear tire (3), (2,) [N].
-
     v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)

@@ -31,7 +31,6 @@ def channel_of(recording: Recording, channel: str) -> Array:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorFault:
     """One broken channel, for some time or throughout.
-
     kind : one of `KINDS`: holds its value; shows 0; shows no number (NaN); has the other sign; is
         multiplied by the size; is off by the size; runs away by the size each second; has white
         noise of the size; shows the size beside the truth for one sample in `_SPIKE_EVERY`.
@@ -65,17 +64,11 @@ class SensorFault:
         return f"{self.channel} {self.kind}{size}{since}{for_long}"
 
     def active(self, t: Any) -> Any:
-        """Return whether the channel is broken at a time.
-
-        t : time [s], a number or (n,).
-        """
+        """Return whether the channel is broken at a time.   t : time [s], a number or (n,)."""
         return (t >= self.start) & (t < self.start + self.duration)
 
     def shown(self, t: Any, value: Any, stuck_at: float, noise: Any) -> Any:
-        """Return what the broken channel shows.
-
-        t : time [s], a number or (n,).
-        """
+        """Return what the broken channel shows.   t : time [s], a number or (n,)."""
         since = t - self.start
         match self.kind:
             case "stuck":
@@ -98,7 +91,6 @@ class SensorFault:
 
     def apply(self, recording: Recording) -> Recording:
         """Return what the log of the same drive holds with the fault.
-
         recording : the drive without it; the fault's times are on its clock.
         """
         if self.kind == "lost":

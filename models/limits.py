@@ -16,7 +16,6 @@ class LimitError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputLimits:
     """How much may be asked for. `TIREID_LIMITS="samples=1e9 megabytes=4e4"` raises limits.
-
     megabytes : of a log, unpacked; it is read piece by piece: 10 h at 1 kHz of 20 columns fit.
     path : samples of a path, rows of way-points.
     document : megabytes of a JSON, ONNX or tire file, or of way-points.

@@ -27,10 +27,7 @@ class Maneuver(Protocol):
         """Length [s]."""
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2).   t : times [s], (n,)."""
 
 
 def _check(maneuver: Any, *, steepest: float) -> None:
@@ -63,7 +60,6 @@ def _both(front: Any, rear_ratio: float) -> Array:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepSteer:
     """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
-
     amplitude : final angle [rad].   onset : start of the ramp [s].
     rate_limit : largest steering rate of either axle [rad/s].   duration : length [s].
     rear_ratio : rear over front angle [-].
@@ -96,7 +92,6 @@ class StepSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoStepSteer:
     """A step steer whose angle changes again: two ramps at `rate_limit`, each to a held angle.
-
     amplitude : angle held from the first ramp to the second [rad].
     second_share : angle held after the second ramp, over `amplitude` [-].
     onset : start of the first ramp [s].
@@ -142,7 +137,6 @@ class TwoStepSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slalom:
     """A sine from onset to the end.
-
     amplitude : of the sine [rad].   frequency : of the sine [Hz].   onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
     duration : length [s].   rear_ratio : rear over front angle [-].
@@ -167,7 +161,6 @@ class Slalom:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoubleLaneChange:
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
-
     amplitude : of both sines [rad].   frequency : of both sines [Hz].
     pause : time straight ahead between them [s].   onset : start of the first [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
@@ -197,7 +190,6 @@ class DoubleLaneChange:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SineWithDwell:
     """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
-
     amplitude : of the sine [rad].   frequency : of the sine [Hz]; the test uses 0.7.
     dwell : time at the second peak [s]; the test uses 0.5.   onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
@@ -227,7 +219,6 @@ class SineWithDwell:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowlyIncreasingSteer:
     """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
-
     amplitude : final angle [rad].   rate : slope of the ramp of the front axle [rad/s].
     onset : start [s].
     rate_limit : largest steering rate of either axle [rad/s]; `rate` must keep it.
@@ -288,7 +279,6 @@ class RandomSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledSteer:
     """Given angles at given times, joined by straight lines, as a planned maneuver is.
-
     times : of the angles [s], rising, (k,); straight ahead before the first.
     angles : of the front wheels [rad], (k,), the first zero.
     rate_limit : largest steering rate of either axle [rad/s].

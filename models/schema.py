@@ -34,7 +34,6 @@ LONGEST_NAME = 200  # characters
 
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:
     """Refuse more than a limit allows, and tell how to raise it.
-
     limit : field of `InputLimits`.
     """
     most = getattr(limits(), limit)
@@ -47,7 +46,6 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
 
 def swells(size: float, packed: float) -> bool:
     """Return whether data unpack to what no log packs to.
-
     size : unpacked, as memory holds it [bytes].   packed : as the file holds them [bytes].
     """
     return size > SWOLLEN_FROM and size > SWELLS * packed
@@ -71,7 +69,6 @@ def require_dense(
 
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
     """Refuse what is no regular file, and files that are too large.
-
     limit : field of `InputLimits` that says how many megabytes it may hold.
     """
     about = path.stat()
@@ -83,7 +80,6 @@ def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
 
 def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
     """Read a file.
-
     path : a regular file: no device, pipe or folder, which may have no end.
     limit : field of `InputLimits` that says how many megabytes it may hold.
     """
@@ -97,7 +93,6 @@ def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document"
 
 def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[bytes]:
     """Yield what a file holds piece by piece, unpacked where it is gzip by its first bytes.
-
     limit : field of `InputLimits` that says how many megabytes there may be, unpacked.
     """
     require_file(path, refusal, limit=limit)
@@ -130,7 +125,6 @@ def read_text(
     path: Path, refusal: type[ValueError], *, limit: str = "document", encoding: str = "utf-8"
 ) -> str:
     """Read a text file.
-
     limit : field of `InputLimits` that says how many megabytes it may hold.
     encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
     """
@@ -201,7 +195,6 @@ def _require_small(path: Path, data: Any, refusal: type[ValueError]) -> None:
 
 class Table:
     """A table of a document; its values are asked for by name and type.
-
     where : begins every message, as "car.toml: "; may be empty.
     prefix : of the names of values in messages, as in "chassis.".
     """
@@ -216,10 +209,7 @@ class Table:
         return key in self.data
 
     def refuse(self, key: str, rule: str) -> NoReturn:
-        """Raise the error of a value.
-
-        rule : that it breaks, as in "must be a number".
-        """
+        """Raise the error of a value.   rule : that it breaks, as in "must be a number"."""
         raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
 
     def value(self, key: str) -> Any:
@@ -283,7 +273,6 @@ class Table:
 
     def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
         """Return the arguments of a dataclass, each of the type that its field declares.
-
         cls : the dataclass; its fields are the keys that may be there.
         """
         known = self.only_fields(cls, skip=skip)

@@ -32,7 +32,6 @@ class SensorError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
     """One channel; the signal is delayed, then biased, then noisy, then rounded.
-
     noise : standard deviation of white Gaussian noise, in the unit of the signal.
     delay : the signal comes this much later [s], by interpolation; before, its first value holds.
     resolution : step of the quantization, in the unit of the signal; 0 for none.
@@ -53,7 +52,6 @@ class Sensor:
 
     def measure(self, t: Array, signal: Array, rng: np.random.Generator) -> Array:
         """Return what the sensor makes of a signal (n,).
-
         t : time [s], (n,).   signal : the exact signal, (n,).
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
@@ -67,7 +65,6 @@ class Sensor:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensors:
     """The sensors of a car; a channel left out is exact.
-
     v_x, v_y : speed over ground [m/s].   r : yaw rate [rad/s].
     delta : steering angle [rad], of each axle that steers.
     """
@@ -79,7 +76,6 @@ class Sensors:
 
     def apply(self, recording: Recording, rng: np.random.Generator) -> Recording:
         """Return the recording as these sensors would have taken it; its force truth stays exact.
-
         rng : source of the noise; the same generator state gives the same noise.
         """
         t = recording.t
@@ -96,7 +92,6 @@ class Sensors:
 
 def is_shown(channel: str, value: float) -> bool:
     """Return whether a channel shows a number.
-
     channel : one of `LARGEST_SHOWN`.   value : in its SI unit.
     """
     return abs(value) <= LARGEST_SHOWN[channel]

@@ -36,7 +36,6 @@ class VehicleError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chassis:
     """Parameters of the double-track plant which the linear bicycle does not have.
-
     track_front, track_rear : distance between the wheels of an axle [m].
     cg_height : height of the center of gravity above the road [m].
     roll_center_height_front, roll_center_height_rear : height of the roll center of the axle above
@@ -141,7 +140,6 @@ class Chassis:
 
 def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
     """Return the TOML text of a dataclass and of the one dataclass inside it.
-
     record : the dataclass to write; fields that are None are left out.
     """
     lines = [
@@ -232,7 +230,6 @@ __all__ = [
 
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
     """Return yaw inertia and cornering stiffnesses of a car of that size, by `RULES`.
-
     mass : total mass [kg].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     """

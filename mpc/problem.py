@@ -1,7 +1,6 @@
 """The optimal control problem of the tracker: horizon, cost, limits. Numbers, but for the horizon.
 
 Minimize Σ_k ½ y_k' Q y_k + ½ R u_k² + ½ y_N' Q_N y_N + ½ Σ Z s² over u_0 … u_{N-1}, with x_{k+1}
-from codegen.arrays import Array
 from one Runge-Kutta step of dt and x_0 given, so that
   |u_k| <= steering_rate,  |δ_k| <= steering                 hard, k = 1 … N
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
@@ -88,7 +87,6 @@ class Cost:
 
 def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
     """Return y (7,), SI.
-
     x : [e_y, e_psi, v_y, r, δ, ...], SX.   kappa : curvature of the path [1/m].
     v_x : longitudinal speed [m/s].   s_dot : speed along the path [m/s].
     """
@@ -100,7 +98,6 @@ def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
 
 def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
     """Return H = C' diag(q) C (n_x, n_x) and h = C' diag(q) y (n_x,), C = ∂y/∂x.
-
     y : errors (7,), SX.   x : state (n_x,), SX symbol.   q : weights (7,).
     """
     C = ca.jacobian(y, x)
@@ -111,7 +108,6 @@ def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Bounds, symmetric, all positive.
-
     steering : angle of the front road wheels [rad], kept exactly.
     steering_rate : [rad/s], kept exactly.   e_y : deviation from the path [m], soft.
     slip : kinematic slip angle in front and at the rear [rad], soft. A tire whose curves are flat
@@ -144,10 +140,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """The problem; only the horizon is compiled.
-
-    dt : length of a stage [s].
-    """
+    """The problem; only the horizon is compiled.   dt : length of a stage [s]."""
 
     horizon: int = 40
     dt: float = 0.05

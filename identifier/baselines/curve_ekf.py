@@ -231,7 +231,6 @@ class CurveEkf(Method):
 
     def model(self, vehicle: Vehicle, theta: Array) -> CurveModel:
         """Return the curve, its lag and its offsets that unknowns make.
-
         theta : unknowns, (n,).
         """
         n, loads = len(KINDS), ca.DM(vehicle.axle_loads)
@@ -267,7 +266,6 @@ class CurveEkf(Method):
 
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
     """Return the method for a car.
-
     vehicle : the car; its stiffness B C D is the prior.   dt : sampling interval [s].
     """
     return CurveEkf.for_vehicle(vehicle, dt=dt, textbook=textbook)

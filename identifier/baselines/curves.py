@@ -57,7 +57,6 @@ class Curve(NamedTuple):
 
 def _small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - (v_y ± l r)/v_x of (3), (2,) [rad].
-
     v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     return slip_angles(p.l_f, p.l_r, v_x, x, u)
@@ -65,17 +64,13 @@ def _small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 
 def _wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - atan((v_y ± l r)/v_x) (2,) [rad].
-
     v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     return u + ca.atan(_small_slip(p, v_x, x, u) - u)
 
 
 def linear(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
-    """Return F = C α of (3), (2,) [N].
-
-    q : C [N/rad] (2, 1).   alpha : slip angles (2,) [rad].
-    """
+    """Return F = C α of (3), (2,) [N].   q : C [N/rad] (2, 1).   alpha : slip angles (2,) [rad]."""
     del loads, u
     return q[:, 0] * alpha
 
@@ -116,7 +111,6 @@ CURVES: Mapping[str, Curve] = {
 
 def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: Any, u: Any) -> Any:
     """Return the slip angles of a curve, the offsets of the sensors taken off, (2,) [rad].
-
     offset : zero of the front steering δ₀ [rad], which is added, and bias b of v_y [m/s], (2,).
     v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] as the sensors read them (2,).
     u : [δ_f, δ_r] (2,).
@@ -160,10 +154,7 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
 
 @cache
 def _curve_scan(name: str, *, lagged: bool) -> Scan:
-    """Return the compiled loop of `_build_curve`.
-
-    name : one of `CURVES`.
-    """
+    """Return the compiled loop of `_build_curve`.   name : one of `CURVES`."""
     return Scan(_build_curve(name, lagged=lagged), carry=LAG_PORTS if lagged else (), over=OVER)
 
 
@@ -175,7 +166,6 @@ def unlagged() -> dict[str, Array]:
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class CurveModel(TireModel):
     """Axle forces of a curve with parameters that no longer change.
-
     curve : one of `CURVES`.   parameters : of the curve, front and rear (2, n), SI.
     min_speed : below this speed [m/s] the forces read zero.
     relaxation_length : σ by which the slip lags (2,) [m]; 0 is no lag.
@@ -244,7 +234,6 @@ class CurveModel(TireModel):
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip, (2,) or none [rad/s].
-
         x : [v_y, r] (2,), as the sensors read them while learning.
         """
         p, u = self.vehicle.bicycle, ca.vertcat(delta, 0)

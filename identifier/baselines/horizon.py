@@ -266,7 +266,6 @@ def _scan(samples: int, iterations: int) -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HorizonEstimator(Method):
     """Lateral velocity and two numbers per tire by moving-horizon estimation; v_y is not read.
-
     window : how long what was measured is looked at again [s].
     """
 

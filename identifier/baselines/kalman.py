@@ -134,7 +134,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
 def midpoint(estimate: Any, rate: Any, dt: Any) -> Any:
     """Return what moves of an estimate a step later, by the linearly implicit midpoint rule.
-
     estimate : symbols; what moves comes first.   rate : of what moves (n,).
     dt : sampling interval [s].
     """
@@ -147,7 +146,6 @@ def correct(
     estimate: Any, P: Any, R: Any, x: Any, outlier: Any, *, follow: bool
 ) -> tuple[Any, Any]:
     """Return estimate and covariance after the measurement of the first two states.
-
     estimate : before, (n,).   P : its covariance (n, n).
     R : covariance of the measurement (2, 2).   x : the measurement (2,).
     follow : whether it counts for the first two all the same.

@@ -64,7 +64,6 @@ class Numbers(NamedTuple):
 
 def _curve_parameters(theta: Any, loads: Any) -> Any:
     """Return B [1/rad], C [-] and D [N] of both axles, (2, 3).
-
     theta : ln C and ln μ of both axles (4,).   loads : static, (2,) [N].
     """
     stiffness, friction = ca.exp(theta[:2]), ca.exp(theta[2:])
@@ -142,7 +141,6 @@ def _scan() -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaggedEkf(Method):
     """Stiffness and friction of each axle behind a fixed lag, with a_y heard where there is one.
-
     v_y_noise, r_noise : standard deviations of what is measured [m/s], [rad/s].
     v_y_disturbance, r_disturbance : what the tires miss, as random change [m/s/√s], [rad/s/√s].
     relaxation_length : of both axles [m].
@@ -227,7 +225,6 @@ class LaggedEkf(Method):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the Magic Formula with the carried parameters, the lag and the steering's zero.
-
         state : estimate (10,).
         """
         z = state["estimate"].ravel()

@@ -18,7 +18,6 @@ from models.vehicle import Vehicle
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearBaseline(Method):
     """F = C α of (3) with the stiffness that the vehicle states.
-
     dt : sampling interval [s].   min_speed : below this speed [m/s] forces read zero.
     """
 

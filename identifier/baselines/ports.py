@@ -56,16 +56,12 @@ def sample_ports() -> Sample:
 
 
 def axle_loads(p: BicycleParameters, gravity: float) -> Any:
-    """Return the static axle loads F_z (2,) [N].
-
-    gravity : g [m/s²].
-    """
+    """Return the static axle loads F_z (2,) [N].   gravity : g [m/s²]."""
     return p.m * gravity / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
 
 
 def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
     """Return n, the axle forces of a steady turn (2,) [N].
-
     v_x : longitudinal speed [m/s].   x : [v_y, r] (2,).
     """
     return p.m * v_x * x[1] / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
@@ -73,7 +69,6 @@ def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
 
 def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
     """Return dx/dt of (1)-(2), (2,).
-
     v_x : longitudinal speed [m/s].   x : [v_y, r] (2,).   F : axle forces (2,) [N].
     """
     return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)
@@ -102,7 +97,6 @@ def lag_symbols() -> LaggedSlip:
 
 def lagged_slip(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
     """Return α' after a step (2,) [rad]; the first sample begins without lag.
-
     alpha : slip angles now (2,) [rad].   way : v_x T_s, what the tire has rolled [m].
     sigma : relaxation lengths (2,) [m], not negative.
     """

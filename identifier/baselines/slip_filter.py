@@ -162,7 +162,6 @@ def _scan(tire: str) -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipFilter(Method):
     """Lateral velocity by a Kalman filter that hears r and a_y; a recording's v_y is not read.
-
     tire : "linear", that of the vehicle file, or "dugoff", which is learnt.
     r_noise : standard deviation of the measured yaw rate [rad/s].
     a_y_noise : standard deviation of the measured a_y [m/s²].
@@ -284,7 +283,6 @@ class SlipFilter(Method):
 
 def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the linear filter of v_y and r on the stiffnesses of the vehicle file.
-
     dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="linear", dt=dt)
@@ -292,7 +290,6 @@ def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
 
 def joint_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the naive joint filter of v_y, r and a tire of Dugoff per axle.
-
     vehicle : the car; its stiffness is the prior.   dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="dugoff", dt=dt)

@@ -71,7 +71,6 @@ def _scan() -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Washout(Method):
     """Lateral velocity by integration, with what is slow taken from the linear tires.
-
     cutoff : ω, below which the linear model counts [1/s].   dt : sampling interval [s].
     min_speed : below this speed [m/s] forces and v_y read zero.
     """

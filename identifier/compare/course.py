@@ -37,7 +37,6 @@ INFINITE = AxleRmse(front=np.inf, rear=np.inf)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
     """What methods are compared on.
-
     min_speed : samples below this speed [m/s] do not count, for any method.
     """
 
@@ -81,7 +80,6 @@ class Course:
 
     def error(self, recording: Recording, force: Array) -> AxleRmse:
         """Return the RMSE of forces over the samples that count; infinite where not finite.
-
         force : (n, 2) [N].
         """
         if self.by_motion:
@@ -104,7 +102,6 @@ class Course:
 
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].
-
         error : over it [N].
         """
         (recording,) = (rec for rec in self.recordings if rec.name == name)
@@ -114,7 +111,6 @@ class Course:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One method on a course.
-
     online : by recording, error of what was identified online [N].
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
@@ -179,7 +175,6 @@ SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SideSlip:
     """What a method told of lateral velocity over a recording, and how far it was off.
-
     v_y : told at each sample (n,) [m/s].
     v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.
     rms : of the error of side slip, from the first sample at a speed that counts [deg], infinite
@@ -195,7 +190,6 @@ class SideSlip:
 
 def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSlip | None:
     """Return what a run told of lateral velocity; None of a method that reads it.
-
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """
@@ -235,7 +229,6 @@ def frozen_shares(
     frozen: Mapping[str, Mapping[str, AxleRmse]], course: Course
 ) -> tuple[float | None, float | None]:
     """Return the mean errors of frozen models where they learnt and elsewhere [%].
-
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on, other = where_learnt_and_elsewhere(frozen)
@@ -249,7 +242,6 @@ def where_learnt_and_elsewhere(
     frozen: Mapping[str, Mapping[str, AxleRmse]],
 ) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
     """Return name and error of replays of the drive that was learnt, and of every other drive.
-
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on: list[tuple[str, AxleRmse]] = []

@@ -18,7 +18,6 @@ Frozen = Mapping[str, Mapping[str, AxleRmse]]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
     """Methods side by side.
-
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them, a method
         that learns from whole logs never.
     """
@@ -63,7 +62,6 @@ def run_comparison(
     seen: Callable[[str, History], None] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
-
     recordings : with true forces, or judged by the motion.
     others : further methods by name.   seen : called with each method's name and run.
     """

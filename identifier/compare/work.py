@@ -39,7 +39,6 @@ def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
 
 def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
     """Return a pool of new processes that end with this one, however it ends.
-
     prepare : what each does first; a function of a module.
     """
     return ProcessPoolExecutor(
@@ -59,7 +58,6 @@ begin_process(prepare)
 
 def begin_process(prepare: Callable[[], None] | None) -> None:
     """Let this process, one of a pool, end with the one that made it.
-
     prepare : what it does first; None for nothing.
     """
     threading.Thread(target=_end_with_parent, daemon=True).start()

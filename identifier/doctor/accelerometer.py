@@ -60,7 +60,6 @@ class Accelerometer:
 
     def line(self, p: Array, wide: Mapping[str, float]) -> Line:
         """Return how well a_y follows from the motion without the sensors' faults p.
-
         wide : standard deviations, by `OF_A_Y`, of what may be wrong with it.
         """
         sd = np.array([wide.get(name, one) for name, one in zip(OF_A_Y, self.usual, strict=True)])
@@ -124,7 +123,6 @@ def _motion(one: Drive, p: Array) -> tuple[Array, Array, Array]:
 
 def descended(cost: Callable[[float], float], width: float) -> tuple[float, float, float]:
     """Return where a function of one number is least, its curvature there, and its value.
-
     width : of the parabola that bounds it from below; it begins at 0.
     """
     x, h, here = 0.0, 0.1 * width, cost(0.0)

@@ -91,7 +91,6 @@ class Examination(NamedTuple):
 
 class Candidate(NamedTuple):
     """A suspect that was fitted beside what is there: its value, deviation and gain of J.
-
     shown : how much it brings over the value zero; of what is no state of the estimate, `gain`.
     felt : of the gain what the accelerometer says; negative where it speaks against it.
     """
@@ -121,7 +120,6 @@ class _Taken(NamedTuple):
 @dataclass(slots=True, kw_only=True)
 class Search:
     """The search for what is wrong with some stretches of a drive.
-
     problem : of them, with slopes over all parameters.   accelerometer : None where there is none.
     """
 
@@ -433,7 +431,6 @@ class Search:
         self, one: Candidate, likely: tuple[float, float], alike: Sequence[Candidate], *, sure: bool
     ) -> Finding:
         """Return a candidate as a finding.
-
         likely : that it is this, and that it is this or one of those that are alike.
         """
         suspect, vehicle, deviation = one.suspect, self.vehicle, self.deviation(one)
@@ -473,7 +470,6 @@ def _all_move(priors: Priors) -> Priors:
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
-
     recording : as it was logged, of one drive or of several joined; of a long one lively stretches
         are looked at.
     vehicle : as it was told; its cornering stiffnesses are not looked at.

@@ -57,7 +57,6 @@ def stretches_of(
     recording: Recording, vehicle: Vehicle, *, longest: float, pieces: int
 ) -> tuple[Recording, ...]:
     """Return the recording, or of a long one the liveliest stretch of each of its parts.
-
     longest : that is looked at as a whole [s]; the stretches have it together.
     """
     n, dt = len(recording), recording.dt

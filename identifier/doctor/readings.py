@@ -50,7 +50,6 @@ _ALONE, _UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one tha
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
     """One thing that may be wrong with a log, or with what is told of its car.
-
     code : for machines: "unit", "sign", "sideslip", or one of `FREE`.
     channels : concerned; none where it is the car.
     unit : in which they are logged, "" where that is right.
@@ -135,7 +134,6 @@ _ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Explanation:
     """A reading of a log, the changes that make it, and what it leaves.
-
     left : what it leaves unexplained, as `unexplained` returns it.
     """
 
@@ -159,7 +157,6 @@ class _Explanation:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Read:
     """How a log is best read, and what else it could be.
-
     without : the same with the velocity sensor where it should be, if elsewhere it makes a reading
         the best that nothing gross is in; None else.
     """
@@ -176,7 +173,6 @@ class Read:
 
 def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...]], bool]) -> Read:
     """Return how a log is best read as the motion of a car.
-
     possible : whether the log breaks no law with some changes; of the best readings those that do
         are left out, unless all do.
     """

@@ -36,7 +36,6 @@ SLOW = 1.0  # s between samples, from which a clock is in ms
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
     """What is grossly wrong.
-
     repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
@@ -148,7 +147,6 @@ def before_sizes(findings: Iterable[Finding]) -> Repair:
 
 def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Finding]:
     """Return findings, none of them sure where one that they stand on is not.
-
     earlier : all of them; those without a repair say nothing that is taken out.
     """
     firm = all(one.sure for one in earlier if one.repair is not None)
@@ -291,7 +289,6 @@ def steering_finding(
     factor: float, confidence: float, doubt: str = "", deviation: float = math.nan
 ) -> Finding:
     """Return what a steering angle is that must be multiplied by a factor.
-
     doubt : what else it may be, in words.
     deviation : of the factor over the factor, NaN where nobody knows it.
     """
@@ -332,10 +329,7 @@ def steering_finding(
 
 
 def words(changes: tuple[Change, ...]) -> str:
-    """Return changes in words.
-
-    changes : of a reading; none is a log that is right.
-    """
+    """Return changes in words.   changes : of a reading; none is a log that is right."""
     said = []
     for change in changes:
         names = " and ".join(change.channels)

@@ -53,7 +53,6 @@ ORDER = (
 
 def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> dict[str, str]:
     """Return the C files of the library by their path in the package.
-
     single : whether float is the default precision.
     """
     if not specialized.carry:

@@ -66,7 +66,6 @@ def build_binary(
     target: Target, name: str, model: Mapping[str, bytes], around: Mapping[str, bytes]
 ) -> bytes:
     """Compile sources to a shared library and return its content.
-
     model : content by name of C files and headers that need no other: compiled once for both
         versions of FMI, since the equations take longest.
     """
@@ -119,7 +118,6 @@ TOKEN = "token.h"
 
 def token_header(token: str, version: int) -> str:
     """Return token.h, which tells this FMU from every other one.
-
     token : GUID of FMI 2.0, instantiation token of FMI 3.0.   version : of FMI, 2 or 3.
     """
     standard = f"#ifndef MODEL_FMI\n#define MODEL_FMI {version} /* of the standard */\n#endif\n"
@@ -155,7 +153,6 @@ Causality = Literal["input", "output", "parameter", "local"]
 
 class Variable(NamedTuple):
     """One variable of modelDescription.xml.
-
     reference : value reference.   start : as text, empty where it is calculated.
     """
 
@@ -265,7 +262,6 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 def element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
     """Return an element; attributes that are empty strings are left out.
-
     attributes : by name; True and False become true and false.
     """
     words = {name: _text(value) for name, value in attributes.items() if value != ""}
@@ -480,10 +476,7 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
 
 
 def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
-    """Return the text files of an FMU by their path inside it.
-
-    version : of FMI, 2 or 3.
-    """
+    """Return the text files of an FMU by their path inside it.   version : of FMI, 2 or 3."""
     shared = model_files(specialized)
     blank = _text_with(specialized, shared, version, "")
     content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))

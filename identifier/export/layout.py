@@ -84,10 +84,7 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
 
 
 def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
-    """Return a nested initializer by rows.
-
-    value : the numbers (of any shape).
-    """
+    """Return a nested initializer by rows.   value : the numbers (of any shape)."""
     if not dimensions:
         return literal(float(value.ravel()[0]), prefix)
     rows: Iterator[Array] = iter(value.reshape(dimensions[0], -1))
@@ -111,7 +108,6 @@ class Rule(NamedTuple):
 
 def rules(members: Sequence[Member]) -> list[Rule]:
     """Return what numbers of the weights must keep to be taken over.
-
     members : of the weights, in the order in which they lie in memory.
     """
     found, first = list[Rule](), 0

@@ -43,7 +43,6 @@ FLAGS = ("-ffp-contract=off", "-fno-math-errno")  # of the library
 
 def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]:
     """Return everything that a package is made of, ready for JSON.
-
     single : whether float is the default precision.
     """
     method = specialized.method
@@ -90,7 +89,6 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
     """Return what texts say about a package: title, method, versions, hash, names and numbers.
-
     content : what `ingredients` returned.
     """
     return {
@@ -295,7 +293,6 @@ def build_package(
     with_band: bool = False,
 ) -> Package:
     """Return the package of a method for a car; the same input gives the same bytes.
-
     start : weights to begin with; None begins with those of the method.
     single : whether float is the default precision.
     with_a_y : whether a_y is an input of a method that goes without it as well.

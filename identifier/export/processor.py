@@ -15,7 +15,6 @@ REPLAYED = Path(__file__).parent / "target" / "replayed.h"
 
 def recording_program(name: str, files: Mapping[str, str], samples: Array) -> Program:
     """Return a recording that is replayed through a package.
-
     samples : (n, k) in the order of the inputs, SI.
     """
     rows = np.ascontiguousarray(samples, dtype="<f8").tobytes()

@@ -50,7 +50,6 @@ SAMPLED = ("x", "u", "v_x", "a_y")
 
 class SpecializedStep(NamedTuple):
     """A step without constants, where it starts, and what its ports mean.
-
     function : SX function of the carried ports, then x (2,), u (2,), v_x, and a_y where it is an
         input; returns `p_next` of each carried port `p`, then the outputs, axle_force (2,) [N]
         first.
@@ -119,7 +118,6 @@ def specialize(
     with_band: bool = False,
 ) -> SpecializedStep:
     """Return the step of a method for a car, ready to be exported.
-
     start : weights to begin with; None begins with those of the method.
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.

@@ -38,7 +38,6 @@ from models.vehicle import GRAVITY, Vehicle
 
 class _Variant(NamedTuple):
     """A law of the paper as it is compared: its law, and where its gains come from.
-
     law : one of `LAWS`.
     """
 
@@ -48,10 +47,7 @@ class _Variant(NamedTuple):
     scaled: bool = False
 
     def gains(self, found: Gains) -> Gains:
-        """Return the gains.
-
-        found : for the law `gains_of`.
-        """
+        """Return the gains.   found : for the law `gains_of`."""
         return found.scaled_by_forgetting() if self.scaled else found
 
 
@@ -272,10 +268,7 @@ def _observed(vehicle: Vehicle, force_unit: float, x: Array) -> dict[str, Array]
 
 
 def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
-    """Return ξ = K⁻¹ x of (7), (2,) [N s].
-
-    x : [v_y, r] (2,).
-    """
+    """Return ξ = K⁻¹ x of (7), (2,) [N s].   x : [v_y, r] (2,)."""
     impulse: Array = _K_inv(vehicle.bicycle) @ x
     return impulse
 
@@ -314,7 +307,6 @@ def design_for(
     seed: int = 0,
 ) -> PaperIdentifier:
     """Return a design whose learning loop has the wanted phase margin at the worst regressor.
-
     driving : how hard it is driven; it is stored with the design.
     law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
     network : structure; None takes `natural_network`.   phase_margin : of the sampled loop [deg].
@@ -361,7 +353,6 @@ def _placeholder() -> Gains:
 
 def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
     """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
-
     design : of the paper's leakage, as `design_for` finds it.
     known : where it runs, `PaperIdentifier.operation`.   keeping : one of `KEEPINGS`.
     """
@@ -421,7 +412,6 @@ class DesignFileError(TireidError, ValueError):
 
 def read_design(path: Path) -> PaperIdentifier:
     """Read a design.
-
     path : TOML with the keys of `PaperIdentifier`, and tables [gains], [network] and, where the
         conditions of driving are declared, [driving].
     """

@@ -29,7 +29,6 @@ _Direction = Callable[[Any, Any], Any]
 
 def _static_direction(A_d: Any, drive: Any) -> Any:
     """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
-
     A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
     """
     return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
@@ -80,7 +79,6 @@ class Law:
 
     def error(self, lead: Any = 0.0) -> DrivingError:
         """Return the coefficients of the driving error.
-
         lead : lead time τ of the gains [s], a number or a symbol.
         """
         return DrivingError(self.z, self.xi + self.lead * lead)
@@ -108,7 +106,6 @@ def unbounded(weights: Any, radius: Any) -> Any:
 
 def ball(weights: Any, radius: Any) -> Any:
     """Return the weights, projected on the ball |weights|_F <= radius.
-
     radius : Frobenius norm that is kept, positive.
     """
     return weights * ca.fmin(1, radius / ca.fmax(ca.norm_fro(weights), 1e-300))
@@ -122,7 +119,6 @@ def whole(weights: Any, radius: Any) -> Any:
 
 def beyond_ball(weights: Any, radius: Any) -> Any:
     """Return what of the weights lies beyond the ball: zero within it, and continuous.
-
     radius : Frobenius norm within which nothing leaks, not negative.
     """
     return weights - ball(weights, radius)
@@ -154,7 +150,6 @@ def weight_rates(
     V_free: Any = 0.0,
 ) -> _WeightRates:
     """Return (11)-(12), each a descent along the static gradient with a leakage.
-
     drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
     xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.   W : weights (2, n_h).
     V : weights (n_h, n_in).   x_bar : network input (n_in,).
@@ -183,7 +178,6 @@ _InputSource = Callable[[Any, Any], Any]
 
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
-
     A_d : Hurwitz matrix (2, 2) [1/s].   A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
     B_xi : B_ξ of (7) (2, 2) [U/rad].   xi : measured axle impulse (2,).
     xi_hat : estimated axle impulse (2,).   u : steering (2,) [rad].
@@ -194,7 +188,6 @@ def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, 
 
 def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
     """Return dz/dt of (10), (2,) [U s].
-
     forgetting : λ [1/s].   z : filtered error (2,) [U s²].   xi_tilde : error (2,) [U s].
     """
     return -forgetting * z + xi_tilde  # (10)
@@ -202,7 +195,6 @@ def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
 
 def measured(xi: Any, xi_hat: Any) -> Any:
     """Read the network's input from the measured state, which opens the loop through x̂.
-
     xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).
     """
     del xi_hat
@@ -241,7 +233,6 @@ def euler(
     derivative: Derivative, state: list[Any], dt: Any, project: Projection = free
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
-
     dt : step [s].
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
     """
@@ -282,7 +273,6 @@ class NotHurwitzError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
     """Gains of the observer (8), the filter (10) and the laws (11)-(12).
-
     A_d : Hurwitz matrix of the prescribed error dynamics (2x2), by rows [1/s].
     forgetting : λ of (9)-(10) [1/s].
     eta_W : learning rate of W: η1 [1/s⁴], or [1/s³] for the instantaneous law.
@@ -351,8 +341,5 @@ class Gains:
 
 
 def diagonal(a: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return A_d = -a I by rows.
-
-    a : rate of the error dynamics [1/s].
-    """
+    """Return A_d = -a I by rows.   a : rate of the error dynamics [1/s]."""
     return ((-a, 0.0), (0.0, -a))

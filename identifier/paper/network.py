@@ -53,7 +53,6 @@ class Weights(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Network:
     """Structure of the network: size, inputs and their scales.
-
     hidden : number of hidden units n_h.
     inputs : signals of x̄, chosen among `SIGNALS`, each at most once.
     scale : divisor of each input in its own unit (m/s, rad/s, rad); None takes those of `SIGNALS`.
@@ -85,7 +84,6 @@ class Network:
 
     def initial_weights(self, rng: np.random.Generator) -> Weights:
         """Return W = 0, which starts at the linear tire, and random V.
-
         rng : generator of V, drawn from a normal distribution of standard deviation 1.
         """
         return Weights(
@@ -94,7 +92,6 @@ class Network:
 
     def normalized_input(self, signals: Mapping[str, Any]) -> Any:
         """Return x̄ (n_in,), without unit.
-
         signals : the CasADi expression of every signal of `inputs`, SI.
         """
         assert self.scale is not None
@@ -106,7 +103,6 @@ def natural_network(
     vehicle: Vehicle, *, hidden: int = 10, inputs: tuple[str, ...] = Network().inputs
 ) -> Network:
     """Return a network whose input scales fit the size of the car.
-
     hidden : number of hidden units.
     """
     ratio = np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
@@ -117,7 +113,6 @@ def natural_network(
 
 def hidden_layer(V: Any, x_bar: Any) -> Any:
     """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
-
     V : weights (n_h, n_in).   x_bar : scaled input (n_in,).
     """
     return tanh(V @ x_bar)
@@ -125,7 +120,6 @@ def hidden_layer(V: Any, x_bar: Any) -> Any:
 
 def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> dict[str, Any]:
     """Return every signal that a network may read, by name, SI.
-
     v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
@@ -198,7 +192,6 @@ def _replay_scan(network: Network) -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class NetworkModel(TireModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
-
     weights : W (2, n_h) in the force unit and V (n_h, n_in).   force_unit : U [N].
     min_speed : below this speed [m/s] the forces read zero.
     """
@@ -250,7 +243,6 @@ class NetworkModel(TireModel):
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
-
         slip : empty.
         """
         del slip, least_lag
@@ -295,7 +287,6 @@ def first_weights(
     network: Network, start: TireModel | None, *, seed: int, force_unit: float
 ) -> Weights:
     """Return the weights that learning begins with.
-
     start : stored weights to begin with; None draws them.   force_unit : U of what learns [N].
     """
     if start is None:

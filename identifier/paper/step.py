@@ -61,7 +61,6 @@ GAINS = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Structure:
     """What the step is built from; all numbers stay inputs of it.
-
     input_source : where the network reads the state.
     """
 

@@ -36,7 +36,6 @@ def small_gain(
     direction: Array | None = None,
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
     dt : step of explicit Euler [s]; None for continuous time.
@@ -75,7 +74,6 @@ def steady_capacity(
 
 def transient_peak(A_d: ArrayLike) -> float:
     """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     matrix = require_hurwitz(A_d)

@@ -22,7 +22,6 @@ from identifier.stability.operation import Operation, proven_bounds, worst_loop
 
 def certify(gains: Gains, law: Law, operation: Operation) -> Certificate:
     """Return every property of the design.
-
     gains : of (8) to (12).
     law : of `identifier.paper.laws.LAWS`; the PI-lead law takes its τ from the gains.
     """

@@ -28,7 +28,6 @@ _CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, 
 
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
-
     gains : of (8) to (12).
     """
     A_d = gains.matrix
@@ -144,7 +143,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
 
 def _state_space_poles(A_d: Array) -> ComplexArray:
     """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
-
     A_d : (2, 2) error dynamics [1/s].
     """
     import control  # takes a second to import, so only where it is needed
@@ -158,7 +156,6 @@ def drift_check(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
-
     gains : of (8) to (12).   direction : (2, 2) D [s].
     """
     found = drift_frequency(
@@ -250,7 +247,6 @@ def bound_checks(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array, proven: Proven
 ) -> list[Property]:
     """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
-
     gains : of (8) to (12).   direction : (2, 2) D [s].   proven : of `proven_bounds`.
     """
     A_d = gains.matrix

@@ -43,7 +43,6 @@ class DesignError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainDesign:
     """Gains and what is proved of them.
-
     gains : of (8) to (12).   bounds : proven bounds of |ξ̃| and |W_hat|.
     """
 
@@ -92,7 +91,6 @@ def gain_for_phase_margin(
 
 def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
     """Return a = λ of rule 1 [1/s].
-
     bandwidth : highest frequency of steering that matters [Hz].
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
@@ -115,7 +113,6 @@ def design_gains(
     minimal_decay: float = 0.0,
 ) -> GainDesign:
     """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
-
     bandwidth : highest frequency of steering that matters [Hz].   dt : sampling interval T_s [s].
     needed_force : that the network is expected to hold [U].
     phase_margin : wanted phase margin of the sampled loop at the worst regressor [deg].
@@ -211,17 +208,13 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
 
 
 def leakage(gains: Gains, known: Operation) -> Gains:
-    """Return the gains as they are: the paper's leakage alone.
-
-    gains : of `design_gains`.
-    """
+    """Return the gains as they are: the paper's leakage alone.   gains : of `design_gains`."""
     del known
     return gains
 
 
 def dead_zone(gains: Gains, known: Operation) -> Gains:
     """Return the gains with a leakage of what lies beyond the balls.
-
     gains : of `design_gains`.
     """
     return replace(gains, W_free=known.W_large, V_free=known.V_start)
@@ -229,7 +222,6 @@ def dead_zone(gains: Gains, known: Operation) -> Gains:
 
 def projection(gains: Gains, known: Operation) -> Gains:
     """Return the gains with a projection on the balls, and no leakage.
-
     gains : of `design_gains`.
     """
     return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)

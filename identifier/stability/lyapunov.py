@@ -21,7 +21,6 @@ class LyapunovError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LyapunovPair:
     """P and Q of A_dᵀ P + P A_d = -Q, with the residual found by substitution.
-
     A_d : (2, 2) error dynamics [1/s].   P : (2, 2) solution [s, for Q without unit].
     Q : (2, 2) right-hand side [-].   residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
     """
@@ -33,10 +32,7 @@ class LyapunovPair:
 
 
 def require_square(A_d: ArrayLike) -> Array:
-    """Return A_d as a finite (2, 2) array.
-
-    A_d : (2, 2) error dynamics [1/s].
-    """
+    """Return A_d as a finite (2, 2) array.   A_d : (2, 2) error dynamics [1/s]."""
     matrix = np.array(A_d, dtype=np.float64)
     if matrix.shape != (2, 2) or not np.all(np.isfinite(matrix)):
         raise ValueError(f"A_d must be a finite 2x2 matrix, it is {matrix.tolist()}")
@@ -45,7 +41,6 @@ def require_square(A_d: ArrayLike) -> Array:
 
 def require_hurwitz(A_d: ArrayLike) -> Array:
     """Return A_d as an array after checking that all its eigenvalues have Re < 0.
-
     A_d : (2, 2) error dynamics [1/s].
     """
     matrix = require_square(A_d)
@@ -58,7 +53,6 @@ def require_hurwitz(A_d: ArrayLike) -> Array:
 
 def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
     """Substitute P back: |A_dᵀ P + P A_d + Q| / |Q|.
-
     A_d : (2, 2) error dynamics [1/s].   P : (2, 2) candidate solution.
     Q : (2, 2) right-hand side.
     """
@@ -68,7 +62,6 @@ def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
 
 def lyapunov(A_d: ArrayLike, Q: ArrayLike) -> LyapunovPair:
     """Solve A_dᵀ P + P A_d = -Q (the P and Q of (14)) and check the answer by substitution.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].   Q : (2, 2) symmetric positive definite matrix.
     """
     A_d, Q = require_hurwitz(A_d), require_square(Q)
@@ -139,7 +132,6 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
 
 def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
     """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
-
     A_d : (2, 2) error dynamics [1/s].   dt : step [s].
     """
     step = np.eye(2) + dt * require_hurwitz(A_d)
@@ -151,7 +143,6 @@ def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
 
 def power_norms(step: Array, entry: Array) -> tuple[float, float]:
     """Largest and sum of |step^k entry| over k = 0, 1, ...
-
     step : (2, 2) with every eigenvalue inside the unit circle.   entry : (2, 2).
     """
     radius, size = float(np.max(np.abs(np.linalg.eigvals(step)))), np.linalg.norm(entry, 2)

@@ -36,7 +36,6 @@ AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _GainMargin:
     """Where the loop turns unstable.
-
     factor : multiplier of the loop gain [-]; inf if none up to 1e6, 0 if unstable without gain.
     frequency : of the oscillation at the margin [rad/s]; nan if there is no margin to reach.
     """
@@ -147,7 +146,6 @@ def passivity(
     direction: Array | None = None,
 ) -> Array:
     """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
-
     frequency : (n,) ω [rad/s].   A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """

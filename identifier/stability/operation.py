@@ -55,7 +55,6 @@ class Sampled(Protocol):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Operation:
     """Where and how the identifier runs: what the certificate must know besides the gains.
-
     n_h : hidden units.   dt : sampling interval T_s [s].   integrator : "euler", "rk4" or "exact".
     bandwidth : highest frequency of steering that matters [Hz].
     needed_force : that the network should be able to hold against its leakage [U].
@@ -107,17 +106,13 @@ class Operation:
         return INTEGRATORS[self.integrator]
 
     def resolves(self, A_d: Array) -> bool:
-        """Whether the step keeps the error dynamics stable.
-
-        A_d : (2, 2) error dynamics [1/s].
-        """
+        """Whether the step keeps the error dynamics stable.   A_d : (2, 2) error dynamics [1/s]."""
         return bool(spectral_radius(A_d, self.step, self.dt) < 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proven:
     """What is proven of a design; None and inf where nothing is.
-
     V : bound on |V_hat| [-].
     leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no bound
         is proven.
@@ -156,7 +151,6 @@ def proven_bounds(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Proven:
     """Return all bounds that are proven, for the start of `sampled_bound.py`.
-
     gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.
     """
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
@@ -245,7 +239,6 @@ def worst_loop(
 
 def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
     """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
-
     m : mass [kg].   I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
     l_r : center of gravity to rear axle [m].
     """
@@ -260,7 +253,6 @@ def estimated_input_feedback(
     *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
-
     m : mass [kg].   I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
     l_r : center of gravity to rear axle [m].
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
@@ -274,10 +266,7 @@ def estimated_input_feedback(
 
 
 def minimal_decay(feedback: ArrayLike) -> float:
-    """Smallest a [1/s] with -a I + J_f K Hurwitz.
-
-    feedback : (2, 2) J_f K [1/s].
-    """
+    """Smallest a [1/s] with -a I + J_f K Hurwitz.   feedback : (2, 2) J_f K [1/s]."""
     return float(np.max(np.linalg.eigvals(np.asarray(feedback)).real))
 
 
@@ -298,7 +287,6 @@ def largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI.
-
     v_x : speed [m/s].   slip : largest slip angle [rad].   friction : μ [-].
     """
     require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
@@ -331,7 +319,6 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
 
 def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
-
     vehicle : the car; its stiffness is at least half that of the tires.
     slip : largest slip angle [rad].
     """
@@ -355,7 +342,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
 def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -> Disturbance:
     """Return bounds of all that acts on the error dynamics, proven for the declared driving.
-
     dt : sampling interval [s].   unit : force unit U [N].
     """
     C, lever = _stiffness(vehicle), np.array([vehicle.l_f, vehicle.l_r])
@@ -411,7 +397,6 @@ def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float
 
 def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
     """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
-
     driving : how hard it is driven; the slowest speed counts.
     """
     slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x

@@ -30,7 +30,6 @@ from models.rules import require_positive
 
 def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h (|P| + (η/ρ) |A_d⁻¹|)]/2, the one that gives (14) as printed [U].
-
     W_M : bound on the ideal weights (Frobenius) [U].   n_h : hidden units; |s| <= √n_h.
     eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
     """
@@ -53,7 +52,6 @@ def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: 
 
 def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].   eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     """
@@ -101,7 +99,6 @@ def k_b_with_V(
 
 def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     """B = 2 (|P| w_bar + k_b²)/λ_min(Q) of (14) [U s]: where L' < 0, not yet an ultimate bound.
-
     w_bar : bound on the approximation error [U].
     k_b : of `printed_k_b`, `tight_k_b` or `k_b_with_V` [U].
     """
@@ -121,7 +118,6 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _UltimateBound:
     """The largest |ξ̃| of the sublevel set of L that contains the whole set L' >= 0.
-
     xi_tilde : limsup |ξ̃| does not exceed it [U s].
     worst_y : |W_t| at which the maximum is taken [U].
     """
@@ -169,7 +165,6 @@ def printed_bounds(
     gains: Gains, law: DrivingError, operation: Operation, trivial: float
 ) -> list[Property]:
     """State b of (14) by the printed and the tight route, with the V layer, and b_UUB [U s].
-
     gains : of (8) to (12), with leakage.
     trivial : bound of an identifier without a network [U s].
     """
@@ -197,7 +192,6 @@ def printed_bounds(
 
 def _best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
     """Return P and Q = q I with |P| = W_M/√n_h + (η/ρ) |A_d⁻¹|, where the printed b is smallest.
-
     gains : of (8) to (12), with leakage.
     """
     unit = lyapunov(gains.matrix, np.eye(2))

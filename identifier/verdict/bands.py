@@ -134,7 +134,6 @@ def calibration(
     missed: Missed, noise: Array, windows: Windows, told: BandCalibration
 ) -> BandCalibration | None:
     """Return factors and color of errors on stretches that did not teach; None: too few windows.
-
     noise : variance of the sensors' white noise in them (2,).
     """
     factors, speeds = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
@@ -172,7 +171,6 @@ def _shared(values: Array, share: Array, everywhere: float) -> float:
 
 def quantile(values: Array, share: Array) -> float:
     """Return what the next value stays below in a share `LEVEL` of cases; inf: too few to tell.
-
     values : of windows that overlap by half (m,).   share : of each that counts (m,).
     """
     order = np.argsort(values)

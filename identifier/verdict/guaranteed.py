@@ -80,7 +80,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
 
 def triangle(n: int, dt: float) -> tuple[Array, Array]:
     """Return g (n + 1,), and the weights whose product with ξ is Σ g dξ/dt [1/s].
-
     dt : sampling interval [s].
     """
     step = np.minimum(np.arange(n) + 0.5, n - np.arange(n) - 0.5)  # of each step, in its middle

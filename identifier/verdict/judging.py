@@ -44,7 +44,6 @@ ROADS = 3  # segments of another friction that are listed one by one
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
     """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
-
     missed : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
     doubt : standard deviation of the curve over the prior's, where the force is [-].
@@ -91,7 +90,6 @@ class Asked(NamedTuple):
 
 def judge(history: History, t: float | None = None) -> Verdict:
     """Return the verdict on a run: on the model that was frozen, over all of its recording.
-
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
     model, whole = history.freeze(t), history.recording
@@ -108,7 +106,6 @@ def judge_taught(
     reached: Sequence[Reached] | None = None,
 ) -> Verdict:
     """Return the verdict on a model over the drive that taught it.
-
     frozen : samples that taught; None is all of them.
     reached : numbers that rest at their bounds; None asks the model.
     """
@@ -124,7 +121,6 @@ def judge_prediction(
     model: TireModel, recording: Recording, *, another_road: bool = True
 ) -> Verdict:
     """Return the verdict on a stored model over a drive: does it give back the drive's motion?
-
     another_road : whether the road may be another one than that which taught, and its friction is
         reported; of a drive that taught the model it is not.
     """

@@ -27,7 +27,6 @@ WITHOUT_V_Y = (
 
 class Objection(NamedTuple):
     """What speaks against an answer.
-
     code : for machines.   axle : that it is about, None for the car or the drive.
     text : what it means and the likely cause, one line.   refuses : whether it makes it not valid.
     """
@@ -45,7 +44,6 @@ class Objection(NamedTuple):
 
 class Number(NamedTuple):
     """A number that was learnt, or not.
-
     sd : its standard deviation ±, None unknown.   told : what was said of it before, None nothing.
     valid : whether it is learnt, within its bounds, and nothing was found against its axle.
     """
@@ -74,7 +72,6 @@ class Number(NamedTuple):
 
 class WindowForces(NamedTuple):
     """Forces over the windows that an answer is judged by [static axle loads].
-
     t : middle of each window (m,) [s].   measured : mean force that the motion shows (m, 2).
     modelled : that of the model (m, 2).
     """

@@ -53,7 +53,6 @@ def _of_arrow(block: bytes) -> Any:
 
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
-
     block : whole lines in UTF-8.   wanted : column from 0 -> how its cells are read.
     """
     import pyarrow
@@ -121,7 +120,6 @@ def words(cells: Any) -> Words:
 
 def doubles(cells: Any) -> NDArray[np.float64]:
     """Return numbers of any type as float64, (n,), NaN where one is missing.
-
     cells : array of pyarrow, (n,).
     """
     import pyarrow
@@ -133,10 +131,7 @@ def doubles(cells: Any) -> NDArray[np.float64]:
 
 
 def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
-    """Return whole numbers or instants [ns] as int64, (n,).
-
-    cells : array of pyarrow, (n,).
-    """
+    """Return whole numbers or instants [ns] as int64, (n,).   cells : array of pyarrow, (n,)."""
     import pyarrow
 
     if pyarrow.types.is_timestamp(cells.type):

@@ -39,7 +39,6 @@ _Selectors = tuple[tuple[Any, tuple[int, ...]], ...]
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class _Group:
     """Signals that are sent together: they share a clock.
-
     t : when they were sent [s], (n,).
     data : of the frames of one identifier on one bus, (m, bytes).
     sent : which of the frames hold the signals, (n,); None where all do.
@@ -242,7 +241,6 @@ def _sent(frames: Frames, selectors: _Selectors) -> NDArray[np.intp] | None:
 
 def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """Return a signal in its unit, (n,), NaN where the DBC says that a value is no number.
-
     data : of the frames, (n, bytes).
     """
     raw = raw_values(data, signal)
@@ -260,7 +258,6 @@ def _words(name: Any) -> str:
 
 def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     """Return the integers, or floats, of a signal as they are in frames, (n,).
-
     data : of the frames, (n, bytes).
     """
     length, little = signal.length, signal.byte_order == "little_endian"

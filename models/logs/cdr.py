@@ -87,10 +87,7 @@ def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
 
 
 def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Return which messages have a layout.
-
-    messages : (n, size).
-    """
+    """Return which messages have a layout.   messages : (n, size)."""
     order = next(word for word, one in ORDERS.items() if one == layout.order)
     same: NDArray[np.bool_] = np.all(messages[:, :2] == np.frombuffer(order, np.uint8), axis=1)
     for place, value in layout.lengths:
@@ -100,10 +97,7 @@ def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def numbers(layout: Layout, messages: NDArray[np.uint8], field: Field) -> NDArray[Any]:
-    """Return a number of each message, (n,), as it is stored.
-
-    messages : (n, size).
-    """
+    """Return a number of each message, (n,), as it is stored.   messages : (n, size)."""
     place, kind = layout.places[field.path], np.dtype(layout.order + field.kind)
     raw = np.ascontiguousarray(messages[:, place : place + kind.itemsize])
     return raw.reshape(-1).view(kind)

@@ -37,7 +37,6 @@ class Stretch(NamedTuple):
 
 class Raw(NamedTuple):
     """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand.
-
     holes : how many cells without a value were cut out.
     """
 
@@ -59,7 +58,6 @@ def holes(channel: Channel) -> NDArray[np.intp]:
 
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     """Return a channel without the empty cells that a slower channel has in a table.
-
     cut : whether `holes` are left out too; else they stay, and are refused.
     """
     kept = ~np.isnan(channel.values)
@@ -77,7 +75,6 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
 
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
-
     t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
     limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
@@ -87,7 +84,6 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
 
 def typical_step(t: Array) -> float:
     """Return the median time between samples [s], of all of them; NaN of one.
-
     t : rising time stamps [s], (n,).
     """
     steps = large((max(t.size - 1, 0),))
@@ -175,7 +171,6 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
 
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:
     """Return a signal at the instants of a clock, of samples that were there by then.
-
     raw : the signal; a sample lies at or before the first instant.   grid : instants [s], (m,).
     dt : step of the clock [s].
     """

@@ -42,7 +42,6 @@ def open_log(
     rate: float = 0.0,
 ) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
-
     path : of a file; of a folder, where a format keeps a log in one.
     mend : whether stamps that do not rise are mended, and not refused.
     clock, clock_unit : channel that is the time, where it is not what the format takes for it.

@@ -55,7 +55,6 @@ def group_of(identifier: int) -> int:
 @dataclass(frozen=True)
 class Known:
     """The frames of a database.
-
     widths : how many bytes they have, by identifier with `EXTENDED`.
     groups : parameter group of J1939 -> identifier of it in the database.
     """
@@ -97,10 +96,7 @@ class _Gathered:
             self._store()
 
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
-        """Take the next frames.
-
-        times : (n,) [s].   data : (n, bytes).
-        """
+        """Take the next frames.   times : (n,) [s].   data : (n, bytes)."""
         self._t.extend(times)
         self._data.extend(data[:, : self.width].reshape(-1))
 

@@ -39,7 +39,6 @@ class Samples(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 class GroupedLog(Generic[P]):
     """A log of groups of channels, as `LogFile` says.
-
     place : what a sample is in the file: "message" or "sample".
     channels : as listed, each with where the format finds it.
     said : what is left out or taken for granted.
@@ -76,7 +75,6 @@ class GroupedLog(Generic[P]):
         remedy: str = "",
     ) -> "GroupedLog[P]":
         """Return the log of channels whose names may repeat.
-
         missing : what the file does not hold where there are none, for the message.
         """
         if not found:
@@ -130,7 +128,6 @@ class GroupedLog(Generic[P]):
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names; those of one clock share its times.
-
         run : None.
         """
         one_run(self.path, self.runs(), run)
@@ -206,7 +203,6 @@ def unique(names: Iterable[tuple[str, str]]) -> list[str]:
 
 def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
     """Return a note of names, none where there are none.
-
     names : all of them; the first few are listed.
     """
     if not names:

@@ -40,7 +40,6 @@ class _Form(NamedTuple):
 @contextmanager
 def opened(path: Path, format: str) -> Iterator[Any]:
     """Open a file by asammdf.
-
     format : that it is read as, for the message where the library is missing.
     """
     asammdf = need(path, "asammdf", format, "mdf")

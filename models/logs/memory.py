@@ -21,7 +21,6 @@ _NANOSECONDS = 1e9  # of a second
 
 class ArrayLog:
     """Columns of one length, of which one is the time.
-
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
@@ -114,10 +113,7 @@ class ArrayLog:
         return tuple(dict.fromkeys(str(word) for word in self._arrays[RUN].tolist()))
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return columns as channels.
-
-        run : one of `runs`; None where there are none, or one.
-        """
+        """Return columns as channels.   run : one of `runs`; None where there are none, or one."""
         run = one_run(self.path, self.runs(), run)
         chosen(self.path, names, self._arrays)
         clock = str(self._clock)

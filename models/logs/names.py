@@ -58,7 +58,6 @@ SAME = 2e-3  # of their size: by less two channels differ that are one, but for 
 
 class Rule(NamedTuple):
     """How a signal is called.
-
     known : whole names, words joined.   vague : names that may mean something else.
     never : words that mean something else.   words : sets of words that all occur; "a|b" is either.
     """
@@ -128,10 +127,7 @@ def _with_corner(word: str) -> tuple[str, ...]:
 
 
 def wheel_words(signal: str, words: Sequence[str]) -> bool:
-    """Return whether a name is that of the speed of a wheel.
-
-    signal : one of `WHEELS`.
-    """
+    """Return whether a name is that of the speed of a wheel.   signal : one of `WHEELS`."""
     listed = frozenset(part for word in words for part in _with_corner(word))
     if listed & OTHERS:
         return False
@@ -152,7 +148,6 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guess:
     """A channel, or the channels of two wheels, that may be a signal.
-
     confidence : from 0 to 1.
     unit : of the file, or what the numbers look like where it tells none.
     sign : channel that has the sign of the amounts in this one; empty where there is none.
@@ -171,7 +166,6 @@ class Guess:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
     """What the channels of a log probably are.
-
     rivals : by signal, all that are as good as the best, it included, where there are several.
     """
 
@@ -246,7 +240,6 @@ def _matches(group: str, words: frozenset[str]) -> bool:
 
 def name_confidence(signal: str, name: str) -> float:
     """Return how sure a name alone says that a channel is a signal, 0 where it does not.
-
     signal : one of `RULES`, or a wheel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
@@ -289,7 +282,6 @@ def propose(
     log: LogFile, headings: Sequence[Heading] | None = None, run: str | None = None
 ) -> Proposal:
     """Return what the channels of a log probably are.
-
     log : as a format reads it; numbers are read of the channels that are in question.
     headings : names and units to choose from; None all of the log.
     run : which of its runs is looked at; None the only one, or the first.

@@ -73,7 +73,6 @@ class _ParquetTable:
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column as text, "" where one is missing.
-
         column : from 0.
         """
         with one_line(self.path, WHAT):
@@ -90,7 +89,6 @@ class _ParquetTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
-
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """

@@ -66,7 +66,6 @@ _LONGEST_CELL = csv.field_size_limit()  # characters
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
     """Where the table of a text file is, and how its cells are written.
-
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
     delimiter : one character, " " for any number of blanks and tabs.   decimal : "." or ",".
     thousands : what sets thousands apart in some cell, "" where nothing does.
@@ -115,10 +114,7 @@ class _Way(NamedTuple):
 
 
 def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
-    """Return the layout of a text file.
-
-    whole : whether they are all of it.
-    """
+    """Return the layout of a text file.   whole : whether they are all of it."""
     encoding = _encoding(path, head)
     text = _decoded(path, head, encoding)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -202,7 +198,6 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
 
 def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
     """Return the cells of one line, the line itself where it has none.
-
     delimiter : one character, " " for any number of blanks and tabs.
     """
     if delimiter == BLANKS:

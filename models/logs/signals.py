@@ -93,7 +93,6 @@ def quantity_of(name: str, unit: str) -> str:
 
 def signal_name(name: str) -> str | None:
     """Return our name of a signal by its own or by that of its column; None where it has neither.
-
     name : for example "vy" or "v_y".
     """
     by_column = {column: ours for ours, column in COLUMNS.items()}
@@ -156,10 +155,7 @@ class Signal:
         return (*self.channel, self.sign) if self.sign else self.channel
 
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
-        """Return the signal of its channels.
-
-        parts : each channel in SI, on one clock (n,).
-        """
+        """Return the signal of its channels.   parts : each channel in SI, on one clock (n,)."""
         plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
         if len(parts) == 1 and self == plain:
             return parts[0]
@@ -187,7 +183,6 @@ class Signal:
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
     """Return amounts with the sign that another channel has then, (n,).
-
     t : times of the amounts [s], (n,).
     sign_t, sign : times and values of the other channel, (m,).
     """

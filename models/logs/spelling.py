@@ -77,7 +77,6 @@ def without_unit(name: str) -> str:
 
 def without_ending(name: str, unit: str) -> str:
     """Return a name without the unit that it holds, where it is that unit.
-
     name : of a column, as in the file: "speed_kmh", "speed [km/h]".
     unit : that was understood: "km/h".
     """

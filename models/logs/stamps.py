@@ -78,7 +78,6 @@ _SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
 
 class Stamps(NamedTuple):
     """Time of each sample [s], (n,), and what was mended, one sentence each.
-
     order : which rows they are of, (n,); None are all as they stand.
     """
 
@@ -222,7 +221,6 @@ def _is_beside(
 
 def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
     """Return a column that is said to be the time; None where its cells are none.
-
     column : from 0.
     """
     found = _clock(column, name, unit, head, _is_any)
@@ -321,7 +319,6 @@ def _number(cell: str) -> float | None:
 
 def nanoseconds(cell: str) -> int | None:
     """Return a date and time (since 1970), or a time of day, in ns; None where it is neither.
-
     cell : ISO 8601, or with the day first, or hh:mm:ss, mm:ss, or "0.01 sec" as MATLAB writes a
         duration; "" gives `MISSING`.
     """
@@ -401,10 +398,7 @@ def _of_day(text: str) -> int | None:
 def require_times(
     label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
 ) -> None:
-    """Refuse a row without a time.
-
-    values, rows : as of `seconds`, (n,) each.
-    """
+    """Refuse a row without a time.   values, rows : as of `seconds`, (n,) each."""
     missing = _first(values, lambda part: part == MISSING if part.dtype.kind == "i" else
                      ~np.isfinite(part))  # fmt: skip
     if missing is not None:
@@ -468,7 +462,6 @@ def risen(
     restarts: bool = True,
 ) -> Stamps:
     """Return times in seconds as `seconds` does.
-
     t : times [s], (n,).   rows : (n,) where each is in the file.
     """
     clock = Clock(0, name, "s", False, "")
@@ -477,7 +470,6 @@ def risen(
 
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     """Return stamps that rise and the rows that they are of; None where that is no mending.
-
     t : stamps [s], some of which are not above the one before, (n,).
     restarts : whether a clock that goes back for long is mended: samples of two runs are not mixed.
     """
@@ -517,7 +509,6 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
 
 def _starts_again(first: float, before: float, after: float) -> bool:
     """Return whether a clock that fell starts again; else its samples are out of order.
-
     first : stamp since which it rose [s].   before, after : stamps between which it fell [s].
     """
     return bool(after - first <= 0.5 * (before - first) and before > first)
@@ -525,7 +516,6 @@ def _starts_again(first: float, before: float, after: float) -> bool:
 
 def typical_rate(t: Array) -> float:
     """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two.
-
     t : times [s], (n,).
     """
     steps = np.diff(t[:_MOST_STEPS])
@@ -535,7 +525,6 @@ def typical_rate(t: Array) -> float:
 
 def since(t: Array, first: float) -> Array:
     """Return times of the calendar since an instant, (n,); doubles hold them to the microsecond.
-
     t : times since 1970 [s], (n,).   first : instant since 1970 [s].
     """
     return filled(t.size, lambda part: np.round((t[part] - first) * _MICROSECONDS) / _MICROSECONDS)
@@ -543,7 +532,6 @@ def since(t: Array, first: float) -> Array:
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     """Return stamps in seconds, (n,); those of the calendar from the first on.
-
     values : (n,) as in the file.
     """
     first = values[0]
@@ -597,7 +585,6 @@ class _Even(NamedTuple):
 @np.errstate(all="ignore")
 def _even_clock(t: Array) -> _Even | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
-
     t : stamps [s] that never fall, (n,).
     """
     if t.size < 10 or not t[-1] > t[0]:
@@ -705,7 +692,6 @@ def _even_step(t: Array, tick: float) -> float | None:
 @np.errstate(all="ignore")
 def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool = True) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
-
     t : stamps [s], one of which is not above the one before, (n,).
     rows : (n,) where each is in the file.
     """

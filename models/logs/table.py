@@ -113,7 +113,6 @@ class Table(Protocol):
 
 class Gathered:
     """Columns that are gathered block by block.
-
     kinds : column from 0 -> how its cells are read.
     run : column and word of the rows to keep; None keeps all.
     """
@@ -143,7 +142,6 @@ class Gathered:
 
     def extend(self, rows: NDArray[np.int64], columns: Mapping[int, Any]) -> None:
         """Add the rows of a block.
-
         rows : (n,) where they are in the file.   columns : column -> (n,) values, or `Words`.
         """
         self._seen += rows.size
@@ -188,7 +186,6 @@ class Gathered:
 @dataclass(frozen=True, kw_only=True)
 class TableLog:
     """A table as a log: which of its columns is the clock, and which names the runs.
-
     clock_name, clock_unit : of the column that is the time; empty finds them.
     rate : of all samples [Hz], in place of a time; 0 where none is told.
     mend : whether stamps that do not rise are mended, and not refused.
@@ -356,7 +353,6 @@ class TableLog:
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return columns as channels on the clock of the log.
-
         run : one of `runs`; None where there are none.
         """
         places, clock = chosen(self.path, names, self._places), self.clock

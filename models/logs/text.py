@@ -51,7 +51,6 @@ def open_text(path: Path) -> TableLog:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable:
     """A table in a text file.
-
     arrow : whether pyarrow is used; None where it is installed and the file is large.
     """
 
@@ -93,7 +92,6 @@ class TextTable:
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column, with decimal points, "" where one is missing.
-
         column : from 0.
         """
         layout = self.layout
@@ -104,7 +102,6 @@ class TextTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
-
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
@@ -207,10 +204,7 @@ class _Row(NamedTuple):
 
 
 class _Python:
-    """Reads blocks of one table.
-
-    wanted : column from 0 -> how its cells are read.
-    """
+    """Reads blocks of one table.   wanted : column from 0 -> how its cells are read."""
 
     def __init__(self, path: Path, layout: Layout, wanted: Mapping[int, Kind]) -> None:
         self._path, self._layout, self._wanted = path, layout, wanted

@@ -33,10 +33,7 @@ _MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leaf:
-    """An array of real numbers that is not read yet.
-
-    load : reads it, (rows, columns) float64.
-    """
+    """An array of real numbers that is not read yet.   load : reads it, (rows, columns) float64."""
 
     shape: tuple[int, int]
     load: Callable[[], Array]
@@ -94,7 +91,6 @@ class Found(NamedTuple):
 
 def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
     """Return the channels of a tree, in its order; their names may repeat.
-
     rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
         the like of the tree, if there is one.
     """
@@ -244,10 +240,7 @@ def _lines(
 
 
 def line_of(values: Array, signal: Signal) -> Array:
-    """Return the values of a channel, (n,).
-
-    values : of its leaf, (rows, columns).
-    """
+    """Return the values of a channel, (n,).   values : of its leaf, (rows, columns)."""
     line = values[:, signal.place] if signal.along == 0 else values[signal.place]
     return np.array(line, dtype=np.float64)
 

@@ -110,7 +110,6 @@ def is_told(unit: str) -> bool:
 
 def unit_of_range(quantity: str, largest: float) -> str:
     """Return the unit that numbers without one can have; "" where SI can be.
-
     quantity : one of `SI`, or `HAND_WHEEL`.   largest : how far the numbers go from zero.
     """
     if quantity == ACCELERATION:
@@ -121,7 +120,6 @@ def unit_of_range(quantity: str, largest: float) -> str:
 
 def to_si(unit: str, quantity: str, what: str) -> float:
     """Return the factor to SI.
-
     unit : as written; where it tells none, SI is meant.   quantity : of the signal, one of `SI`.
     """
     plain = _plain(unit)

@@ -40,7 +40,6 @@ class Wheel(NamedTuple):
 
     def velocity(self, v_x: Any, v_y: Any, r: Any) -> tuple[Any, Any]:
         """Velocity of the wheel center [m/s] in the body frame.
-
         v_x, v_y : velocity of the center of gravity, body frame [m/s].   r : yaw rate [rad/s].
         """
         return v_x - self.y * r, v_y + self.x * r
@@ -60,7 +59,6 @@ def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
 
 def mounted(tire: Tire, wheel: Wheel) -> Tire:
     """Return the tire for the side of the wheel; only measured tires have sides.
-
     tire : any of `models.tires`.
     """
     if isinstance(tire, MagicFormula):
@@ -86,7 +84,6 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
 
 def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
     """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
-
     slip : lagged slip tan(α') [-].   camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
     load : vertical load [N].   mu : friction over the tire's own [-].
@@ -107,7 +104,6 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
 
 def downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
     """Return what the air adds to the loads of front and rear axle [N]; 0 of a car without.
-
     v_x : longitudinal speed [m/s].
     """
     if not vehicle.has_downforce:
@@ -158,7 +154,6 @@ def wheel_loads(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
     """Gains of the speed controller; the defaults hold the speed within about 0.1 m/s.
-
     gain : acceleration per speed error [1/s].
     integral_gain : acceleration per integrated speed error [1/s^2], zero for none.
     acceleration_limit : largest demand, driving and braking [m/s^2].
@@ -175,7 +170,6 @@ class Driver:
 
     def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
         """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
-
         error : wanted minus actual speed [m/s].   integral : of the error [m].
         """
         unlimited = self.gain * error + self.integral_gain * integral
@@ -192,7 +186,6 @@ OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "accelerat
 
 def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
     """Return the components of a wheel-frame vector in the body frame.
-
     angle : steering angle of the wheel [rad].
     """
     c, s = ca.cos(angle), ca.sin(angle)

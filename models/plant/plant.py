@@ -27,7 +27,6 @@ from models.vehicle import GRAVITY, Vehicle, VehicleError
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlantRun:
     """The truth of a run: n samples, SI, ISO axes; wheels in the order FL, FR, RL, RR.
-
     t : time [s], (n,).
     v_x, v_y : velocity of the center of gravity in the body frame [m/s], (n,).
     r : yaw rate [rad/s], (n,).
@@ -71,7 +70,6 @@ class PlantRun:
         cls, name: str, vehicle: Vehicle, t: Array, command: Array, record: Mapping[str, Array]
     ) -> "PlantRun":
         """Name the columns of what the compiled loop recorded.
-
         t : time [s], (n,).   command : steering asked for [rad], (n, 2).
         record : state "x" (n, 18) in the order of `models.plant.dynamics`, and its outputs.
         """
@@ -97,7 +95,6 @@ class PlantRun:
         self, sensors: Sensors | None = None, rng: np.random.Generator | None = None
     ) -> Recording:
         """Return what a log of this run would hold, with the axle forces as truth.
-
         sensors : what the signals go through; None measures exactly.
         rng : source of the noise; needed when there are sensors.
         """
@@ -143,7 +140,6 @@ def _compiled_loop(
     vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt: float
 ) -> _CompiledLoop:
     """Return the compiled loop of a plant over time, built once.
-
     dt : step of the integration [s].
     """
     car, constants = lifted(dynamics(vehicle, tires, driver))
@@ -186,7 +182,6 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
 
 class Plant:
     """A double-track car on its tires.
-
     vehicle : the car; it needs a chassis.
     tire : of all four wheels, a frozen record; None reads the file named by the chassis.
     rear_tire : of the two rear wheels, where they have another.
@@ -264,10 +259,7 @@ class Plant:
         return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
 
     def loop(self, dt: float) -> _CompiledLoop:
-        """Return the compiled loop over time.
-
-        dt : step of the integration [s].
-        """
+        """Return the compiled loop over time.   dt : step of the integration [s]."""
         return _compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
 
 
@@ -302,7 +294,6 @@ class PlantState(NamedTuple):
 
 class StepwisePlant:
     """A plant that is driven period by period.
-
     friction : of the road; None is what the tire was measured on.
     period : for which command and wanted speed are held [s], a multiple of `dt`.
     dt : step of the integration [s].
@@ -338,7 +329,6 @@ class StepwisePlant:
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
-
         v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
         """
         if not v_x > 0.0:
@@ -349,7 +339,6 @@ class StepwisePlant:
 
     def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
         """Return the plant one period later.
-
         command : steering angles asked for, [δ_f, δ_r] [rad].   v_ref : wanted speed [m/s].
         """
         if not np.isfinite([*command, v_ref]).all():

@@ -76,7 +76,6 @@ def recording_of(
     log: LogFile, name: str, log_map: LogMap, *, run: str | None, dt: float
 ) -> Recording:
     """Return one run of a log on a uniform clock, not yet judged by physics.
-
     name : of the recording, without its run.
     run : name of the run; None where the map names it, or there is only one.
     dt : sample time T_s of the result [s].
@@ -174,10 +173,7 @@ def _channels(
 
 
 def scaled(values: Array, factor: float) -> Array:
-    """Return values times a factor; themselves where it is one.
-
-    values : (n,).
-    """
+    """Return values times a factor; themselves where it is one.   values : (n,)."""
     if factor == 1.0:
         return values
     return filled(values.size, lambda part: values[part] * factor)
@@ -348,7 +344,6 @@ def wheel_scales(
     log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
 ) -> dict[str, Scale]:
     """Return how wheels roll by the v_x that is logged as well, by name of the wheel.
-
     signals : v_x, wheels, and r where it is there; others are not looked at.
     """
     headings = log.headings()

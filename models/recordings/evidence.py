@@ -130,7 +130,6 @@ def windows(recording: Recording) -> Means:
 
 def least_squares(X: Array, y: Array) -> Fit:
     """Fit y = X theta; standard errors count overlapping windows once.
-
     X : regressors, shape (k, p).   y : response, shape (k,).
     """
     size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
@@ -148,7 +147,6 @@ def least_squares(X: Array, y: Array) -> Fit:
 
 def correlation(a: Array, b: Array) -> float:
     """Correlation about zero, from -1 to 1; 0 where one is zero throughout.
-
     a, b : samples of two signals, shape (k,).
     """
     return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)
@@ -169,7 +167,6 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
 
 def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     """Return how two measures of the same bends go together, in the windows where either turns.
-
     a, b : of each window, in any unit (k,).   keep : windows that may count (k,).
     """
     some = turning(a, b)

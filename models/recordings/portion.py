@@ -30,7 +30,6 @@ class Portion(NamedTuple):
 
     def place(self, index: int) -> int:
         """Return how many of its samples lie before a sample of the whole.
-
         index : of the sample; as many as there are is the end.
         """
         return int(np.searchsorted(self.samples, index))

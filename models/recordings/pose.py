@@ -116,7 +116,6 @@ class Smooth(NamedTuple):
 
 def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
     """Return how a car moves by its pose.
-
     parts : by name of `POSE` on one clock or several, SI.
     """
     x = parts["x"]
@@ -180,7 +179,6 @@ def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
 
 def smoothed(z: Array) -> Smooth:
     """Return columns of one size, smoothed alike as strongly as they predict themselves best.
-
     z : (n, k), evenly sampled.
     """
     from scipy.fft import dct  # takes longer than to read a short log

@@ -135,7 +135,6 @@ def repair_text(repair: Repair) -> str:
 
 def map_of(told: Told) -> LogMap:
     """Return a map that may be given as a path; an empty one where there is none.
-
     told : a map, the path of a log.toml, or None.
     """
     if told is None:

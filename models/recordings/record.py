@@ -277,7 +277,6 @@ class Recording:
 
     def __getitem__(self, times: slice) -> "Recording":
         """Return the part between two times [s], both included, as label slices of pandas have it.
-
         times : `log[5.0:20.0]`, on the recording's own clock; what is left out is the begin or end.
         """
         if not isinstance(times, slice) or times.step is not None:
@@ -372,10 +371,7 @@ class Recording:
 
 
 def peak(signal: Array) -> float:
-    """Return the largest size of a signal.
-
-    signal : samples, any shape (...).
-    """
+    """Return the largest size of a signal.   signal : samples, any shape (...)."""
     return max(abs(float(signal.min())), abs(float(signal.max())))
 
 
@@ -473,7 +469,6 @@ def _nobody_writes(array: NDArray[Any]) -> bool:
 
 def side_by_side(first: Array, second: Array) -> Array:
     """Return two signals as columns that nobody may write, (n, 2).
-
     first, second : signals (n,).
     """
     both = large((first.size, 2))

@@ -302,7 +302,6 @@ def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, fl
 
 def _by_stretches(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
     """Return values of samples that are computed of their stretch alone, block by block (n,).
-
     compute : returns the values of a part (k,) of a stretch, told both.
     """
     values = large((len(recording),))

@@ -26,7 +26,6 @@ MOST = 200_000  # samples that are looked at
 
 class Scale(NamedTuple):
     """Speed over ground per what a wheel shows.
-
     value : radius [m] of one that shows turns, factor [-] of one that shows a speed.
     """
 
@@ -57,7 +56,6 @@ def learnt_scales(
     parts: Mapping[str, Sequence[Raw]], signals: Mapping[str, Signal], units: Mapping[str, str]
 ) -> dict[str, Scale]:
     """Return the scale of each wheel that v_x tells, by name.
-
     parts : by signal its channels in SI; v_x, wheels, and r where it is there.
     """
     t = parts["v_x"][0].t

@@ -40,7 +40,6 @@ class Tire(Protocol):
         mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
-
         alpha : slip angle, paper's sign [rad].   kappa : longitudinal slip [-].
         gamma : camber [rad].   F_z : wheel load [N]; no force at F_z <= 0.
         mu : friction of the road over that of the measurement [-].
@@ -48,23 +47,16 @@ class Tire(Protocol):
         ...
 
     def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ at zero slip and camber [N].
-
-        F_z : wheel load [N].
-        """
+        """∂F_x/∂κ at zero slip and camber [N].   F_z : wheel load [N]."""
         ...
 
     def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α at zero slip and camber [N/rad].
-
-        F_z : wheel load [N].
-        """
+        """∂F_y/∂α at zero slip and camber [N/rad].   F_z : wheel load [N]."""
         ...
 
 
 def positive(x: Expression) -> Expression:
     """The number where it is above 0, else 0; NaN stays NaN, which fmax(x, 0) would hide.
-
     x : any number; for a wheel load [N], 0 means lifted off: a tire cannot pull.
     """
     return x * (x > 0)
@@ -113,7 +105,6 @@ class Slips(NamedTuple):
 
 def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
     """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
-
     alpha : slip angle, paper's sign [rad].
     kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
     C_alpha : cornering stiffness [N/rad].   C_kappa : longitudinal slip stiffness [N].
@@ -141,16 +132,10 @@ class _ConstantStiffness(Protocol):
 
 
 def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
-    """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
-
-    F_z : wheel load [N].
-    """
+    """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.   F_z : wheel load [N]."""
     return self.C_kappa * (F_z > 0)
 
 
 def cornering_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
-    """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
-
-    F_z : wheel load [N].
-    """
+    """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.   F_z : wheel load [N]."""
     return self.C_alpha * (F_z > 0)

@@ -37,7 +37,6 @@ def _magic_curve(
     x: Expression, B: Expression, C: Expression, D: Expression, E: Expression
 ) -> Expression:
     """D sin(C atan(B x - E (B x - atan B x))), (4.49) without shifts.
-
     B, C : stiffness and shape factor.   D : peak value [N].
     """
     Bx = B * x
@@ -79,7 +78,6 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
 
 def _lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> _Shape:
     """All of the curve that does not depend on slip.
-
     gamma : camber [rad].   F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
@@ -103,7 +101,6 @@ def _lateral_curvature(
     c: Coefficients, alpha_y: Expression, gamma: Expression, F_z: Expression
 ) -> Expression:
     """E_y, at most 1.
-
     alpha_y : slip angle, ISO sign, shifted [rad].   gamma : camber [rad].
     F_z : wheel load, not negative [N].
     """
@@ -116,7 +113,6 @@ def pure_lateral(
     c: Coefficients, alpha: Expression, gamma: Expression, F_z: Expression, mu: Expression
 ) -> Expression:
     """F_y0 [N] of a wheel that rolls freely, (4.E19).
-
     alpha : slip angle, ISO sign [rad].   gamma : camber [rad].
     F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
@@ -136,7 +132,6 @@ def combined_lateral(
     mu: Expression,
 ) -> Expression:
     """F_y [N] at any slip, (4.E58).
-
     alpha : slip angle, ISO sign [rad].   kappa : longitudinal slip [-].   gamma : camber [rad].
     F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
@@ -156,7 +151,6 @@ def combined_lateral(
 
 def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0.
-
     F_z : wheel load, not negative [N].
     """
     B_y, C_y, D_y, S_Hy, _ = _lateral_shape(c, 0.0, F_z, 1.0)
@@ -175,7 +169,6 @@ def _longitudinal_shape(
     c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression
 ) -> _Shape:
     """All of the curve that does not depend on slip.
-
     gamma : camber [rad].   F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
@@ -193,10 +186,7 @@ def _longitudinal_shape(
 
 
 def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:
-    """E_x, at most 1.
-
-    kappa_x : slip, shifted [-].   F_z : wheel load, not negative [N].
-    """
+    """E_x, at most 1.   kappa_x : slip, shifted [-].   F_z : wheel load, not negative [N]."""
     df_z = c.load_increment(F_z)
     E_0 = c.PEX1 + c.PEX2 * df_z + c.PEX3 * df_z**2
     return ca.fmin(E_0 * (1.0 - c.PEX4 * ca.sign(kappa_x)) * c.LEX, 1.0)  # (4.E14)
@@ -206,7 +196,6 @@ def _pure_longitudinal(
     c: Coefficients, kappa: Expression, gamma: Expression, F_z: Expression, mu: Expression
 ) -> Expression:
     """F_x0 [N] of a wheel that runs straight, (4.E9).
-
     kappa : longitudinal slip [-].   gamma : camber [rad].   F_z : wheel load, not negative [N].
     mu : friction of the road over that of the measurement [-].
     """
@@ -236,7 +225,6 @@ def _combined_longitudinal(
 
 def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
     """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0.
-
     F_z : wheel load, not negative [N].
     """
     B_x, C_x, D_x, S_Hx, _ = _longitudinal_shape(c, 0.0, F_z, 1.0)
@@ -247,7 +235,6 @@ def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MagicFormula:
     """Steady-state Magic Formula 5.2 in combined slip with camber.
-
     side : side of the car this tire belongs to, "left" or "right".
     name : where the tire comes from, for messages and tables.
     """
@@ -262,10 +249,7 @@ class MagicFormula:
 
     @classmethod
     def from_tir(cls, path: str | PathLike[str]) -> Self:
-        """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).
-
-        path : the `.tir` file.
-        """
+        """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).   path : the `.tir` file."""
         c, side, valid_range, name = read_magic_formula(path)
         return cls(coefficients=c, side=side, valid_range=valid_range, name=name)
 
@@ -311,7 +295,6 @@ class MagicFormula:
 
     def mounted(self, side: Literal["left", "right"]) -> Self:
         """The tire for that side: itself where it belongs there, else mirrored.
-
         side : "left" or "right".
         """
         _require_side(side)

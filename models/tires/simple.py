@@ -32,7 +32,6 @@ class LinearTire:
         mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
-
         gamma : camber [rad]; without effect.
         mu : friction of the road over that of the measurement [-]; without effect.
         """
@@ -55,7 +54,6 @@ class LinearTire:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FialaTire:
     """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
-
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
@@ -79,7 +77,6 @@ class FialaTire:
         mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
-
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
         """
@@ -105,7 +102,6 @@ class FialaTire:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DugoffTire:
     """Friction-limited linear tire: |F| < μ F_z, reached only in the limit; camber does nothing.
-
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
@@ -129,7 +125,6 @@ class DugoffTire:
         mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
-
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
         """

@@ -131,7 +131,6 @@ class Entry(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TirFile:
     """The entries of one file.
-
     without_sign : lines that begin with a word but have no "=", by that word in capitals; their
         value is empty.
     """
@@ -145,14 +144,12 @@ class TirFile:
 
     def text(self, key: str, default: str) -> str:
         """The value as text.
-
         default : the answer where the file has no such key, or an empty value.
         """
         return self._text(key, default, self.entries.get(key, ()), self.without_sign.get(key, ()))
 
     def number(self, key: str) -> float | None:
         """The value in SI; None where the file has no such key.
-
         key : in capitals; those of `_DIMENSIONS` are converted from the units of the file.
         """
         if key not in self.entries:
@@ -211,10 +208,7 @@ class TirFile:
 
 
 def read_tir(path: str | PathLike[str]) -> TirFile:
-    """Read a tire property file without judging what it describes.
-
-    path : the `.tir` file.
-    """
+    """Read a tire property file without judging what it describes.   path : the `.tir` file."""
     path = Path(path)
     entries: dict[str, list[Entry]] = {}
     without_sign: dict[str, list[Entry]] = {}
@@ -296,7 +290,6 @@ _SIGNED_AS_FRICTION = ("PDY1", "PDY2", "RVY1", "RVY2", "RVY3")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidRange:
     """What the tire was measured for, as (least, greatest); infinite where the file does not say.
-
     alpha : slip angle, paper's sign [rad]; the file has the ISO sign, so its limits change places.
     kappa : longitudinal slip [-].   gamma : camber [rad].   F_z : wheel load [N].
     """
@@ -325,10 +318,7 @@ class _MagicFormulaFile(NamedTuple):
 
 
 def read_magic_formula(path: str | PathLike[str]) -> _MagicFormulaFile:
-    """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.
-
-    path : the `.tir` file.
-    """
+    """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.   path : the `.tir` file."""
     tir = read_tir(path)
     _require_mf52(tir)
     c = _inflated(_coefficients(tir), tir)

@@ -178,7 +178,6 @@ TOLERANCE_DOUBLE, TOLERANCE_SINGLE = 1e-9, 1e-3
 
 class MpcPackage(NamedTuple):
     """A package before it is written.
-
     params : the numbers that it begins with, of `mpc.realtime.instance.c_types`.
     """
 
@@ -202,7 +201,6 @@ def build_mpc_package(
     caution: float = 0.0,
 ) -> MpcPackage:
     """Return the package of a tracker; the same input gives the same bytes.
-
     period : between two steps [s].   delay : from a measurement until its command acts [s].
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.

@@ -52,7 +52,6 @@ def frozen_start(package: Package) -> TireModel:
 
 def _handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
     """Return header and source by path.
-
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
     """
     specialized, model = identifier.specialized, frozen_start(identifier)
@@ -136,7 +135,6 @@ def build_pair(
     caution: float = 0.0,
 ) -> Pair:
     """Return the tracker that goes with an identifier, one step a sample, and what joins them.
-
     identifier : package of the identifier; its weights are the tire that is begun with.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.

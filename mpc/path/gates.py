@@ -34,7 +34,6 @@ _OPTIONS: dict[str, Any] = {
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gate:
     """A lane between two rows of cones, or beside one row where a side is infinite.
-
     start : where it begins along x [m].   end : where it ends [m].
     right : y of the right cones [m].   left : y of the left cones [m].
     """
@@ -68,7 +67,6 @@ def line_through_gates(
     knots: float = 1.0,
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
-
     start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].

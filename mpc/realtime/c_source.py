@@ -62,7 +62,6 @@ def c_sources(
     structure: TireStructure, *, horizon: int, name: str, single: bool = False, about: Values
 ) -> dict[str, str]:
     """Return the C files by their path in a package; they depend on nothing but these arguments.
-
     single : whether float is the default precision.
     """
     counts = c_sizes(structure, horizon)

@@ -23,7 +23,6 @@ GRIPS: Array = LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 
 def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> None:
     """Write what the tracker fears of a tire; `max_slip` must have been written.
-
     caution : from 0 to 1.
     """
     if caution > 0.0 and tire.vehicle.has_downforce:

@@ -64,7 +64,6 @@ def fall_back(
 
 def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
     """Return A (5, 5) and B (5, 1) of ẋ = A x + B u at a speed.
-
     v_x : longitudinal speed [m/s].   lag : of the wheels behind what is told [s].
     """
     m, I_z, l_f, l_r, C_f, C_r = vehicle.bicycle
@@ -79,7 +78,6 @@ def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
 
 def steady_turn(vehicle: Vehicle, v_x: float) -> tuple[float, float]:
     """Return δ [rad m] and v_y [m²/s] of a steady turn, each a curvature.
-
     v_x : longitudinal speed [m/s].
     """
     m, _, l_f, l_r, C_f, C_r = vehicle.bicycle

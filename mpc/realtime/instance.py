@@ -213,7 +213,6 @@ class Instance:
 
     def prepare_from(self, x0: ArrayLike) -> None:
         """Do ahead of `solve` what does not ask for its state, on the road in `input`.
-
         x0 : state that is expected (n_x,).
         """
         self.start[:] = x0
@@ -234,25 +233,16 @@ class Instance:
         self._library.mpc_shift(*self._step[:2])
 
     def guess(self, x0: ArrayLike) -> None:
-        """Set the plan to one without a solution.
-
-        x0 : state at its beginning (n_x,).
-        """
+        """Set the plan to one without a solution.   x0 : state at its beginning (n_x,)."""
         self.start[:] = x0
         self._library.mpc_guess(*self._step[:2], *self.solve_arguments[3:])
 
     def late(self, steering: float) -> None:
-        """Say that the last command came too late.
-
-        steering : what was steered instead [rad].
-        """
+        """Say that the last command came too late.   steering : what was steered instead [rad]."""
         self._library.mpc_late(self._step[0], self._real(steering))
 
     def reset(self, steering: float) -> Status:
-        """Begin anew, with the faults kept.
-
-        steering : angle of the wheels [rad].
-        """
+        """Begin anew, with the faults kept.   steering : angle of the wheels [rad]."""
         return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))
 
 

@@ -170,7 +170,6 @@ class Tracker:
 
     def reset(self, steering: float = 0.0) -> None:
         """Forget what was planned and steered; faults are kept.
-
         steering : angle of the wheels now [rad].
         """
         if self.instance.reset(steering) != Status.OK:

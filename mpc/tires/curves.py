@@ -115,7 +115,6 @@ class LinearAxles(SmallSlip):
 
 def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> PredictionTire:
     """Return the tire of the linear bicycle.
-
     stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
     """
     weights = vehicle.bicycle[4:] if stiffness is None else stiffness

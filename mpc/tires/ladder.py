@@ -131,7 +131,6 @@ def ladder_weights(
     downforce: tuple[float, ...] = (),
 ) -> Array:
     """Return w of `LadderAxles`.
-
     ladder : α_j [rad], (n,).   W : w_j [N], front and rear (2, n).   compliance : s [m/N], (2,).
     least : least lag [m], (2,).   shortest : σ_0 [m].   offset : δ_0 [rad] and b [m/s].
     downforce : κ of front and rear [s²/m²] where pressed, else nothing.
@@ -168,7 +167,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
 
 def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
-
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
     units = model.in_units()
@@ -204,7 +202,6 @@ class Fit(NamedTuple):
 
 def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
-
     largest : end of the grid [rad].
     """
     grid: Array = largest * (np.arange(1, SAMPLES + 1) / SAMPLES) ** 2
@@ -213,7 +210,6 @@ def slip_grid(largest: float) -> Array:
 
 def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     """Return slip scales α_j (n,) for curves of both axles, and w_j [N] (2, n).
-
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
     """
@@ -234,7 +230,6 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
 
 def fitted(alpha: Array, force: Array, ladder: Array) -> Fit:
     """Return the weights of one curve.
-
     alpha : slips [rad], (k,).   force : at these slips [N], (k,).
     ladder : slip scales [rad], (n,).
     """
@@ -276,7 +271,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
 
 def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
-
     vehicle : the car; it needs no chassis.
     """
     alpha = slip_grid(LARGEST_SLIP)
@@ -290,7 +284,6 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
 
 def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: float) -> Array:
     """Return the side force of an axle in steady cornering [N], (k,).
-
     axle : 0 in front, 1 at the rear.   alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].
     """

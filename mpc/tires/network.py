@@ -81,7 +81,6 @@ def network_tire(model: NetworkModel) -> PredictionTire:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _OnnxAxles(SmallSlip):
     """Axle forces of a static network of signals; w: its constants, one after another.
-
     inputs : signals that it reads, of `identifier.paper.network.SIGNALS`.
     slip_sign : 1 where it reads slip angles in the paper's sign, -1 for ISO 8855.
     """

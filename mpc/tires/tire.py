@@ -70,7 +70,6 @@ class TireStructure:
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body.
-
         slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
         """
         raise NotImplementedError
@@ -119,7 +118,6 @@ RELATIVE, FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire miss
 
 class PredictionTire(NamedTuple):
     """A structure with its weights (n_weights,), and the car that they are of.
-
     doubt : half the band of 90 % of the axle forces at slips 0, 0.02, … 0.5 rad [N], (2, 26); None
         where nobody told.
     """
@@ -158,7 +156,6 @@ SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has d
 
 class ValidSlip(NamedTuple):
     """Slip up to which curves are believed [rad], their slope beyond [N/rad]; (2,) each.
-
     grip : friction over the one that the curves have, by which all of that scales [-].
     """
 
@@ -185,7 +182,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 
 def curves_at(tire: PredictionTire, slip: Array) -> Array:
     """Return the axle forces at slips, straight ahead, (2, k) [N].
-
     slip : of both axles [rad], (k,).
     """
     x = ca.SX.sym("slip")
@@ -222,7 +218,6 @@ def _extrapolated_force(
     structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).
-
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).
