@@ -3,8 +3,9 @@
 Every maneuver is a frozen record with `.steering(t)`, commanded angles [δ_f, δ_r] [rad], δ > 0 to
 the left, and `.duration` [s]. Angles never jump: |dδ/dt| <= rate_limit, which the identifier needs
 (steering must be resolved at its sample time); a maneuver that cannot keep its limit is refused at
-birth. Steering starts at `onset`; a negative amplitude steers right first. `rear_ratio` is
-δ_r/δ_f, zero for a car that steers in front only.
+birth. Steering starts at `onset` [s]; a negative amplitude steers right first. `rear_ratio` is
+δ_r/δ_f, zero for a car that steers in front only; `rate_limit` [rad/s] is that of either axle, of a
+sine at least 2 pi frequency amplitude.
 """
 
 import math
@@ -60,9 +61,7 @@ def _both(front: Any, rear_ratio: float) -> Array:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepSteer:
     """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
-    amplitude : final angle [rad].   onset : start of the ramp [s].
-    rate_limit : largest steering rate of either axle [rad/s].   duration : length [s].
-    rear_ratio : rear over front angle [-].
+    amplitude : final angle [rad].
     """
 
     amplitude: float
@@ -75,7 +74,6 @@ class StepSteer:
         _check(self, steepest=0.0)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         angle = np.clip(self._rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -96,8 +94,6 @@ class TwoStepSteer:
     second_share : angle held after the second ramp, over `amplitude` [-].
     onset : start of the first ramp [s].
     second_onset : start of the second ramp [s], not before the first has arrived.
-    rate_limit : largest steering rate of either axle [rad/s].   duration : length [s].
-    rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -128,7 +124,6 @@ class TwoStepSteer:
         )
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         change = (self.second_share - 1.0) * self.amplitude
         second = replace(self._first, amplitude=change, onset=self.second_onset)
         return self._first.steering(t) + second.steering(t)
@@ -137,9 +132,7 @@ class TwoStepSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slalom:
     """A sine from onset to the end.
-    amplitude : of the sine [rad].   frequency : of the sine [Hz].   onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].   rear_ratio : rear over front angle [-].
+    amplitude : of the sine [rad].   frequency : of the sine [Hz].
     """
 
     amplitude: float
@@ -153,7 +146,6 @@ class Slalom:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         phase = 2.0 * math.pi * self.frequency * np.maximum(t - self.onset, 0.0)
         return _both(self.amplitude * np.sin(phase), self.rear_ratio)
 
@@ -162,9 +154,7 @@ class Slalom:
 class DoubleLaneChange:
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
     amplitude : of both sines [rad].   frequency : of both sines [Hz].
-    pause : time straight ahead between them [s].   onset : start of the first [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].   rear_ratio : rear over front angle [-].
+    pause : time straight ahead between them [s].
     """
 
     amplitude: float
@@ -179,7 +169,6 @@ class DoubleLaneChange:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         there = np.clip((t - self.onset) * self.frequency, 0.0, 1.0) % 1.0
         second = self.onset + 1.0 / self.frequency + self.pause
         back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
@@ -191,9 +180,7 @@ class DoubleLaneChange:
 class SineWithDwell:
     """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
     amplitude : of the sine [rad].   frequency : of the sine [Hz]; the test uses 0.7.
-    dwell : time at the second peak [s]; the test uses 0.5.   onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].   rear_ratio : rear over front angle [-].
+    dwell : time at the second peak [s]; the test uses 0.5.
     """
 
     amplitude: float
@@ -208,7 +195,6 @@ class SineWithDwell:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         since = t - self.onset
         peak = 0.75 / self.frequency
         moving = np.minimum(since, peak) + np.maximum(since - peak - self.dwell, 0.0)
@@ -220,9 +206,6 @@ class SineWithDwell:
 class SlowlyIncreasingSteer:
     """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
     amplitude : final angle [rad].   rate : slope of the ramp of the front axle [rad/s].
-    onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s]; `rate` must keep it.
-    duration : length [s].   rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -236,7 +219,6 @@ class SlowlyIncreasingSteer:
         _check(self, steepest=self.rate)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         angle = np.clip(self.rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -249,9 +231,7 @@ class RandomSteer:
     half period, so that the steepest path between two is that of a sine of `frequency`. The same
     seed is the same maneuver, at any sampling.
 
-    amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].   onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].   rear_ratio : rear over front angle [-].
+    amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].
     """
 
     amplitude: float
@@ -266,7 +246,6 @@ class RandomSteer:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         rng = np.random.default_rng(self.seed)
         swings = 2 + math.ceil(2.0 * self.frequency * self.duration)
         angles = np.append(0.0, self.amplitude * rng.uniform(-1.0, 1.0, swings))
@@ -281,9 +260,7 @@ class SampledSteer:
     """Given angles at given times, joined by straight lines, as a planned maneuver is.
     times : of the angles [s], rising, (k,); straight ahead before the first.
     angles : of the front wheels [rad], (k,), the first zero.
-    rate_limit : largest steering rate of either axle [rad/s].
     duration : length [s]; after the last time the last angle is held.
-    rear_ratio : rear over front angle [-].
     """
 
     times: tuple[float, ...]
@@ -316,5 +293,4 @@ class SampledSteer:
             )
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         return _both(np.interp(t, self.times, self.angles), self.rear_ratio)

@@ -269,6 +269,7 @@ class HorizonEstimator(Method):
     window : how long what was measured is looked at again [s].
     """
 
+    ports = _OWN_PORTS
     needs_v_y = False  # it tells one
     needs_a_y = True
 
@@ -314,11 +315,6 @@ class HorizonEstimator(Method):
             ),
             window=window,
         )
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return _OWN_PORTS
 
     @property
     def remark(self) -> str:

@@ -31,7 +31,7 @@ from identifier.baselines.ports import (
 )
 from identifier.baselines.without_v_y import OVER, corrected, heard_ports
 from identifier.method import Method
-from identifier.setup import Port, Setup
+from identifier.setup import Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
@@ -152,6 +152,9 @@ class LaggedEkf(Method):
     min_speed : below this speed [m/s] forces read zero.
     """
 
+    ports = (*PORTS, *LAG_DESCRIBED)
+    remark = "two numbers an axle, one relaxation length for all cars of a size"
+
     v_y_noise: float
     r_noise: float
     v_y_disturbance: float
@@ -189,15 +192,6 @@ class LaggedEkf(Method):
             learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
         )
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return (*PORTS, *LAG_DESCRIBED)
-
-    @property
-    def remark(self) -> str:
-        return "two numbers an axle, one relaxation length for all cars of a size"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""

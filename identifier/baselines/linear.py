@@ -11,7 +11,7 @@ from identifier.baselines.curves import CurveModel
 from identifier.method import Method
 from identifier.setup import Setup
 from identifier.tire_model import TireModel
-from models.rules import require_positive
+from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
 
@@ -25,7 +25,7 @@ class LinearBaseline(Method):
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(ValueError, dt=self.dt, min_speed=self.min_speed)
+        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:

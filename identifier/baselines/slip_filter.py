@@ -176,6 +176,7 @@ class SlipFilter(Method):
     min_speed : below this speed [m/s] forces and v_y read zero.
     """
 
+    ports = PORTS
     estimates = "lateral velocity"
     needs_v_y = False  # it tells one
     needs_a_y = True
@@ -226,11 +227,6 @@ class SlipFilter(Method):
     @property
     def learns(self) -> bool:
         return TIRES[self.tire].unknowns > 0
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return PORTS
 
     @property
     def remark(self) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
 from models.schema import require_few
@@ -47,6 +47,10 @@ class GroupedLog(Generic[P]):
         starts again.
     clock_name, clock_unit : of the channel that is the time of all; empty leaves each its own.
     """
+
+    dialect = ()
+    clock = None
+    unlisted = ()
 
     path: Path
     format: str
@@ -99,21 +103,6 @@ class GroupedLog(Generic[P]):
     def notes(self) -> tuple[str, ...]:
         """What is left out or taken for granted, and what was mended in what has been read."""
         return (*self.said, *dict.fromkeys(self._mended))
-
-    @property
-    def dialect(self) -> tuple[str, ...]:
-        """Nothing: such a file is written in one way."""
-        return ()
-
-    @property
-    def clock(self) -> Clock | None:
-        """None: each group has its own."""
-        return None
-
-    @property
-    def unlisted(self) -> tuple[str, ...]:
-        """Nothing: what is left out, the notes say."""
-        return ()
 
     def headings(self) -> tuple[Heading, ...]:
         """Return names and units of the channels."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.spelling import without_unit
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
@@ -28,6 +28,11 @@ class ArrayLog:
     mend : whether times that do not rise are mended, and not refused.
     rate : of the samples [Hz], in place of a time; 0 where none is told.
     """
+
+    format = "arrays"
+    dialect = ()
+    clock = None
+    unlisted = ()
 
     def __init__(
         self,
@@ -71,28 +76,9 @@ class ArrayLog:
         return Path(self._name)
 
     @property
-    def format(self) -> str:
-        return "arrays"
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """What was mended in what has been read so far, one sentence each."""
         return tuple(dict.fromkeys(self._noted))
-
-    @property
-    def dialect(self) -> tuple[str, ...]:
-        """Nothing: arrays are written in one way."""
-        return ()
-
-    @property
-    def clock(self) -> Clock | None:
-        """None: the time is in seconds, so that there is nothing to be said of it."""
-        return None
-
-    @property
-    def unlisted(self) -> tuple[str, ...]:
-        """Nothing: words show in reading."""
-        return ()
 
     def headings(self) -> tuple[Heading, ...]:
         """Return the columns, but for the time and the runs; which are numeric shows in reading."""

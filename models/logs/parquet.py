@@ -44,6 +44,8 @@ def open_parquet(path: Path) -> TableLog:
 class _ParquetTable:
     """A table in a Parquet file."""
 
+    words = ()
+
     path: Path
     schema: Any
     rows: int
@@ -65,11 +67,6 @@ class _ParquetTable:
     def numeric(self) -> tuple[bool, ...]:
         """Which columns hold numbers."""
         return tuple(_is_numeric(one.type) for one in self.schema)
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """How the file is written, for people."""
-        return ()
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column as text, "" where one is missing.

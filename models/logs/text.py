@@ -54,6 +54,8 @@ class TextTable:
     arrow : whether pyarrow is used; None where it is installed and the file is large.
     """
 
+    place = "line"
+
     path: Path
     layout: Layout
     arrow: bool | None = None
@@ -61,10 +63,6 @@ class TextTable:
     @property
     def format(self) -> str:
         return "VBO" if self.layout.made_by == "Racelogic VBOX" else "CSV"
-
-    @property
-    def place(self) -> str:
-        return "line"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -116,7 +116,7 @@ def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) 
     return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
 
 
-# The two slopes of a tire whose stiffness is the same at every load: methods of such tires.
+# What tires share whose stiffness is the same at every load: methods of such tires.
 
 
 class _ConstantStiffness(Protocol):
@@ -139,3 +139,28 @@ def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
 def cornering_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
     """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.   F_z : wheel load [N]."""
     return self.C_alpha * (F_z > 0)
+
+
+class _BrushTire(_ConstantStiffness, Protocol):
+    """A tire of constant stiffness whose force points along the demand of its tread."""
+
+    def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
+        """Force over the demand of a tread that never slides [-]."""
+
+
+def brush_forces(
+    self: _BrushTire,
+    alpha: Expression,
+    kappa: Expression,
+    gamma: Expression,
+    F_z: Expression,
+    mu: Expression = 1.0,
+) -> TireForces:
+    """Longitudinal and lateral force in the wheel frame [N].
+    kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
+    gamma : camber [rad]; without effect.
+    """
+    del gamma
+    s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    per_demand = self.per_demand(s, F_z, mu)
+    return TireForces(s.p_x * per_demand, s.p_y * per_demand)

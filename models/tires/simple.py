@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from models.rules import require_positive
+from models.rules import require_positive_fields
 from models.tires import forces as constant_stiffness
-from models.tires.forces import NO_FORCE, Expression, TireForces, positive, slips, smaller
+from models.tires.forces import NO_FORCE, Expression, Slips, TireForces, positive, smaller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +21,7 @@ class LinearTire:
     C_kappa: float
 
     def __post_init__(self) -> None:
-        require_positive(ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa)
+        require_positive_fields(self)
 
     def forces(
         self,
@@ -64,30 +64,16 @@ class FialaTire:
     friction: float
 
     def __post_init__(self) -> None:
-        require_positive(
-            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
-        )
+        require_positive_fields(self)
 
-    def forces(
-        self,
-        alpha: Expression,
-        kappa: Expression,
-        gamma: Expression,
-        F_z: Expression,
-        mu: Expression = 1.0,
-    ) -> TireForces:
-        """Longitudinal and lateral force in the wheel frame [N].
-        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-        gamma : camber [rad]; without effect.
-        """
-        del gamma
-        s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
+        """Force over the demand of a tread that never slides [-]."""
         sliding = 3.0 * mu * self.friction * positive(F_z)  # demand at which all contact slides
         demand = s.size / s.rolling
         x = smaller(demand / (sliding + NO_FORCE), 1.0)
-        per_demand = (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
-        return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+        return (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
 
+    forces = constant_stiffness.brush_forces
     slip_stiffness = constant_stiffness.slip_stiffness
     cornering_stiffness = constant_stiffness.cornering_stiffness
 
@@ -112,28 +98,14 @@ class DugoffTire:
     friction: float
 
     def __post_init__(self) -> None:
-        require_positive(
-            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
-        )
+        require_positive_fields(self)
 
-    def forces(
-        self,
-        alpha: Expression,
-        kappa: Expression,
-        gamma: Expression,
-        F_z: Expression,
-        mu: Expression = 1.0,
-    ) -> TireForces:
-        """Longitudinal and lateral force in the wheel frame [N].
-        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-        gamma : camber [rad]; without effect.
-        """
-        del gamma
-        s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
+        """Force over the demand of a tread that never slides [-]."""
         half = mu * self.friction * positive(F_z) / (2.0 * s.size)  # λ/(1 + κ)
         lam = smaller(half * s.rolling, 1.0)
-        per_demand = smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
-        return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+        return smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
 
+    forces = constant_stiffness.brush_forces
     slip_stiffness = constant_stiffness.slip_stiffness
     cornering_stiffness = constant_stiffness.cornering_stiffness
