@@ -29,7 +29,6 @@ class Driving:
 
     The sensors may err by as much as the noise at every sample, in any direction: it is a largest
     error, not a standard deviation.
-
     v_x : speed [m/s], give or take `SPEED_SPREAD`.   slip : largest slip angle of an axle [rad].
     friction : largest μ of the road [-]; an axle pushes with at most μ times its load.
     bandwidth : highest frequency of the steering [Hz].

@@ -14,7 +14,6 @@ def with_doubt(value: float, sd: float | None = None) -> str:
     """Return a value with its standard deviation, as in "0.886 ± 0.060", "127 ± 5".
 
     Of the larger of both three digits are given, of the standard deviation one or two.
-
     sd : in the unit of the value; None where it is not known.
     """
     if not math.isfinite(value):

@@ -57,7 +57,6 @@ def read_network(content: bytes, inputs: Sequence[str] | None = None) -> ca.Func
     """Return a network as a function of scalar signals, with the result axle_force (2,) [N].
 
     The function's inputs bear the names of the signals that the network reads.
-
     content : the ONNX file. Its tensors are (columns,) or (batch, columns); a batch may be dynamic.
     inputs : the signal in each column, over all input tensors in turn. None takes the names of the
         tensors where each is one column with the name of a signal, else alpha_f, alpha_r for two
@@ -176,7 +175,6 @@ class OnnxModel(TireModel):
 
     A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
     where F_y = +C α; ISO 8855 has the opposite sign: for a network of that, set `slip_sign` to -1.
-
     min_speed : below this speed [m/s] the forces read zero.
     inputs : what the network's columns are, see `read_network`; None goes by names and number.
     slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -222,11 +220,7 @@ class OnnxModel(TireModel):
         inputs: tuple[str, ...] | None = None,
         slip_sign: int = 1,
     ) -> "OnnxModel":
-        """Read a network file.
-        min_speed : below this speed [m/s] the forces read zero.
-        inputs : what the network's columns are; None goes by names and number.
-        slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
-        """
+        """Read a network file; arguments are those of the class."""
         try:
             return cls(
                 vehicle=vehicle,

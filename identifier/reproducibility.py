@@ -60,7 +60,6 @@ class Reproduction:
 
     The instant of the freeze belongs to neither side: there the frozen force is the online one. A
     side without a sample that counts has no error, None; nor has one against truth without truth.
-
     past_against_online : error for t < T_freeze against what was identified online, the measure of
         the paper's section IV-A; the linear part of both forces is the same and cancels.
     after_against_truth : error for t > T_freeze against the true force.

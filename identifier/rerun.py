@@ -56,7 +56,6 @@ class Rerun:
 
         A port of a block is computed when it is asked for, together with those that were asked for
         of blocks before. Of a run that is one block it is kept.
-
         samples : rising indices; blocks without one are left out. None yields all.
         """
         for k, whole in enumerate(self.parts):

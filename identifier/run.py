@@ -354,7 +354,6 @@ class OnlineIdentifier:
         """Take a sample; return the axle forces (2,) [N], with the weights before it.
 
         Where the sample is refused, those of the last one it took, and zero once it is `stale`.
-
         x : [v_y, r] (2,) [m/s, rad/s]; v_y NaN where there is none, if the method tells it itself.
         u : [δ_f, δ_r] (2,), angles of the road wheels [rad].   v_x : longitudinal speed [m/s].
         a_y : of an accelerometer at the center of gravity, positive to the left [m/s²]; None, or a

@@ -101,7 +101,6 @@ class Setup(NamedTuple):
         """Yield what the compiled step records over a recording, block by block.
 
         Values are carried from block to block: the bits are those of one piece.
-
         recording : its signals are the input; its forces are not looked at.
         parts : of the recording, one after the other; None takes all of it in `blocks`.
         carry : values that are carried into the first part; None begins with the recording.
@@ -239,7 +238,6 @@ def shown(
 
     A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
     that no difference over the gap is ever taken for one over a sampling interval.
-
     over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
         there is none.
     judges : whether the step judges samples itself.

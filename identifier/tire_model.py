@@ -89,7 +89,6 @@ class Estimate(NamedTuple):
         """Return the number with the share that is missed of a force in its standard deviation.
 
         The recursion knows of noise only; what its curves cannot say is in what they miss.
-
         share : of the force of its axle, rms [-].
         """
         if self.sd is None or self.title not in (STIFFNESS, GRIP):

@@ -68,12 +68,7 @@ def bicycle(parameters: BicycleParameters, v_x: Any) -> _Bicycle:
 
 
 def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:
-    """Return [α_f, α_r] = δ - (v_y ± l r)/v_x [rad], (2,), in the paper's sign, as used in (3).
-    l_f : distance from the center of gravity to the front axle [m].
-    l_r : distance from the center of gravity to the rear axle [m].
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r], lateral velocity [m/s] and yaw rate [rad/s].   u : [δ_f, δ_r], steering [rad].
-    """
+    """Return [α_f, α_r] = δ - (v_y ± l r)/v_x [rad], (2,), in the paper's sign, as used in (3)."""
     return ca.vertcat(u[0] - (x[0] + l_f * x[1]) / v_x, u[1] - (x[0] - l_r * x[1]) / v_x)
 
 
@@ -90,9 +85,6 @@ def measured_slip(
     """Return [α_f, α_r] = δ - atan2(v_y ± l r, v_x) [rad] of samples, (n, 2), the paper's sign.
 
     Without small angles; meaningless at standstill.
-
-    l_f : distance from the center of gravity to the front axle [m].
-    l_r : distance from the center of gravity to the rear axle [m].
     v_x : longitudinal speed [m/s], (n,).   v_y : lateral velocity [m/s], (n,).
     r : yaw rate [rad/s], (n,).   delta_f : steering in front [rad], (n,).
     delta_r : at the rear [rad], (n,).

@@ -34,14 +34,14 @@ class Maneuver(Protocol):
 def _check(maneuver: Any, *, steepest: float) -> None:
     """Refuse numbers that are not physical and a steering rate above the limit."""
     name = type(maneuver).__name__
-    free = ("amplitude", "second_share", "onset", "rear_ratio", "seed", "dwell", "pause")
+    free = ("amplitude", "second_share", "onset", "rear_ratio", "seed", "pause")
     for field in fields(maneuver):
         value = getattr(maneuver, field.name)
         if not math.isfinite(value):
             raise ManeuverError(f"{name}: {field.name} must be finite, it is {value}")
         if field.name not in free and not value > 0.0:
             raise ManeuverError(f"{name}: {field.name} must be positive, it is {value}")
-        if field.name in ("onset", "seed", "dwell", "pause") and value < 0.0:
+        if field.name in ("onset", "seed", "pause") and value < 0.0:
             raise ManeuverError(f"{name}: {field.name} must not be negative, it is {value}")
     rate = steepest * max(1.0, abs(maneuver.rear_ratio))
     if rate > maneuver.rate_limit * (1.0 + 1e-12):
@@ -177,32 +177,6 @@ class DoubleLaneChange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SineWithDwell:
-    """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
-    amplitude : of the sine [rad].   frequency : of the sine [Hz]; the test uses 0.7.
-    dwell : time at the second peak [s]; the test uses 0.5.
-    """
-
-    amplitude: float
-    frequency: float
-    dwell: float
-    onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_sine(self)
-
-    def steering(self, t: Array) -> Array:
-        since = t - self.onset
-        peak = 0.75 / self.frequency
-        moving = np.minimum(since, peak) + np.maximum(since - peak - self.dwell, 0.0)
-        phase = np.clip(moving * self.frequency, 0.0, 1.0) % 1.0  # sin(2 pi) is not 0
-        return _both(self.amplitude * np.sin(2.0 * math.pi * phase), self.rear_ratio)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SlowlyIncreasingSteer:
     """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
     amplitude : final angle [rad].   rate : slope of the ramp of the front axle [rad/s].
@@ -230,7 +204,6 @@ class RandomSteer:
     The angles are drawn from `numpy.random.default_rng(seed)`, uniform in +-amplitude and one every
     half period, so that the steepest path between two is that of a sine of `frequency`. The same
     seed is the same maneuver, at any sampling.
-
     amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].
     """
 

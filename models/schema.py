@@ -3,6 +3,9 @@
 A file is a regular file of limited size, also when unpacked; JSON and TOML are limited in depth and
 number of values; a table gives its values by name and type. Which numbers are possible is for the
 records that are made of them. A refusal is one line: file, place, rule, and the value, shortened.
+
+In functions:
+limit : field of `InputLimits` that says how many megabytes it may hold.
 """
 
 import gzip
@@ -68,9 +71,7 @@ def require_dense(
 
 
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
-    """Refuse what is no regular file, and files that are too large.
-    limit : field of `InputLimits` that says how many megabytes it may hold.
-    """
+    """Refuse what is no regular file, and files that are too large."""
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
         kind = "a folder" if stat.S_ISDIR(about.st_mode) else "a device, pipe or socket"
@@ -79,10 +80,7 @@ def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
 
 
 def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
-    """Read a file.
-    path : a regular file: no device, pipe or folder, which may have no end.
-    limit : field of `InputLimits` that says how many megabytes it may hold.
-    """
+    """Read a file.   path : a regular file: no device, pipe or folder, which may have no end."""
     require_file(path, refusal, limit=limit)
     most = int(min(1e6 * getattr(limits(), limit), 2.0**62))
     with path.open("rb") as file:
@@ -124,10 +122,7 @@ def _require_size(path: Path, refusal: type[ValueError], size: int, limit: str) 
 def read_text(
     path: Path, refusal: type[ValueError], *, limit: str = "document", encoding: str = "utf-8"
 ) -> str:
-    """Read a text file.
-    limit : field of `InputLimits` that says how many megabytes it may hold.
-    encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
-    """
+    """Read a text file.   encoding : utf-8, or utf-8-sig where a byte order mark may begin it."""
     try:
         return read_bytes(path, refusal, limit=limit).decode(encoding)
     except UnicodeDecodeError as error:

@@ -104,7 +104,6 @@ def white_noise(signal: Array) -> float:
     """Return the standard deviation of the white part of a signal, by its second differences.
 
     Their median is taken: steps and outliers are not noise.
-
     signal : samples (n,).
     """
     bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]

@@ -27,7 +27,6 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
     """Return what comes out of a low pass of first order that began at rest on the first value.
 
     It is exact for straight lines between samples.
-
     signal : u, what goes in (n,).   lag : time constant T of the low pass [s].
     dt : sampling interval [s].
     """

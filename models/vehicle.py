@@ -208,7 +208,6 @@ def load_ratio(downforce: Any, v_x: Any) -> Any:
     """Return λ = 1 + κ v_x^2, the load over the static one [-], as a CasADi expression.
 
     `Vehicle.load_ratio` is the same of numbers.
-
     downforce : κ of both axles (2,), or of one, as `Vehicle.downforce` has it [s^2/m^2].
     v_x : longitudinal speed [m/s].
     """

@@ -41,7 +41,6 @@ class Cost:
     0.5; the slalom, the circle and the handling course tuned nothing of them. With none on the yaw
     rate and a quarter on the input, plans became jerky and runs beyond the grip failed; with 8 on
     e_y some did at the grip. With 1 the car stays 1.3 times as far from the path.
-
     e_y : deviation from the path, at 0.1 m.
     e_psi : heading against that of the path, at 0.05 rad.
     course : direction of travel against the path, e_psi + v_y/v_x, at 0.05 rad.
@@ -160,7 +159,6 @@ class Guards:
     Without a new plan the old one steers for `hold_time`; then feedback to the path, within the
     hard limits: optimal at each speed for Σ (e_y/`fall_back_e_y`)² + (a/`fall_back_acceleration`)²,
     see `mpc.realtime.fall_back`.
-
     e_y : |e_y| beyond which the car is off the path [m].
     e_psi : |e_psi| beyond which it is [rad].
     v_y : |v_y| beyond which the tire is not known [m/s].

@@ -64,7 +64,6 @@ def _filtered_tire(textbook: bool) -> FilteredTire:
     """Return what makes the forces of a curve by θ = [curve, ln σ/σ₀, δ₀ and b over spreads].
 
     Prior: friction [-], then those of `_OWN_PRIOR` where it is not the textbook's.
-
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
     n = len(KINDS)
@@ -98,7 +97,6 @@ class CurveEkf(Method):
     """Tire parameters that walk at random, slowly, in the coordinates of `decoded`.
 
     With them the lag of the tire and the zeros of both sensors, which the default learns too.
-
     walk : of every parameter [1/√s].   v_y_noise : standard deviation of measured v_y [m/s].
     r_noise : standard deviation of the measured yaw rate [rad/s].
     v_y_disturbance : what the curve misses, as random change of v_y [m/s/√s].
@@ -147,7 +145,6 @@ class CurveEkf(Method):
         Disturbances stand for what the curve misses, for a natural time at once: 8 % of g without
         lag and offsets, half of it with them. The parameters may walk by one percent in a second.
         Both were chosen on 32 random cars of our plant, from a compact to 1:10.
-
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed

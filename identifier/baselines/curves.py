@@ -79,7 +79,6 @@ def magic_formula(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """Return F = D sin(C atan(B α)) cos δ, the Magic Formula without E, (2,) [N].
 
     Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49) with E = 0.
-
     q : B [1/rad], C [-], D [N] (2, 3).   alpha : slip angles (2,) [rad].   u : [δ_f, δ_r] (2,).
     """
     del loads
@@ -92,7 +91,6 @@ def dugoff(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
 
     F = C tan α f(λ), λ = μ F_z/(2 C |tan α|), f = λ (2 - λ) for λ < 1, else 1.
     Source: Dugoff, Fancher and Segel, SAE 700377 (1970).
-
     q : C [N/rad], μ [-] (2, 2).   loads : F_z (2,) [N].   alpha : slip angles (2,) [rad].
     u : [δ_f, δ_r] (2,).
     """
@@ -126,7 +124,6 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
 
     Carried: `LaggedSlip` where it lags, else nothing. Constant: parameters of the curve (2, n),
     offset (2,) = δ₀ [rad] and b [m/s], and where it lags lag (2,) = σ [m].
-
     name : one of `CURVES`.
     """
     s, last = sample_ports(), lag_symbols()

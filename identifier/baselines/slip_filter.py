@@ -208,7 +208,6 @@ class SlipFilter(Method):
 
         So that the joint filter errs least, and 95 % of its errors lie within two standard
         deviations there; the linear one has the same, and does not know that stiffnesses are wrong.
-
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed

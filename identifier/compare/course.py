@@ -272,7 +272,6 @@ def step_times(
     Setting up is left out. Times are those of this thread on its processor, so that waiting for a
     busy machine does not count, and the methods take turns. A short recording is run forward and
     backward in time until it is long enough, of a long one the first 100 000 samples count.
-
     repeats : turns; the shortest counts.
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}

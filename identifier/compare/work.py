@@ -23,7 +23,6 @@ def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
 
     Fresh processes rather than threads: the compiled loops release Python's lock, but what is
     around them does not, and CasADi's graphs must not be built by two threads at once.
-
     workers : number of processes; the functions and their arguments must be picklable.
     chunk : number of items that a process takes at once.
     """

@@ -379,7 +379,6 @@ class Search:
         """Return the share of the force missed on each half by the model of the other half, (2,).
 
         The model of a half is one Gauss-Newton step from that of the whole.
-
         parts : which residuals are of each half, (m,) each.
         zero : a suspect that is held at zero.
         """

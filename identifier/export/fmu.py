@@ -451,7 +451,6 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     and F_yr_half_band where it tells the band. Samples are taken at multiples of the step's
     interval after the start, whatever the communication step; a step from t to t + h takes those in
     [t, t + h).
-
     specialized : the step; its name is the model identifier.   version : of FMI, 2 or 3.
     """
     if version not in OF_VERSION:

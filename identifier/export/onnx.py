@@ -204,7 +204,6 @@ def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | No
     """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
 
     Of a car with downforce those of the static loads.
-
     single : whether numbers are float32; else they are float64.
     """
     graph = Graph(single)

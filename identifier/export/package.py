@@ -157,7 +157,6 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
 
     Where v_y is told it is measured at the end alone; a_y is that of the motion, with a gap.
-
     n : number of samples.
     """
     k = np.arange(n, dtype=np.float64)
@@ -184,7 +183,6 @@ def run_in_virtual_machine(
     """Return the outputs (n, k) of a specialized step, one beside the other, and its state then.
 
     Samples that are refused count as time, as `identifier.refused` says.
-
     samples : (n, k) in the order of the inputs.
     """
     limits, method = specialized.limits, specialized.method

@@ -283,7 +283,6 @@ def _natural_force_unit(mass: float) -> float:
 
     The gains are well scaled where forces are of order one: 1 kN for a passenger car, 1 N for a
     1:10 model.
-
     mass : mass of the car [kg].
     """
     return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))

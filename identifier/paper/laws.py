@@ -11,6 +11,10 @@ ball; it is done after the step.
 
 ξ̃ = ξ - ξ̂ [U s], z = ∫ exp(-λ (t - τ)) ξ̃ dτ [U s²], σ = tanh(V̂ x̄), U the force unit.
 The paper never defines ξ̃. Only with ξ - ξ̂, so that dξ̃/dt = A_d ξ̃ + f - f̂, do (11)-(12) descend.
+
+In functions:
+A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
+xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).   dt : step [s].
 """
 
 from collections.abc import Callable, Mapping
@@ -28,9 +32,7 @@ _Direction = Callable[[Any, Any], Any]
 
 
 def _static_direction(A_d: Any, drive: Any) -> Any:
-    """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
-    A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
-    """
+    """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,)."""
     return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
 
 
@@ -39,8 +41,6 @@ def lyapunov_direction(A_d: Any, drive: Any) -> Any:
 
     P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
     2x2 matrix in closed form.
-
-    A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
     """
     trace = A_d[0, 0] + A_d[1, 1]
     determinant = A_d[0, 0] * A_d[1, 1] - A_d[0, 1] * A_d[1, 0]
@@ -153,9 +153,8 @@ def weight_rates(
     drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
     xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.   W : weights (2, n_h).
     V : weights (n_h, n_in).   x_bar : network input (n_in,).
-    sigma : hidden layer tanh(V x̄) (n_h,).   A_d : Hurwitz matrix (2, 2) [1/s].
-    eta_W : learning rate η1.   eta_V : learning rate η2.   rho_W : leakage ρ1.
-    rho_V : leakage ρ2.
+    sigma : hidden layer tanh(V x̄) (n_h,).   eta_W : learning rate η1.   eta_V : learning rate η2.
+    rho_W : leakage ρ1.   rho_V : leakage ρ2.
     leaking : what of the weights leaks, from them and the radius: `whole` or `beyond_ball`.
     W_free : radius of the dead zone of W, which `whole` does not read [U].
     V_free : radius of the dead zone of V, which `whole` does not read [-].
@@ -178,10 +177,8 @@ _InputSource = Callable[[Any, Any], Any]
 
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
-    A_d : Hurwitz matrix (2, 2) [1/s].   A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
-    B_xi : B_ξ of (7) (2, 2) [U/rad].   xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).   u : steering (2,) [rad].
-    f_hat : network output (2,) [U].
+    A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].   B_xi : B_ξ of (7) (2, 2) [U/rad].
+    u : steering (2,) [rad].   f_hat : network output (2,) [U].
     """
     return A_d @ xi_hat + (A_xi @ xi + B_xi @ u - A_d @ xi) + f_hat  # (8)
 
@@ -194,9 +191,7 @@ def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
 
 
 def measured(xi: Any, xi_hat: Any) -> Any:
-    """Read the network's input from the measured state, which opens the loop through x̂.
-    xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).
-    """
+    """Read the network's input from the measured state, which opens the loop through x̂."""
     del xi_hat
     return xi
 
@@ -205,8 +200,6 @@ def estimated(xi: Any, xi_hat: Any) -> Any:
     """Read the network's input from the estimated state, as (8) prints it.
 
     It closes a loop: A_d must then be fast against the slope of the tire.
-
-    xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).
     """
     del xi
     return xi_hat
@@ -233,7 +226,6 @@ def euler(
     derivative: Derivative, state: list[Any], dt: Any, project: Projection = free
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
-    dt : step [s].
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
     """
     del project
@@ -245,8 +237,6 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
 
     The inner stages are projected: else a high gain leaves the bounds within the step, and the
     slopes there carry it beyond them.
-
-    dt : step [s].
     """
     k1 = derivative(state)
     k2 = derivative(project(_ahead(state, k1, dt / 2)))

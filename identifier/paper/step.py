@@ -77,7 +77,6 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 
     A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is told:
     one of 1000 m/s would carry the weights beyond any number.
-
     v_x : longitudinal speed, at least the minimum speed [m/s].   x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     """

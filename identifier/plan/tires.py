@@ -135,7 +135,6 @@ class PlausibleTires:
 
         Weights, and what is not known of them, are those of the static loads times λ; of a car
         without downforce they stay as they are.
-
         v_x : speed [m/s].
         """
         load, n = self.vehicle.load_ratio(v_x), len(self.method.ladder)

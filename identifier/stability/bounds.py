@@ -61,7 +61,6 @@ def steady_capacity(
 
     In steady state learning balances leakage, η_W |s|² |A_d⁻¹| (c_z/λ + c_ξ) |ξ̃| = ρ_W |ξ̃| |f_hat|:
     a residual above it leaves an error however long one learns. It shrinks with |s|²/n_h.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.

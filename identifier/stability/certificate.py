@@ -45,7 +45,6 @@ def judged_loop(
     """Return the |W_hat| that margins are judged at, the worst loop there, and its margins.
 
     It is the proven bound, or where the margins do not hold up to it `W_large`.
-
     gains : of (8) to (12).   direction : (2, 2) D [s].   kept : |W_hat| that is proven [U].
     """
     loop = worst_loop(gains, law, operation, direction, kept)

@@ -117,7 +117,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
 
     Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
     the weights at which the margins were judged.
-
     gains : of (8) to (12).   kept : |W_hat| that is proven [U].
     judged : |W_hat| at which the margins were judged [U].
     """

@@ -59,7 +59,6 @@ def gain_for_phase_margin(
 
     The loop is (g/a) (c_ξ + c_z/(s + λ))/((s + a) s); the frequency where its phase is PM - 180° is
     found by bisection, g is the inverse of its magnitude there.
-
     a : decay rate [1/s].   lam : forgetting factor λ [1/s].
     phase_margin : wanted [deg], above 0 and below 90.
     dt : step of explicit Euler [s]; None for continuous time (RK4 at a dt <= 0.2 comes to it).

@@ -167,7 +167,6 @@ def worst_gain(
     A unit i adds η_W u + η_V |x_bar|² |W_i|² (1 - u)² with u = s_i² in [0, 1], convex in u and in
     W: the worst is at a corner, where every unit is saturated but perhaps the one that holds all
     of W. So V learns at no cost in margin while η_V x_bar_max² W_max² <= η_W.
-
     eta_W : learning rate of (11).   eta_V : learning rate of (12).
     n_h : hidden units; |s|² <= n_h.   W_max : bound on |W| (Frobenius) [U]; needed where V learns.
     """

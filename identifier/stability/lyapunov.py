@@ -83,7 +83,6 @@ def peak_gain(A_d: ArrayLike) -> float:
     1 / min|Re pole| where A_d is normal (symmetric, or a multiple of the identity plus a
     rotation); otherwise Gauss-Legendre quadrature, refined until it agrees with itself to 1e-10.
     With complex poles exp(A_d T) = -exp(m T) I after T = π/|Im|: one such period is enough.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     A_d = require_hurwitz(A_d)
@@ -112,7 +111,6 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
 
     m = tr A_d/2, k = |the symmetric part of A_d - m I|, S = sinh(q t)/q, q² = m² - det A_d: the
     singular values of C I + S (A_d - m I) are sqrt(1 + k² S²) ± k |S|.
-
     A_d : (2, 2) error dynamics [1/s].
     t : times [s], positive; within half a turn where the poles are complex.
     """

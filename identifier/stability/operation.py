@@ -1,4 +1,11 @@
-"""What a certificate must know besides the gains, and the worst loop that follows from it."""
+"""What a certificate must know besides the gains, and the worst loop that follows from it.
+
+In functions:
+gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.   m : mass [kg].
+I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
+l_r : center of gravity to rear axle [m].   v_x : speed [m/s].   slip : largest slip angle [rad].
+friction : μ [-].
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -150,9 +157,7 @@ _NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, l
 def proven_bounds(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Proven:
-    """Return all bounds that are proven, for the start of `sampled_bound.py`.
-    gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.
-    """
+    """Return all bounds that are proven, for the start of `sampled_bound.py`."""
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
     if not operation.resolves(A_d):
         return _NOTHING
@@ -207,8 +212,6 @@ def worst_loop(
     """Return the loop at the worst regressor, and |W_hat| up to W.
 
     Where W is infinite, the V layer cannot be counted and is left out.
-
-    gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
     """
     g = worst_gain(
@@ -238,10 +241,7 @@ def worst_loop(
 
 
 def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
-    """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
-    m : mass [kg].   I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
-    l_r : center of gravity to rear axle [m].
-    """
+    """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6)."""
     require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
@@ -253,10 +253,7 @@ def estimated_input_feedback(
     *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
-    m : mass [kg].   I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
-    l_r : center of gravity to rear axle [m].
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
-    v_x : speed [m/s].
     """
     require_positive(ValueError, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
@@ -286,9 +283,7 @@ def minimal_decay(feedback: ArrayLike) -> float:
 def largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
-    """Bound of every signal that a network may read, SI.
-    v_x : speed [m/s].   slip : largest slip angle [rad].   friction : μ [-].
-    """
+    """Bound of every signal that a network may read, SI."""
     require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
     v_y = vehicle.l_r * r + v_x * slip
@@ -320,7 +315,6 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
 def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
     vehicle : the car; its stiffness is at least half that of the tires.
-    slip : largest slip angle [rad].
     """
     require_positive(ValueError, slip=slip)
     return slip * math.hypot(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
@@ -330,8 +324,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
     """Force that the linear tire misses on a usual tire, F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))).
 
     No bound, but what the network must be able to hold where both axles are at the slip [N].
-
-    slip : largest slip angle [rad].   friction : μ [-].
     """
     require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)

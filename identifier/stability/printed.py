@@ -82,7 +82,6 @@ def k_b_with_V(
     k_b² = (K1² + c l2 K1 K2 + c K2²)/(1 - c l2²/4), c l2² < 4. It grows with c: as c -> 0 the V
     layer costs nothing, because w_bar already holds what V_hat does to the force, and V_hat itself
     is bounded by its leakage.
-
     k_b : K1, of `printed_k_b` or `tight_k_b` [U].   A_d : (2, 2) error dynamics [1/s].
     W_M : bound on the ideal W (Frobenius) [U].   V_M : bound on the ideal V (Frobenius) [-].
     eta_V : learning rate of (12).   rho_V : leakage gain of (12) [1/(U s²)].   weight : c > 0.
@@ -109,7 +108,6 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
     """γ sup|f| [U s]: the ultimate bound of an identifier that has no network at all.
 
     A bound above this one says nothing about learning.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].   residual_bound : sup|f| [U].
     """
     return peak_gain(A_d) * residual_bound
@@ -132,7 +130,6 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     b_UUB² = max over 0 <= y <= w_b of [λ_max(P) x(y)² + y²/ρ_W]/λ_min(P), with
     x(y) = max(0, b - (2/λ_min(Q)) (y - k_b)²) and w_b = k_b + sqrt(k_b² + |P| w_bar). The objective
     is a quartic where x > 0: its stationary points are roots of a cubic, none is missed.
-
     w_bar : bound on the approximation error [U].   k_b : of `printed_k_b` or `tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """

@@ -204,7 +204,6 @@ def by_leakage(
     """Return the bounds that leakage gives, or None where the circle does not close.
 
     The smallest X >= F(X), F increasing and convex, by Newton from below.
-
     error : of `error_gains`.   learning : of `output_layer`.   A_d : (2, 2) error dynamics [1/s].
     """
 

@@ -86,7 +86,6 @@ def calibrated(
     """Return the model frozen at a time, its band calibrated; as frozen where that cannot be done.
 
     It cannot where the model has no band, or too little is driven.
-
     t : time of the freeze in the recording's own clock [s]; None is the end.
     verdict : what `judge` said of that time; None asks it where it is needed.
     """
@@ -186,7 +185,6 @@ def color_of(error: Array, windows: Windows) -> float:
 
     The sum of their autocorrelation, over windows that do not overlap, until it is first not
     positive.
-
     error : of the windows, nan where nothing was asked (m,).
     """
     step = max(1, windows.n // 2)

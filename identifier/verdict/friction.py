@@ -111,7 +111,6 @@ def road_friction(
     Nobody can of a model without a calibrated band, and of a drive of fewer than eight brisk
     windows. More friction is told of a model alone that learnt its grip. Of a long drive those
     parts are asked that the verdict asks.
-
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """

@@ -242,7 +242,6 @@ class MotionError:
 
     The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
     small the forces are right, where it is large they need not be wrong.
-
     lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
     """
 

@@ -104,7 +104,6 @@ def words(cells: Any) -> Words:
     """Return cells of any type as the distinct words of them, "" where one is missing.
 
     What a dictionary keeps once is never written out row by row.
-
     cells : array of pyarrow, (n,).
     """
     import pyarrow

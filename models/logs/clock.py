@@ -112,7 +112,6 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
     """Return signals of several clocks on one, in the stretches in which all of them are there.
 
     Clocks of the calendar are compared since their first instant, to the microsecond.
-
     raws : by signal; times rise.   dt : step of the clock [s].
     longest : time without a sample that is no gap yet [s].
     """

@@ -106,7 +106,6 @@ class Signal:
 
     In SI it is (mean or sum of the channels) · factor - offset; by `ratio` or `table` the angle of
     the road wheels, where that of the hand wheel was logged.
-
     channel : names in the file; of several, forces are added and anything else is averaged.
     unit : as users write units; empty takes that of the file, SI where it tells none.
     factor : the numbers are multiplied by it [-]; -1 turns a sign.

@@ -4,6 +4,9 @@ Stamps that are rounded (ten samples of 0.01 s that share the stamp 0.1 s, 400 H
 milliseconds) are put back on the even clock that they were taken from, where one explains every
 stamp; it is said. Stamps that fall are no rounding: a clock that starts again, or a mixed order.
 They are refused, or mended where that is asked for.
+
+In functions:
+values : (n,) as in the file.   rows : (n,) where each is in the file.   t : times [s], (n,).
 """
 
 import datetime
@@ -421,8 +424,6 @@ def seconds(
 
     Dates and times of day count from the first of them; numbers stay as they stand, in seconds,
     those since 1970 too.
-
-    values : (n,) as in the file.   rows : (n,) where each is in the file.
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
         and what follows where the clock goes back for long is put after the rest; refused else.
     restarts : whether a clock that goes back for long is mended, too: not one of several.
@@ -461,9 +462,7 @@ def risen(
     mend: bool = False,
     restarts: bool = True,
 ) -> Stamps:
-    """Return times in seconds as `seconds` does.
-    t : times [s], (n,).   rows : (n,) where each is in the file.
-    """
+    """Return times in seconds as `seconds` does."""
     clock = Clock(0, name, "s", False, "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 
@@ -515,9 +514,7 @@ def _starts_again(first: float, before: float, after: float) -> bool:
 
 
 def typical_rate(t: Array) -> float:
-    """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two.
-    t : times [s], (n,).
-    """
+    """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two."""
     steps = np.diff(t[:_MOST_STEPS])
     step = float(np.median(steps)) if steps.size else 0.0
     return 1.0 / step if step > 0.0 else math.nan
@@ -531,9 +528,7 @@ def since(t: Array, first: float) -> Array:
 
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
-    """Return stamps in seconds, (n,); those of the calendar from the first on.
-    values : (n,) as in the file.
-    """
+    """Return stamps in seconds, (n,); those of the calendar from the first on."""
     first = values[0]
     per_second = PER_SECOND.get(clock.unit, 1.0)
     if clock.unit == "instant":
@@ -693,7 +688,6 @@ def _even_step(t: Array, tick: float) -> float | None:
 def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool = True) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
     t : stamps [s], one of which is not above the one before, (n,).
-    rows : (n,) where each is in the file.
     """
     k = _first_step(t, lambda step: ~(step > 0.0))
     assert k is not None

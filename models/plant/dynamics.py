@@ -72,7 +72,6 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     σ d(tan α')/dt + |V_cx| tan α' = -V_cy with the velocity V_c of the contact point in the frame
     of the wheel (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 7.2; no division by speed,
     so it is well posed down to standstill).
-
     slip : lagged slip tan(α') [-].   delta : steering angle of the wheel [rad].
     velocity : of the wheel, body frame [m/s].   length : relaxation length σ [m].
     """
@@ -125,7 +124,6 @@ def wheel_loads(
     An axle takes its share of the spring and damper moment and, through its roll center, the
     moment of its own side force. A wheel that would pull on the road is lifted: its load is zero
     and the other wheel of the axle carries all; the moment beyond that is lost.
-
     roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
     axle_force : side force of the front and the rear axle, body frame, (2,) [N].
     a_x : longitudinal acceleration [m/s^2].   pressed : downforce of front and rear axle [N].
@@ -271,7 +269,6 @@ def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
     """Return one classical fourth-order step as an MX function which calls `car` four times.
 
     Its outputs are those of the state before the step.
-
     car : from `dynamics`.   dt : step [s].
     """
     x = ca.MX.sym("x", N_STATES)

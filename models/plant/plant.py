@@ -224,8 +224,6 @@ class Plant:
         sample_time : step of the record [s], a multiple of `dt`.
         name : of the run; None takes the name of the maneuver's class.
 
-        Returns
-        -------
         The run at every `sample_time` from 0 to the maneuver's duration.
         """
         every = round(sample_time / dt) if dt > 0.0 else 0

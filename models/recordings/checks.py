@@ -57,13 +57,7 @@ def _refuse(recording: Recording, contradiction: str | None) -> None:
 
 
 def physics_contradiction(recording: Recording) -> str | None:
-    """Return how a recording contradicts the laws of motion: column, rule, value and remedy.
-
-    Returns
-    -------
-    str | None
-        One line about the first law that is broken, None where all hold.
-    """
+    """Return how a recording contradicts the laws of motion: column, rule, value and remedy."""
     world = world_axes(recording)
     if world is not None:
         return world
@@ -439,7 +433,6 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     each axle's force, or failing that the lateral acceleration for the rear, rises with its slip
     angle (correlation above -0.3); the mass that the forces accelerate is a third to three times
     the vehicle's.
-
     vehicle : anything with l_f and l_r [m] and mass [kg].
     """
     _refuse(recording, vehicle_contradiction(recording, vehicle))
@@ -447,13 +440,7 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
 
 def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
     """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`.
-
     vehicle : anything with l_f and l_r [m] and mass [kg].
-
-    Returns
-    -------
-    str | None
-        One line about the first rule that is broken, None where all hold.
     """
     w = windows(recording)
     a = w.acceleration

@@ -156,7 +156,6 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
     """Return the windows where one of two measures is beyond a fifth of what it reaches, (k,).
 
     So neither a long straight nor a channel that holds noise hides the other.
-
     a, b : of each window, in any unit (k,).
     """
     some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)

@@ -40,7 +40,6 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
 
     The recording is divided into parts of one length, and of each the stretch is taken in which the
     car is turned hardest: by the sum of (v_x r)².
-
     middle : sample before which half of the stretches shall lie; None spreads them over all.
     """
     n = len(recording)

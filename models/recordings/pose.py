@@ -38,7 +38,6 @@ def with_pose(
     """Return signals and their channels with v_x, v_y and r of the pose in its place, and notes.
 
     A gyro tells how late it, and what else a box has, is against the pose; that is taken out.
-
     parts : by signal its channels in SI.
     """
     if not set(POSE) <= set(signals):

@@ -384,7 +384,6 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
 
     Each keeps its own time where it begins after the one before; else its time is moved to begin
     `PAUSE` after it. Signals that one lacks are left out of all.
-
     recordings : sampled alike; at least one.   name : of the drive; None takes all their names.
     """
     first = recordings[0]
@@ -496,11 +495,6 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     stretches where each lasts a second and time leaps by more than 0.1 s between them. Over a
     shorter gap a reader draws a line, unless its map tells a shorter `longest_gap`, and shorter
     stretches it leaves out. The file appears whole or not at all; an existing one is replaced.
-
-    Returns
-    -------
-    Path
-        The file written.
     """
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
@@ -562,7 +556,6 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
 
     Time stamps that are that grid keep their bits. Those that only jitter about it, or drift by
     less than 1 % of a step, are replaced by it, and the values stay.
-
     t : rising time stamps [s], shape (n,).   columns : name -> values, shape (n,).
     dt : step of the grid [s].
     """

@@ -86,7 +86,6 @@ def learnt_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, f
     """Return the speed over ground per what a wheel shows, and the seconds that tell it.
 
     None where straight and even driving is too short, or does not agree on one number.
-
     t : time [s], (n,), rising.   v_x : speed over ground [m/s], (n,).   r : yaw rate [rad/s], (n,).
     wheel : what the wheel shows [rad/s or m/s], (n,).
     """

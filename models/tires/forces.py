@@ -14,11 +14,7 @@ Expression: TypeAlias = Any  # float, casadi.DM, SX or MX; CasADi has no stubs
 
 class TireForces(NamedTuple):
     """The force of the road on one wheel, in the wheel frame.
-
-    Attributes
-    ----------
-    F_x : longitudinal force, > 0 drives [N].
-    F_y : lateral force, > 0 to the left [N].
+    F_x : longitudinal force, > 0 drives [N].   F_y : lateral force, > 0 to the left [N].
     """
 
     F_x: Expression
@@ -72,7 +68,6 @@ def folded(alpha: Expression) -> Expression:
 
     tan α is the sideways over the absolute forward speed, so a wheel that rolls backwards, with
     |α| > π/2, slips by π - α.
-
     alpha : slip angle [rad], any real number.
     """
     return ca.atan2(ca.sin(alpha), ca.fabs(ca.cos(alpha)))
@@ -89,11 +84,7 @@ NO_FORCE = 1e-6  # N; rounds the root of a sum of squares at zero, so that its d
 
 class Slips(NamedTuple):
     """The demand of a tread that never slides, and the speed it refers to.
-
-    Attributes
-    ----------
-    p_x, p_y : C_κ κ and C_α tan α [N].
-    size : length of (p_x, p_y) [N], never zero.
+    p_x, p_y : C_κ κ and C_α tan α [N].   size : length of (p_x, p_y) [N], never zero.
     rolling : 1 + κ, rolling over forward speed [-], never zero.
     """
 

@@ -12,7 +12,6 @@ class LinearTire:
     """F_x = C_κ κ, F_y = C_α α while the wheel touches the ground.
 
     Load only decides about contact; friction and camber do nothing: no limit, by definition.
-
     C_alpha : cornering stiffness of one tire [N/rad], > 0.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0.
     """

@@ -87,7 +87,6 @@ def _unit_in_si(dimension: str, unit: str) -> float:
 
     Case and a plural s do not matter; from five letters on the beginning of a name will do,
     because some programs cut names after twelve letters.
-
     dimension : "LENGTH", "FORCE", "ANGLE", "MASS" or "TIME".
     """
     known = UNITS[dimension]
@@ -115,11 +114,7 @@ class TirError(TireidError, ValueError):
 
 class Entry(NamedTuple):
     """One `KEY = value` line.
-
-    Attributes
-    ----------
-    value : text without quotes and comment.
-    line : its number, from 1.
+    value : text without quotes and comment.   line : its number, from 1.
     section : the section it stands in, in capitals; empty before the first.
     """
 
@@ -302,12 +297,8 @@ class ValidRange:
 
 class _MagicFormulaFile(NamedTuple):
     """What a file tells about its tire.
-
-    Attributes
-    ----------
     coefficients : of the force equations, at the inflation pressure of the file.
-    side : of the car the file is valid for.
-    valid_range : of the measurement.
+    side : of the car the file is valid for.   valid_range : of the measurement.
     name : file name without extension.
     """
 

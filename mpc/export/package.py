@@ -90,7 +90,6 @@ def record(tracker: Tracker, steps: int = STEPS) -> Vectors:
 
     Numbers are rounded, and the car is computed without a function of a library: the record does
     not depend on the machine.
-
     tracker : in double; it is reset before, and steers.
     """
     tracker.reset()

@@ -48,7 +48,6 @@ def line_from_heading(
     """Integrate a heading that was sampled four times as fine as the line will be.
 
     X and Y by Boole's rule, whose error is of order spacing^6.
-
     psi : heading [rad], (4 n + 1,), at steps of spacing/4.
     kappa : dψ/ds at the same places [1/m], (4 n + 1,).   spacing : step of the line [m].
     start : X, Y of the first sample [m].

@@ -42,7 +42,6 @@ def fall_back(
 
     Minimizes Σ (e_y/`e_y`)² + (a/`acceleration`)² + (u/0.2 rad)², where a [m/s²] is the lateral
     acceleration of the steady turn that u steers: at speed, steering is worth less of it.
-
     period : between two steps [s].   delay : from a measurement until its command acts [s].
     e_y : deviation [m] that is worth as much as `acceleration`.   acceleration : lateral [m/s²].
     """
@@ -91,7 +90,6 @@ def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
 
     By structure-preserving doubling (Chu, Fan, Lin and Wang 2004), which converges quadratically
     and also for cars of which SciPy's Schur form is too ill-conditioned to be ordered.
-
     A : (n, n).   B : (n, m).   Q : (n, n), symmetric, not negative.
     R : (m, m), symmetric, positive.
     """

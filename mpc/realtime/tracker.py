@@ -22,7 +22,6 @@ class Tracker:
 
     The command of a step acts `delay` after its measurement, and is held for a period. What is
     steered is a ramp to the solver, so that it plans from half a period before.
-
     problem : what to minimize; None takes the default.
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
@@ -181,7 +180,6 @@ class Tracker:
 
         The step is a sweep then: its `solve_time_s` is the latency from measurement to command. On
         another road than it is told with the measurement, or without a plan, it does all itself.
-
         kappa : curvature [1/m] that the next measurement will tell, at `times`, (N + 1,).
         v_x : speed [m/s] that it will tell, (N + 1,).
         """

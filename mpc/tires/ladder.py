@@ -41,7 +41,6 @@ class LadderAxles(TireStructure):
     δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. β [rad]: mounting angle of its sensor.
     g: relative error of the steering. They were learnt as errors of sensors, and the tracker reads
     the same sensors.
-
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
     """
 
@@ -255,7 +254,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     Load transfer and camber are quasi-steady; drive forces are left out. With downforce curves are
     those of the static load, and forces in proportion with load. The sedan's Magic
     Formula is fitted to 0.2 % of its peak, a tire with a kink, as Dugoff's, to 1.2 %.
-
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
     """

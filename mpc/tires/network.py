@@ -19,7 +19,6 @@ class NetworkAxles(SmallSlip):
     """w = [C_f, C_r, U Ŵ by columns (2, n_h), V̂ diag(1/scale) by columns (n_h, n_in)].
 
     The force unit and the scales of the inputs are in the weights: they cost no operation.
-
     hidden : number of hidden units n_h.
     inputs : signals of x̄, of `identifier.paper.network.SIGNALS`.
     """

@@ -83,7 +83,6 @@ class TireStructure:
         """Return the weights where friction is another; None where that is not offered.
 
         Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and slip of the peak shrink.
-
         weights : (n_weights,).   ratio : friction over the one that the weights have [-].
         """
         del weights, ratio
@@ -171,7 +170,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     """Return how far the curves of a tire are believed, and how they go on.
 
     They go on straight, but never with less than 4 % of their slope at zero.
-
     most : slip beyond which no curve is believed [rad], front and rear.
     """
     slopes = curve_slopes(tire)
