@@ -216,15 +216,9 @@ def load_ratio(downforce: Any, v_x: Any) -> Any:
 
 
 __all__ = [
-    "GRAVITY",
-    "BicycleParameters",
-    "Chassis",
-    "Vehicle",
-    "VehicleError",
-    "estimate",
-    "sedan",
+    "GRAVITY", "BicycleParameters", "Chassis", "Vehicle", "VehicleError", "estimate", "sedan",
     "vehicle_template",
-]
+]  # fmt: skip
 
 
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:

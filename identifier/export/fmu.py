@@ -137,13 +137,9 @@ def model_files(specialized: SpecializedStep) -> dict[str, str]:
 
 # What a unit is made of in SI, as attributes of BaseUnit; a radian counts as one of its own.
 UNITS: Mapping[str, Mapping[str, int]] = {
-    "s": {"s": 1},
-    "m/s": {"m": 1, "s": -1},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "m/s^2": {"m": 1, "s": -2},
-    "N": {"kg": 1, "m": 1, "s": -2},
-}
+    "s": {"s": 1}, "m/s": {"m": 1, "s": -1}, "rad": {"rad": 1}, "rad/s": {"rad": 1, "s": -1},
+    "m/s^2": {"m": 1, "s": -2}, "N": {"kg": 1, "m": 1, "s": -2},
+}  # fmt: skip
 INPUT_REFERENCES = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
 DEGREES = 57.29577951308232  # of a radian: display units of angles
 

@@ -232,14 +232,11 @@ class PaperIdentifier(Method):
             "gains": asdict(self.gains),
             "network": asdict(self.network),
             "design": {
-                "input_source": self.input_source,
-                "integrator": self.integrator,
-                "dt_s": self.dt,
-                "force_unit_N": self.force_unit,
-                "min_speed_m_s": self.min_speed,
+                "input_source": self.input_source, "integrator": self.integrator, "dt_s": self.dt,
+                "force_unit_N": self.force_unit, "min_speed_m_s": self.min_speed,
             },
             "seed": self.seed,
-        }
+        }  # fmt: skip
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> NetworkModel:
         """Return the model with the carried weights.
@@ -375,34 +372,23 @@ def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> Pap
 COMMENTS = {
     "law": "integral | instantaneous | pi_lead",
     "input_source": "the state that the network reads: measured | estimated",
-    "integrator": "euler | rk4",
-    "dt": "s",
-    "force_unit": "N, the unit U of forces in the gains",
-    "min_speed": "m/s, below it learning rests",
-    "seed": "of the initial weights",
-    "A_d": "1/s, by rows, Hurwitz",
-    "forgetting": "1/s, lambda",
-    "eta_W": "1/s^4 (instantaneous: 1/s^3)",
-    "eta_V": "1/(U^2 s^4) (instantaneous: 1/(U^2 s^3))",
-    "rho_W": "1/(U s^2)",
-    "rho_V": "1/(U s^2)",
-    "W_max": "U, projection of W (inf: none)",
+    "integrator": "euler | rk4", "dt": "s", "force_unit": "N, the unit U of forces in the gains",
+    "min_speed": "m/s, below it learning rests", "seed": "of the initial weights",
+    "A_d": "1/s, by rows, Hurwitz", "forgetting": "1/s, lambda",
+    "eta_W": "1/s^4 (instantaneous: 1/s^3)", "eta_V": "1/(U^2 s^4) (instantaneous: 1/(U^2 s^3))",
+    "rho_W": "1/(U s^2)", "rho_V": "1/(U s^2)", "W_max": "U, projection of W (inf: none)",
     "V_max": "projection of V (inf: none)",
     "W_free": "U, dead zone of the leakage of W (0: all of W leaks, the paper's)",
     "V_free": "dead zone of the leakage of V (0: all of V leaks, the paper's)",
-    "lead": "s, tau of pi_lead",
-    "hidden": "units",
-    "inputs": "what the network reads",
-    "scale": "divisors of the inputs, SI",
-    "v_x": "m/s, give or take 5 %",
-    "slip": "rad, largest slip angle of an axle",
-    "friction": "largest of the road",
+    "lead": "s, tau of pi_lead", "hidden": "units", "inputs": "what the network reads",
+    "scale": "divisors of the inputs, SI", "v_x": "m/s, give or take 5 %",
+    "slip": "rad, largest slip angle of an axle", "friction": "largest of the road",
     "bandwidth": "Hz, highest frequency of the steering",
     "noise_v_x": "m/s, largest error of the sensor",
     "noise_v_y": "m/s, largest error of the sensor",
     "noise_r": "rad/s, largest error of the sensor",
     "noise_delta": "rad, largest error of the sensor",
-}
+}  # fmt: skip
 
 
 class DesignFileError(TireidError, ValueError):

@@ -45,17 +45,8 @@ PORTS = (
 OVER = ("x", "u", "v_x")
 LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
 GAINS = (
-    "eta_W",
-    "eta_V",
-    "rho_W",
-    "rho_V",
-    "forgetting",
-    "W_max",
-    "V_max",
-    "lead",
-    "W_free",
-    "V_free",
-)
+    "eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead", "W_free", "V_free",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

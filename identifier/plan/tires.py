@@ -70,14 +70,11 @@ class PlausibleTires:
             front = rear = neutral
         low, high = 1.0 - SPREAD, 1.0 + SPREAD
         cases = (
-            (front, rear, friction, 1.0),
-            (low * front, low * rear, friction, low),
-            (high * front, high * rear, friction, high),
-            (neutral, neutral, low * friction, high),
-            (front, rear, high * friction, low),
-            (low * front, high * rear, friction, high),
+            (front, rear, friction, 1.0), (low * front, low * rear, friction, low),
+            (high * front, high * rear, friction, high), (neutral, neutral, low * friction, high),
+            (front, rear, high * friction, low), (low * front, high * rear, friction, high),
             (low * front, low * rear, low * friction, 1.0),
-        )
+        )  # fmt: skip
         W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu, _ in cases]
         lag = _steering_lag_of(vehicle, steering_lag) * np.array([late for *_, late in cases])
         P = prior.covariance(vehicle, ladder)

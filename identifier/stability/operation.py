@@ -288,14 +288,10 @@ def largest_signals(
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
     v_y = vehicle.l_r * r + v_x * slip
     return {
-        "v_y": v_y,
-        "r": r,
-        "delta_f": slip + (v_y + vehicle.l_f * r) / v_x,
-        "delta_r": slip + (v_y + vehicle.l_r * r) / v_x,
-        "v_x": v_x,
-        "alpha_f": slip,
+        "v_y": v_y, "r": r, "delta_f": slip + (v_y + vehicle.l_f * r) / v_x,
+        "delta_r": slip + (v_y + vehicle.l_r * r) / v_x, "v_x": v_x, "alpha_f": slip,
         "alpha_r": slip,
-    }
+    }  # fmt: skip
 
 
 def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
@@ -374,14 +370,9 @@ def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float
     speed = driving.noise_v_x * (signals["v_y"] + vehicle.wheelbase * signals["r"]) / slow
     slip = driving.noise_delta + (sideways + speed) / (slow - driving.noise_v_x)
     noise = {
-        "v_y": driving.noise_v_y,
-        "r": driving.noise_r,
-        "delta_f": driving.noise_delta,
-        "delta_r": driving.noise_delta,
-        "v_x": driving.noise_v_x,
-        "alpha_f": slip,
-        "alpha_r": slip,
-    }
+        "v_y": driving.noise_v_y, "r": driving.noise_r, "delta_f": driving.noise_delta,
+        "delta_r": driving.noise_delta, "v_x": driving.noise_v_x, "alpha_f": slip, "alpha_r": slip,
+    }  # fmt: skip
     assert design.network.scale is not None
     named = zip(design.network.inputs, design.network.scale, strict=True)
     return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))

@@ -7,19 +7,7 @@ from identifier.verdict.judging import judge, judge_prediction, judge_taught
 from identifier.verdict.verdict import Number, Objection, Verdict, WindowForces
 
 __all__ = [
-    "BoundViolatedError",
-    "Number",
-    "Objection",
-    "Road",
-    "RoadFriction",
-    "Verdict",
-    "WindowForces",
-    "calibrated",
-    "contradictions",
-    "guaranteed",
-    "judge",
-    "judge_prediction",
-    "judge_taught",
-    "road_friction",
-    "within_band",
-]
+    "BoundViolatedError", "Number", "Objection", "Road", "RoadFriction", "Verdict", "WindowForces",
+    "calibrated", "contradictions", "guaranteed", "judge", "judge_prediction", "judge_taught",
+    "road_friction", "within_band",
+]  # fmt: skip

@@ -168,16 +168,9 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
 
 def _findings(asked: Asked) -> list[Objection]:
     rules = (
-        _v_y_stuck,
-        _no_force,
-        _missed,
-        _left_out,
-        _unsure,
-        _no_tire,
-        _beyond,
-        _turning,
+        _v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning,
         _unobserved,
-    )
+    )  # fmt: skip
     return [finding for rule in rules for finding in rule(asked)]
 
 

@@ -65,30 +65,20 @@ KNOWN = {
 }
 # By package-free type and field: the unit of it and of all in it.
 UNITS = {
-    ("Twist", "linear"): "m/s",
-    ("Twist", "angular"): "rad/s",
-    ("Accel", "linear"): "m/s^2",
-    ("Accel", "angular"): "rad/s^2",
-    ("Pose", "position"): "m",
-    ("Imu", "angular_velocity"): "rad/s",
-    ("Imu", "linear_acceleration"): "m/s^2",
+    ("Twist", "linear"): "m/s", ("Twist", "angular"): "rad/s", ("Accel", "linear"): "m/s^2",
+    ("Accel", "angular"): "rad/s^2", ("Pose", "position"): "m",
+    ("Imu", "angular_velocity"): "rad/s", ("Imu", "linear_acceleration"): "m/s^2",
     ("AckermannDrive", "steering_angle"): "rad",
-    ("AckermannDrive", "steering_angle_velocity"): "rad/s",
-    ("AckermannDrive", "speed"): "m/s",
-    ("AckermannDrive", "acceleration"): "m/s^2",
-    ("AckermannDrive", "jerk"): "m/s^3",
+    ("AckermannDrive", "steering_angle_velocity"): "rad/s", ("AckermannDrive", "speed"): "m/s",
+    ("AckermannDrive", "acceleration"): "m/s^2", ("AckermannDrive", "jerk"): "m/s^3",
     ("SteeringReport", "steering_tire_angle"): "rad",
     ("VelocityReport", "longitudinal_velocity"): "m/s",
-    ("VelocityReport", "lateral_velocity"): "m/s",
-    ("VelocityReport", "heading_rate"): "rad/s",
-}
+    ("VelocityReport", "lateral_velocity"): "m/s", ("VelocityReport", "heading_rate"): "rad/s",
+}  # fmt: skip
 PACKAGES = (
-    "geometry_msgs",
-    "sensor_msgs",
-    "ackermann_msgs",
-    "autoware_vehicle_msgs",
+    "geometry_msgs", "sensor_msgs", "ackermann_msgs", "autoware_vehicle_msgs",
     "autoware_auto_vehicle_msgs",
-)
+)  # fmt: skip
 
 
 class _Topic(NamedTuple):

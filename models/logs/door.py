@@ -21,13 +21,10 @@ ENDINGS = (
     ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".npz", ".npy",
 )  # fmt: skip
 OPENERS = {
-    "parquet": "models.logs.parquet:open_parquet",
-    "mdf": "models.logs.mdf:open_",
-    "matlab": "models.logs.matlab:open_",
-    "bag": "models.logs.bag:open_",
-    "can": "models.logs.can:open_",
-    "text": "models.logs.text:open_text",
-}
+    "parquet": "models.logs.parquet:open_parquet", "mdf": "models.logs.mdf:open_",
+    "matlab": "models.logs.matlab:open_", "bag": "models.logs.bag:open_",
+    "can": "models.logs.can:open_", "text": "models.logs.text:open_text",
+}  # fmt: skip
 _JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
 _RATED = ("text", "parquet", "matlab")  # which may lack a time
 

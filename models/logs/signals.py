@@ -48,26 +48,15 @@ COLUMNS = {
 }  # what a column is called where it differs
 MEANINGS: Mapping[str, str] = MappingProxyType(
     {
-        "v_x": "forward speed",
-        "v_y": "lateral velocity",
-        BETA: "sideslip angle",
-        "r": "yaw rate",
-        "delta_f": "front steering angle",
-        "delta_r": "rear steering angle",
-        "a_y": "lateral acceleration",
-        "a_x": "longitudinal acceleration",
-        "x": "position",
-        "y": "position",
-        "heading": "heading",
-        "Fyf": "front axle force",
-        "Fyr": "rear axle force",
-        "wheel_fl": "speed of the front left wheel",
-        "wheel_fr": "speed of the front right wheel",
-        "wheel_rl": "speed of the rear left wheel",
-        "wheel_rr": "speed of the rear right wheel",
+        "v_x": "forward speed", "v_y": "lateral velocity", BETA: "sideslip angle", "r": "yaw rate",
+        "delta_f": "front steering angle", "delta_r": "rear steering angle",
+        "a_y": "lateral acceleration", "a_x": "longitudinal acceleration", "x": "position",
+        "y": "position", "heading": "heading", "Fyf": "front axle force", "Fyr": "rear axle force",
+        "wheel_fl": "speed of the front left wheel", "wheel_fr": "speed of the front right wheel",
+        "wheel_rl": "speed of the rear left wheel", "wheel_rr": "speed of the rear right wheel",
         "wheel": "speed of the wheels, by one encoder",
     }
-)
+)  # fmt: skip
 SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 

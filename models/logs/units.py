@@ -16,14 +16,9 @@ SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
 ACCELERATION, FORCE, TIME, LENGTH = "acceleration", "force", "time", "length"
 TURNS = "rate of turns"  # of wheels; in rad/s it is called a rate as that of yaw
 SI = {
-    SPEED: "m/s",
-    ANGLE: "rad",
-    RATE: "rad/s",
-    ACCELERATION: "m/s^2",
-    FORCE: "N",
-    TIME: "s",
+    SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "N", TIME: "s",
     LENGTH: "m",
-}
+}  # fmt: skip
 
 TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.

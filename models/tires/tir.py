@@ -26,23 +26,13 @@ from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 # Q.., L..) are dimensionless or in radian whatever [UNITS] says: their equations are in SI.
 
 _DIMENSIONS: Mapping[str, Mapping[str, int]] = {
-    "FNOMIN": {"FORCE": 1},
-    "FZMIN": {"FORCE": 1},
-    "FZMAX": {"FORCE": 1},
-    "UNLOADED_RADIUS": {"LENGTH": 1},
-    "WIDTH": {"LENGTH": 1},
-    "RIM_RADIUS": {"LENGTH": 1},
-    "RIM_WIDTH": {"LENGTH": 1},
-    "ALPMIN": {"ANGLE": 1},
-    "ALPMAX": {"ANGLE": 1},
-    "CAMMIN": {"ANGLE": 1},
-    "CAMMAX": {"ANGLE": 1},
-    "LONGVL": {"LENGTH": 1, "TIME": -1},
-    "VXLOW": {"LENGTH": 1, "TIME": -1},
-    "VERTICAL_STIFFNESS": {"FORCE": 1, "LENGTH": -1},
-    "VERTICAL_DAMPING": {"FORCE": 1, "TIME": 1, "LENGTH": -1},
-    "MBELT": {"MASS": 1},
-}
+    "FNOMIN": {"FORCE": 1}, "FZMIN": {"FORCE": 1}, "FZMAX": {"FORCE": 1},
+    "UNLOADED_RADIUS": {"LENGTH": 1}, "WIDTH": {"LENGTH": 1}, "RIM_RADIUS": {"LENGTH": 1},
+    "RIM_WIDTH": {"LENGTH": 1}, "ALPMIN": {"ANGLE": 1}, "ALPMAX": {"ANGLE": 1},
+    "CAMMIN": {"ANGLE": 1}, "CAMMAX": {"ANGLE": 1}, "LONGVL": {"LENGTH": 1, "TIME": -1},
+    "VXLOW": {"LENGTH": 1, "TIME": -1}, "VERTICAL_STIFFNESS": {"FORCE": 1, "LENGTH": -1},
+    "VERTICAL_DAMPING": {"FORCE": 1, "TIME": 1, "LENGTH": -1}, "MBELT": {"MASS": 1},
+}  # fmt: skip
 
 _POUND = 0.45359237  # kg
 _GRAVITY = 9.80665  # m/s², standard

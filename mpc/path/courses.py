@@ -227,10 +227,7 @@ def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Ar
 
 BUILT_IN: Mapping[str, Callable[[], Path]] = MappingProxyType(
     {
-        "iso-3888-1": iso_3888_1,
-        "iso-3888-2": iso_3888_2,
-        "slalom": slalom,
-        "circle": constant_radius,
-        "course": handling_course,
+        "iso-3888-1": iso_3888_1, "iso-3888-2": iso_3888_2, "slalom": slalom,
+        "circle": constant_radius, "course": handling_course,
     }
-)
+)  # fmt: skip

@@ -156,15 +156,9 @@ def _generator() -> str:
 
 # -O3 is twice as fast as -O2 here; the rest as in `codegen.compiler.FLAGS`.
 FLAGS = (
-    "-std=c99",
-    "-O3",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-fno-signed-zeros",
-    "-ffp-contract=off",
-    "-fPIC",
-    "-shared",
-)
+    "-std=c99", "-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros",
+    "-ffp-contract=off", "-fPIC", "-shared",
+)  # fmt: skip
 
 
 class NoCompilerError(TireidError, RuntimeError):

@@ -70,12 +70,9 @@ def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
 
 
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
-    NetworkModel.kind: network_tire,
-    AxleModel.kind: axle_tire,
-    FittedModel.kind: fit_tire,
-    CurveModel.kind: _curve_tire,
-    OnnxModel.kind: onnx_tire,
-}
+    NetworkModel.kind: network_tire, AxleModel.kind: axle_tire, FittedModel.kind: fit_tire,
+    CurveModel.kind: _curve_tire, OnnxModel.kind: onnx_tire,
+}  # fmt: skip
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,
     DugoffTire: _limited,

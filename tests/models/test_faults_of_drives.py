@@ -38,21 +38,14 @@ T = 0.01 * np.arange(2001)
 STEER = RandomSteer(amplitude=0.08, frequency=0.5, seed=3, onset=1.0, rate_limit=2.0, duration=12.0)
 BIAS = SensorFault(channel="v_y", kind="biased", size=0.3)
 ALL = (
-    BIAS,
-    WrongUnit(channel="r", unit="deg"),
-    Mirrored(channels=("v_y", "a_y")),
-    Late(channels=("delta_f",), delay=0.02),
-    Lagging(channels=("r",), time_constant=0.38),
-    Held(channels=(), every=0.1, lasts=0.1),
-    Jitter(size=0.02),
-    ClockJump(at=5.0, size=0.5),
-    Misaligned(angle=0.01),
-    SensorElsewhere(sensor="velocity", x=0.5, y=0.2),
+    BIAS, WrongUnit(channel="r", unit="deg"), Mirrored(channels=("v_y", "a_y")),
+    Late(channels=("delta_f",), delay=0.02), Lagging(channels=("r",), time_constant=0.38),
+    Held(channels=(), every=0.1, lasts=0.1), Jitter(size=0.02), ClockJump(at=5.0, size=0.5),
+    Misaligned(angle=0.01), SensorElsewhere(sensor="velocity", x=0.5, y=0.2),
     SensorElsewhere(sensor="accelerometer", x=0.5, y=0.2),
-    Bank(vehicle=CAR, angle=0.05, period=20.0),
-    Together(faults=(BIAS, Misaligned(angle=0.01))),
+    Bank(vehicle=CAR, angle=0.05, period=20.0), Together(faults=(BIAS, Misaligned(angle=0.01))),
     Passing(fault=BIAS, until=2.0, fade=1.0),
-)
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

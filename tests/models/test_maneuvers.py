@@ -19,13 +19,10 @@ from models.maneuvers import (
 
 COMMON = {"amplitude": 0.1, "onset": 1.003, "rate_limit": 0.7, "duration": 12.0}
 ALL = [
-    StepSteer(**COMMON),
-    TwoStepSteer(**COMMON, second_share=0.5, second_onset=5.0),
-    Slalom(**COMMON, frequency=0.6),
-    DoubleLaneChange(**COMMON, frequency=0.5, pause=1.2),
-    SlowlyIncreasingSteer(**COMMON, rate=0.02),
-    RandomSteer(**COMMON, frequency=1.0, seed=3),
-]
+    StepSteer(**COMMON), TwoStepSteer(**COMMON, second_share=0.5, second_onset=5.0),
+    Slalom(**COMMON, frequency=0.6), DoubleLaneChange(**COMMON, frequency=0.5, pause=1.2),
+    SlowlyIncreasingSteer(**COMMON, rate=0.02), RandomSteer(**COMMON, frequency=1.0, seed=3),
+]  # fmt: skip
 NAMES = [type(m).__name__ for m in ALL]
 every_maneuver = pytest.mark.parametrize("maneuver", ALL, ids=NAMES)
 

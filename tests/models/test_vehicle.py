@@ -38,16 +38,12 @@ def test_a_number_that_is_not_positive_and_finite_is_refused_by_name(key, value)
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("roll_stiffness_front_share", 1.01),
-        ("drive_front_share", -0.01),
-        ("drive_front_share", math.nan),
-        ("brake_front_share", 1.01),
-        ("roll_center_height_front", 0.6),
-        ("roll_camber_rear", math.nan),
-        ("relaxation_length_rear", 0.0),
-        ("roll_damping", math.nan),
+        ("roll_stiffness_front_share", 1.01), ("drive_front_share", -0.01),
+        ("drive_front_share", math.nan), ("brake_front_share", 1.01),
+        ("roll_center_height_front", 0.6), ("roll_camber_rear", math.nan),
+        ("relaxation_length_rear", 0.0), ("roll_damping", math.nan),
     ],
-)
+)  # fmt: skip
 def test_a_chassis_value_outside_its_range_is_refused_by_name(key, value):
     with pytest.raises(VehicleError, match=key):
         replace(sedan().require_chassis(), **{key: value})
@@ -160,13 +156,10 @@ def test_no_physical_value_of_a_chassis_has_a_default():
 @pytest.mark.parametrize(
     ("key", "factor"),
     [
-        ("yaw_inertia", 1e-3),
-        ("mass", 1e-3),
-        ("cornering_stiffness_front", 1e-3),
-        ("cornering_stiffness_rear", 1 / 57.3),
-        ("cornering_stiffness_rear", 100.0),
+        ("yaw_inertia", 1e-3), ("mass", 1e-3), ("cornering_stiffness_front", 1e-3),
+        ("cornering_stiffness_rear", 1 / 57.3), ("cornering_stiffness_rear", 100.0),
     ],
-)
+)  # fmt: skip
 def test_a_value_in_another_unit_is_refused(key, factor):
     car = sedan()
     with pytest.raises(VehicleError, match="check the units"):
@@ -290,13 +283,10 @@ def test_the_chassis_tells_what_the_car_does_not():
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("cg_height", 2.0),
-        ("cg_height", -0.1),
-        ("drive_front_share", 1.1),
-        ("brake_front_share", math.nan),
-        ("drag_area", 70.0),
+        ("cg_height", 2.0), ("cg_height", -0.1), ("drive_front_share", 1.1),
+        ("brake_front_share", math.nan), ("drag_area", 70.0),
     ],
-)
+)  # fmt: skip
 def test_what_braking_wants_to_know_is_refused_by_name_where_no_car_has_it(key, value):
     with pytest.raises(VehicleError, match=key):
         replace(sedan(), **{key: value})

@@ -25,20 +25,11 @@ from tireid.diagnoses import NAMES
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
 SIZED = {
-    "offset v_y": 0.008,
-    "offset r": 0.0015,
-    "offset a_y": 0.01,
-    "offset delta_f": 0.0008,
-    "factor v_x": 0.025,
-    "factor delta_f": 0.02,
-    "delay r": 0.003,
-    "delay delta_f": 0.003,
-    "delay a_y": 0.004,
-    "misaligned": 0.0006,
-    "velocity sensor": 0.06,
-    "accelerometer": 0.04,
+    "offset v_y": 0.008, "offset r": 0.0015, "offset a_y": 0.01, "offset delta_f": 0.0008,
+    "factor v_x": 0.025, "factor delta_f": 0.02, "delay r": 0.003, "delay delta_f": 0.003,
+    "delay a_y": 0.004, "misaligned": 0.0006, "velocity sensor": 0.06, "accelerometer": 0.04,
     "bank": 0.003,
-}
+}  # fmt: skip
 
 
 def found_in(log, car):

@@ -10,29 +10,17 @@ from identifier.stability.sampled_bound import Disturbance
 from tests.identifier.stability.storage import pi_lead
 
 TASK = {
-    "bandwidth": 0.7,
-    "dt": 0.01,
-    "n_h": 10,
-    "x_bar_max": 2.5,
-    "disturbance": Disturbance(residual=4.0),
-    "needed_force": 4.0,
-    "V_max": 12.0,
-}
+    "bandwidth": 0.7, "dt": 0.01, "n_h": 10, "x_bar_max": 2.5,
+    "disturbance": Disturbance(residual=4.0), "needed_force": 4.0, "V_max": 12.0,
+}  # fmt: skip
 
 
 def operation(**changes):
     settings = {
-        "n_h": 10,
-        "dt": 0.01,
-        "integrator": "euler",
-        "bandwidth": 0.7,
-        "disturbance": Disturbance(residual=4.0),
-        "needed_force": 4.0,
-        "x_bar_max": 2.5,
-        "input_feedback": None,
-        "W_M": 3.0,
-        "w_bar": 0.2,
-    }
+        "n_h": 10, "dt": 0.01, "integrator": "euler", "bandwidth": 0.7,
+        "disturbance": Disturbance(residual=4.0), "needed_force": 4.0, "x_bar_max": 2.5,
+        "input_feedback": None, "W_M": 3.0, "w_bar": 0.2,
+    }  # fmt: skip
     return Operation(**{**settings, **changes})
 
 

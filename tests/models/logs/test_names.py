@@ -266,20 +266,15 @@ def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none() 
 @pytest.mark.parametrize(
     ("signal", "name", "size", "unit"),
     [
-        ("r", "YawRate", 37.0, "deg/s"),
-        ("r", "YawRate", 2.0, ""),
-        ("v_x", "Speed", 180.0, "km/h"),
-        ("v_x", "Speed", 60.0, ""),
-        ("beta", "Slip_Angle", 9.0, "deg"),
-        ("beta", "Slip_Angle", 0.2, ""),
-        ("delta_f", "RoadWheelAngle", 12.0, "deg"),
-        ("delta_f", "RoadWheelAngle", 0.3, ""),
+        ("r", "YawRate", 37.0, "deg/s"), ("r", "YawRate", 2.0, ""),
+        ("v_x", "Speed", 180.0, "km/h"), ("v_x", "Speed", 60.0, ""),
+        ("beta", "Slip_Angle", 9.0, "deg"), ("beta", "Slip_Angle", 0.2, ""),
+        ("delta_f", "RoadWheelAngle", 12.0, "deg"), ("delta_f", "RoadWheelAngle", 0.3, ""),
         ("delta_f", "SteeringWheelAngle", 102.0, "deg"),
-        ("delta_f", "SteeringWheelAngle", 6.0, ""),
-        ("a_y", "Lat_Acc", 1.05, "g"),
+        ("delta_f", "SteeringWheelAngle", 6.0, ""), ("a_y", "Lat_Acc", 1.05, "g"),
         ("a_y", "Lat_Acc", 8.0, ""),
     ],
-)
+)  # fmt: skip
 def test_without_a_unit_that_is_proposed_which_the_range_allows_and_none_is_sure(
     signal: str, name: str, size: float, unit: str
 ) -> None:
