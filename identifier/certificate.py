@@ -102,15 +102,9 @@ def at_least(value: float, *, good: float, bad: float | None) -> Status:
 def statement(name: str, title: str, value: float, unit: str, advice: str = "") -> Property:
     """Return a property that is only stated: it has no limit and passes."""
     return Property(
-        name=name,
-        title=title,
-        value=value,
-        limit=None,
-        margin=None,
-        status="pass",
-        unit=unit,
+        name=name, title=title, value=value, limit=None, margin=None, status="pass", unit=unit,
         advice=advice,
-    )
+    )  # fmt: skip
 
 
 def _finite(value: float | None) -> float | None:

@@ -664,12 +664,9 @@ class TireModel(ABC):
         delta, v_x, dt = ca.MX.sym("delta"), ca.MX.sym("v_x"), ca.MX.sym("dt")
         x_dot, force = self._motion(x, delta, v_x, 0.0)
         dynamics = ca.Function(
-            "car_dynamics",
-            [x, delta, v_x],
-            [x_dot, force],
-            ["x", "delta", "v_x"],
+            "car_dynamics", [x, delta, v_x], [x_dot, force], ["x", "delta", "v_x"],
             ["x_dot", "axle_force"],
-        )
+        )  # fmt: skip
         rate = ca.Function("rate", [x, delta, v_x, dt], [self._motion(x, delta, v_x, dt / 2)[0]])
         at = (delta, v_x, dt)
         k1 = rate(x, *at)
@@ -677,12 +674,9 @@ class TireModel(ABC):
         k3 = rate(x + dt / 2 * k2, *at)
         k4 = rate(x + dt * k3, *at)
         step = ca.Function(
-            "car_step",
-            [x, *at],
-            [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)],
-            ["x", "delta", "v_x", "dt"],
-            ["x_next"],
-        )
+            "car_step", [x, *at], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)],
+            ["x", "delta", "v_x", "dt"], ["x_next"],
+        )  # fmt: skip
         return _TireFunctions(self._force_curve(), dynamics.expand(), step.expand())
 
     def _force_curve(self) -> ca.Function:

@@ -116,12 +116,9 @@ class TwoStepSteer:
     @property
     def _first(self) -> StepSteer:
         return StepSteer(
-            amplitude=self.amplitude,
-            onset=self.onset,
-            rate_limit=self.rate_limit,
-            duration=self.duration,
-            rear_ratio=self.rear_ratio,
-        )
+            amplitude=self.amplitude, onset=self.onset, rate_limit=self.rate_limit,
+            duration=self.duration, rear_ratio=self.rear_ratio,
+        )  # fmt: skip
 
     def steering(self, t: Array) -> Array:
         change = (self.second_share - 1.0) * self.amplitude

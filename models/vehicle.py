@@ -76,56 +76,32 @@ class Chassis:
 
     def __post_init__(self) -> None:
         require_positive(
-            VehicleError,
-            track_front=self.track_front,
-            track_rear=self.track_rear,
-            cg_height=self.cg_height,
-            roll_stiffness=self.roll_stiffness,
-            roll_damping=self.roll_damping,
-            roll_inertia=self.roll_inertia,
+            VehicleError, track_front=self.track_front, track_rear=self.track_rear,
+            cg_height=self.cg_height, roll_stiffness=self.roll_stiffness,
+            roll_damping=self.roll_damping, roll_inertia=self.roll_inertia,
             relaxation_length_front=self.relaxation_length_front,
-            relaxation_length_rear=self.relaxation_length_rear,
-            steering_lag=self.steering_lag,
-        )
+            relaxation_length_rear=self.relaxation_length_rear, steering_lag=self.steering_lag,
+        )  # fmt: skip
         require_within(
-            VehicleError,
-            1e-3,
-            30.0,
-            track_front=self.track_front,
-            track_rear=self.track_rear,
+            VehicleError, 1e-3, 30.0, track_front=self.track_front, track_rear=self.track_rear,
             cg_height=self.cg_height,
-        )
+        )  # fmt: skip
         require_within(
-            VehicleError,
-            1e-9,
-            1e12,
-            roll_stiffness=self.roll_stiffness,
-            roll_damping=self.roll_damping,
-            roll_inertia=self.roll_inertia,
-        )
+            VehicleError, 1e-9, 1e12, roll_stiffness=self.roll_stiffness,
+            roll_damping=self.roll_damping, roll_inertia=self.roll_inertia,
+        )  # fmt: skip
         require_within(
-            VehicleError,
-            1e-4,
-            100.0,
-            relaxation_length_front=self.relaxation_length_front,
-            relaxation_length_rear=self.relaxation_length_rear,
-            steering_lag=self.steering_lag,
-        )
+            VehicleError, 1e-4, 100.0, relaxation_length_front=self.relaxation_length_front,
+            relaxation_length_rear=self.relaxation_length_rear, steering_lag=self.steering_lag,
+        )  # fmt: skip
         require_within(
-            VehicleError,
-            0.0,
-            1.0,
-            roll_stiffness_front_share=self.roll_stiffness_front_share,
-            drive_front_share=self.drive_front_share,
-            brake_front_share=self.brake_front_share,
-        )
+            VehicleError, 0.0, 1.0, roll_stiffness_front_share=self.roll_stiffness_front_share,
+            drive_front_share=self.drive_front_share, brake_front_share=self.brake_front_share,
+        )  # fmt: skip
         require_within(
-            VehicleError,
-            -1.0,
-            1.0,
-            roll_camber_front=self.roll_camber_front,
+            VehicleError, -1.0, 1.0, roll_camber_front=self.roll_camber_front,
             roll_camber_rear=self.roll_camber_rear,
-        )
+        )  # fmt: skip
         require_within(
             VehicleError,
             0.0,
@@ -303,14 +279,10 @@ class Vehicle:
             if name not in RULES:
                 raise VehicleError(f"estimated must be of {', '.join(RULES)}, not {shown(name)}")
         require_positive(
-            VehicleError,
-            mass=self.mass,
-            yaw_inertia=self.yaw_inertia,
-            l_f=self.l_f,
-            l_r=self.l_r,
+            VehicleError, mass=self.mass, yaw_inertia=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
             cornering_stiffness_front=self.cornering_stiffness_front,
             cornering_stiffness_rear=self.cornering_stiffness_rear,
-        )
+        )  # fmt: skip
         self._require_plausible()
         if self.chassis is not None:
             tipping = self.weight * self.roll_arm
@@ -455,13 +427,9 @@ class Vehicle:
     def bicycle(self) -> BicycleParameters:
         """The six numbers of the linear bicycle in the paper's letters."""
         return BicycleParameters(
-            m=self.mass,
-            I_z=self.yaw_inertia,
-            l_f=self.l_f,
-            l_r=self.l_r,
-            C_f=self.cornering_stiffness_front,
-            C_r=self.cornering_stiffness_rear,
-        )
+            m=self.mass, I_z=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
+            C_f=self.cornering_stiffness_front, C_r=self.cornering_stiffness_rear,
+        )  # fmt: skip
 
     def require_chassis(self) -> Chassis:
         """Return the chassis to who cannot do without.

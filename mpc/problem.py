@@ -126,13 +126,9 @@ class Limits:
 
     def __post_init__(self) -> None:
         require_positive(
-            ValueError,
-            steering=self.steering,
-            steering_rate=self.steering_rate,
-            e_y=self.e_y,
-            soft_e_y=self.soft_e_y,
-            soft_slip=self.soft_slip,
-        )
+            ValueError, steering=self.steering, steering_rate=self.steering_rate, e_y=self.e_y,
+            soft_e_y=self.soft_e_y, soft_slip=self.soft_slip,
+        )  # fmt: skip
         if len(self.slip) != 2 or not all(0.0 < value < np.inf for value in self.slip):
             raise ValueError(f"slip must be two positive numbers, it is {self.slip}")
 

@@ -115,11 +115,7 @@ CHANGES = (
     _unit("deg", DEGREE, "r", "delta_f"),
     *(
         Change(
-            code="sideslip",
-            channels=("v_y",),
-            unit=unit,
-            factors=(("v_y", one),),
-            sideslip=True,
+            code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True,
             price=price,
         )
         for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, _UNUSUAL))
@@ -127,7 +123,7 @@ CHANGES = (
     _unit("deg", DEGREE, "delta_f"),
     *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),
     _sign("v_x", "v_y"),
-)
+)  # fmt: skip
 _ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y"))
 
 

@@ -207,15 +207,12 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
         ),
         _constant(11, "sample_time", "s", specialized.dt, "sampling interval, inside and fixed"),
         _constant(
-            12,
-            "min_speed",
-            "m/s",
-            specialized.min_speed,
+            12, "min_speed", "m/s", specialized.min_speed,
             "below it forces are zero, learning rests",
         ),
         *_side_slip(specialized),
         *_band(specialized),
-    )
+    )  # fmt: skip
 
 
 def _side_slip(specialized: SpecializedStep) -> Iterator[Variable]:

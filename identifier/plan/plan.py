@@ -234,12 +234,9 @@ def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None)
     """
     f = SLALOM / vehicle.froude_time if frequency is None else frequency
     return lambda amplitude: Slalom(
-        amplitude=amplitude,
-        frequency=f,
-        onset=0.0,
-        rate_limit=2.1 * math.pi * f * amplitude,
+        amplitude=amplitude, frequency=f, onset=0.0, rate_limit=2.1 * math.pi * f * amplitude,
         duration=duration,
-    )
+    )  # fmt: skip
 
 
 def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
@@ -248,13 +245,9 @@ def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
     """
     f = 1.5 * SLALOM / vehicle.froude_time
     return lambda amplitude: RandomSteer(
-        amplitude=amplitude,
-        frequency=f,
-        seed=seed,
-        onset=0.0,
-        rate_limit=2.1 * math.pi * f * amplitude,
-        duration=duration,
-    )
+        amplitude=amplitude, frequency=f, seed=seed, onset=0.0,
+        rate_limit=2.1 * math.pi * f * amplitude, duration=duration,
+    )  # fmt: skip
 
 
 def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> tuple[Rival, ...]:

@@ -164,13 +164,9 @@ def drift_check(
     advice = ""
     if operation.bandwidth > limit:
         leakage = sufficient_leakage(
-            A_d=gains.matrix,
-            forgetting=gains.forgetting,
-            law=law,
-            eta_W=gains.eta_W,
-            n_h=operation.n_h,
-            direction=direction,
-        )
+            A_d=gains.matrix, forgetting=gains.forgetting, law=law, eta_W=gains.eta_W,
+            n_h=operation.n_h, direction=direction,
+        )  # fmt: skip
         advice = f"raise A_d and forgetting; a leakage of {leakage:.3g} 1/s would stop the drift"
     return Property(
         name="drift",
@@ -303,13 +299,10 @@ def _stated(proven: Proven) -> list[Property]:
     if proven.projection is not None:
         entries.append(
             statement(
-                "projection_bound",
-                "proven bound of |xi - xi_hat| by the projection",
-                proven.projection.xi_tilde,
-                "U s",
-                _CONDITION,
+                "projection_bound", "proven bound of |xi - xi_hat| by the projection",
+                proven.projection.xi_tilde, "U s", _CONDITION,
             )
-        )
+        )  # fmt: skip
     if not math.isfinite(proven.xi_tilde):
         entries.append(
             _unproven(
@@ -335,15 +328,9 @@ def _stated(proven: Proven) -> list[Property]:
 
 def _unproven(name: str, title: str, unit: str, advice: str) -> Property:
     return Property(
-        name=name,
-        title=title,
-        value=math.inf,
-        limit=None,
-        margin=None,
-        status="warn",
-        unit=unit,
+        name=name, title=title, value=math.inf, limit=None, margin=None, status="warn", unit=unit,
         advice=advice,
-    )
+    )  # fmt: skip
 
 
 def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
@@ -364,14 +351,9 @@ def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: 
     """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
     resting = math.sqrt(operation.n_h) * gains.W_free
     capacity = resting + steady_capacity(
-        gains.matrix,
-        law=law,
-        forgetting=gains.forgetting,
-        eta_W=gains.eta_W,
-        rho_W=gains.rho_W,
-        n_h=operation.n_h,
-        direction=direction,
-    )
+        gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
+        n_h=operation.n_h, direction=direction,
+    )  # fmt: skip
     need = operation.needed_force
     enough = capacity >= need
     return Property(

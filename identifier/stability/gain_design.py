@@ -120,14 +120,9 @@ def design_gains(
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
     require_positive(
-        ValueError,
-        bandwidth=bandwidth,
-        dt=dt,
-        x_bar_max=x_bar_max,
-        needed_force=needed_force,
-        V_max=V_max,
-        capacity=capacity,
-    )
+        ValueError, bandwidth=bandwidth, dt=dt, x_bar_max=x_bar_max, needed_force=needed_force,
+        V_max=V_max, capacity=capacity,
+    )  # fmt: skip
     a = decay_rate(bandwidth, minimal_decay)
     if not a * dt <= FASTEST:
         raise DesignError(

@@ -91,13 +91,9 @@ class Operation:
 
     def __post_init__(self) -> None:
         require_positive(
-            ValueError,
-            n_h=self.n_h,
-            dt=self.dt,
-            bandwidth=self.bandwidth,
-            needed_force=self.needed_force,
-            x_bar_max=self.x_bar_max,
-        )
+            ValueError, n_h=self.n_h, dt=self.dt, bandwidth=self.bandwidth,
+            needed_force=self.needed_force, x_bar_max=self.x_bar_max,
+        )  # fmt: skip
         if self.integrator not in INTEGRATORS:
             raise ValueError(
                 f"integrator must be one of {list(INTEGRATORS)}, not {self.integrator!r}"
@@ -401,13 +397,10 @@ def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
     found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
     expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
     feedback = estimated_input_feedback(
-        m=vehicle.mass,
-        I_z=vehicle.yaw_inertia,
-        l_f=vehicle.l_f,
-        l_r=vehicle.l_r,
+        m=vehicle.mass, I_z=vehicle.yaw_inertia, l_f=vehicle.l_f, l_r=vehicle.l_r,
         stiffness_lost=(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear),
         v_x=(1.0 - SPEED_SPREAD) * driving.v_x,
-    )
+    )  # fmt: skip
     estimated = design.input_source == "estimated"
     return Operation(
         n_h=design.network.hidden,

@@ -352,13 +352,9 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
         if full not in names:
             return None
         return file.get(
-            full,
-            group=number,
-            raw=True,
-            ignore_invalidation_bits=True,
-            record_offset=first,
+            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=first,
             record_count=count,
-        )
+        )  # fmt: skip
 
     def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
         found = signal(name)

@@ -138,14 +138,10 @@ class GroupedLog(Generic[P]):
             t, values_of, rows = found[listed.name]
             result.append(
                 Channel(
-                    name=listed.name,
-                    unit=listed.unit,
-                    t=t,
-                    values=values_of,
-                    place=self.place,
+                    name=listed.name, unit=listed.unit, t=t, values=values_of, place=self.place,
                     rows=rows,
                 )
-            )
+            )  # fmt: skip
         return tuple(result)
 
     def _timed(self, names: Sequence[str]) -> tuple[Channel, ...]:

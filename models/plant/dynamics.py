@@ -257,12 +257,9 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     outputs = [ca.vertcat(*v) for v in (F_x, F_y)] + [F_z]
     outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y + wind))]
     return ca.Function(
-        "car",
-        [x, command, v_ref, mu, places, aside],
-        [x_dot, *outputs],
-        ["x", "command", "v_ref", "mu", "places", "aside"],
-        ["x_dot", *OUTPUTS],
-    )
+        "car", [x, command, v_ref, mu, places, aside], [x_dot, *outputs],
+        ["x", "command", "v_ref", "mu", "places", "aside"], ["x_dot", *OUTPUTS],
+    )  # fmt: skip
 
 
 def runge_kutta(car: ca.Function, dt: float) -> ca.Function:

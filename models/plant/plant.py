@@ -79,17 +79,9 @@ class PlantRun:
         a_x, a_y = record["acceleration"].T
         forces = {key: record[key] for key in ("F_x", "F_y", "F_z", "alpha", "axle_force")}
         return cls(
-            name=name,
-            vehicle=vehicle,
-            t=t,
-            a_x=a_x,
-            a_y=a_y,
-            command=command,
-            delta_f=delta_f,
-            delta_r=delta_r,
-            **motion,
-            **forces,
-        )
+            name=name, vehicle=vehicle, t=t, a_x=a_x, a_y=a_y, command=command, delta_f=delta_f,
+            delta_r=delta_r, **motion, **forces,
+        )  # fmt: skip
 
     def recording(
         self, sensors: Sensors | None = None, rng: np.random.Generator | None = None
@@ -99,16 +91,9 @@ class PlantRun:
         rng : source of the noise; needed when there are sensors.
         """
         exact = Recording(
-            name=self.name,
-            t=self.t,
-            v_x=self.v_x,
-            v_y=self.v_y,
-            r=self.r,
-            delta_f=self.delta_f,
-            delta_r=self.delta_r,
-            a_y=self.a_y,
-            axle_force=self.axle_force,
-        )
+            name=self.name, t=self.t, v_x=self.v_x, v_y=self.v_y, r=self.r, delta_f=self.delta_f,
+            delta_r=self.delta_r, a_y=self.a_y, axle_force=self.axle_force,
+        )  # fmt: skip
         if sensors is None:
             return exact
         if rng is None:

@@ -188,14 +188,9 @@ class Path:
             path turns tighter than minimum_radius.
         """
         line = line_through(
-            X,
-            Y,
-            closed=closed,
-            name=name,
-            spacing=spacing,
-            smoothing=smoothing,
+            X, Y, closed=closed, name=name, spacing=spacing, smoothing=smoothing,
             minimum_radius=minimum_radius,
-        )
+        )  # fmt: skip
         return cls.from_line(line, name=name, closed=closed)
 
     @classmethod

@@ -80,12 +80,9 @@ class Tracker:
         guards = guards or Guards()
         set_params(params, problem, guards)
         table = fall_back(
-            tire.vehicle,
-            period=period,
-            delay=delay,
-            e_y=guards.fall_back_e_y,
+            tire.vehicle, period=period, delay=delay, e_y=guards.fall_back_e_y,
             acceleration=guards.fall_back_acceleration,
-        )
+        )  # fmt: skip
         params["speeds"], params["gains"] = table
         solver["max_active_sets"] = max_active_sets
         for name, value in {"period": period, "delay": delay, **solver}.items():

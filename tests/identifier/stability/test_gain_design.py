@@ -63,13 +63,9 @@ def test_a_design_keeps_its_rules(law):
     lag = 2.0 * np.arctan(2 * np.pi * 0.7 / a)
     assert np.degrees(lag) == pytest.approx(45.0)
     capacity = steady_capacity(
-        gains.matrix,
-        law=law,
-        forgetting=gains.forgetting,
-        eta_W=gains.eta_W,
-        rho_W=gains.rho_W,
+        gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
         n_h=10,
-    )
+    )  # fmt: skip
     assert capacity == pytest.approx(3.0 * 4.0)
     drive, lam = gains.eta_V / a * bounds.W * 2.5, gains.forgetting  # of V, at the bounds
     V = (

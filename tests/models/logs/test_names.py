@@ -200,13 +200,9 @@ def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel()
 
 def test_two_wheels_of_an_axle_are_taken_together() -> None:
     found = proposed(
-        ("Car.SteerAngleFL", "rad", 0.1 * WAVE),
-        ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
-        ("FyFL", "N", WAVE),
-        ("FyFR", "N", WAVE),
-        ("FyRL", "N", WAVE),
-        ("FyRR", "N", WAVE),
-    )
+        ("Car.SteerAngleFL", "rad", 0.1 * WAVE), ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
+        ("FyFL", "N", WAVE), ("FyFR", "N", WAVE), ("FyRL", "N", WAVE), ("FyRR", "N", WAVE),
+    )  # fmt: skip
     assert found.guesses["delta_f"].channel == ("Car.SteerAngleFL", "Car.SteerAngleFR")
     assert found.guesses["Fyf"].channel == ("FyFL", "FyFR")
     assert found.guesses["Fyr"].channel == ("FyRL", "FyRR")
@@ -343,14 +339,10 @@ def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken() -> 
 
 def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
     found = proposed(
-        ("vxCG", "m/s", 20 + WAVE),
-        ("vyCG", "m/s", WAVE),
-        ("ayCG", "m/s2", WAVE),
-        ("axCG", "m/s2", WAVE),
-        ("yawRate", "deg/s", WAVE),
-        ("sideSlip", "deg", WAVE),
+        ("vxCG", "m/s", 20 + WAVE), ("vyCG", "m/s", WAVE), ("ayCG", "m/s2", WAVE),
+        ("axCG", "m/s2", WAVE), ("yawRate", "deg/s", WAVE), ("sideSlip", "deg", WAVE),
         ("handwheelAngle", "deg", 90 * WAVE),
-    )
+    )  # fmt: skip
     assert (
         set(found.signals()) == {"v_x", "v_y", "r", "a_y", "a_x"} and found.guesses["delta_f"].hand
     )
