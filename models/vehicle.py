@@ -7,7 +7,7 @@ F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the 
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,16 @@ from models.schema import Table, read_toml, require_name
 
 class VehicleError(TireidError, ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
+
+
+# What the numbers of a chassis lie within, in their units.
+_RANGES: Mapping[tuple[float, float], tuple[str, ...]] = {
+    (1e-3, 30.0): ("track_front", "track_rear", "cg_height"),
+    (1e-9, 1e12): ("roll_stiffness", "roll_damping", "roll_inertia"),
+    (1e-4, 100.0): ("relaxation_length_front", "relaxation_length_rear", "steering_lag"),
+    (0.0, 1.0): ("roll_stiffness_front_share", "drive_front_share", "brake_front_share"),
+    (-1.0, 1.0): ("roll_camber_front", "roll_camber_rear"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,40 +85,14 @@ class Chassis:
     tire: Path | None = None
 
     def __post_init__(self) -> None:
-        require_positive(
-            VehicleError, track_front=self.track_front, track_rear=self.track_rear,
-            cg_height=self.cg_height, roll_stiffness=self.roll_stiffness,
-            roll_damping=self.roll_damping, roll_inertia=self.roll_inertia,
-            relaxation_length_front=self.relaxation_length_front,
-            relaxation_length_rear=self.relaxation_length_rear, steering_lag=self.steering_lag,
-        )  # fmt: skip
-        require_within(
-            VehicleError, 1e-3, 30.0, track_front=self.track_front, track_rear=self.track_rear,
-            cg_height=self.cg_height,
-        )  # fmt: skip
-        require_within(
-            VehicleError, 1e-9, 1e12, roll_stiffness=self.roll_stiffness,
-            roll_damping=self.roll_damping, roll_inertia=self.roll_inertia,
-        )  # fmt: skip
-        require_within(
-            VehicleError, 1e-4, 100.0, relaxation_length_front=self.relaxation_length_front,
-            relaxation_length_rear=self.relaxation_length_rear, steering_lag=self.steering_lag,
-        )  # fmt: skip
-        require_within(
-            VehicleError, 0.0, 1.0, roll_stiffness_front_share=self.roll_stiffness_front_share,
-            drive_front_share=self.drive_front_share, brake_front_share=self.brake_front_share,
-        )  # fmt: skip
-        require_within(
-            VehicleError, -1.0, 1.0, roll_camber_front=self.roll_camber_front,
-            roll_camber_rear=self.roll_camber_rear,
-        )  # fmt: skip
-        require_within(
-            VehicleError,
-            0.0,
-            self.cg_height,
-            roll_center_height_front=self.roll_center_height_front,
-            roll_center_height_rear=self.roll_center_height_rear,
-        )
+        for (low, high), names in _RANGES.items():
+            values = {name: getattr(self, name) for name in names}
+            if low > 0.0:
+                require_positive(VehicleError, **values)
+            require_within(VehicleError, low, high, **values)
+        centers = ("roll_center_height_front", "roll_center_height_rear")
+        values = {name: getattr(self, name) for name in centers}
+        require_within(VehicleError, 0.0, self.cg_height, **values)
 
 
 # A dataclass of a vehicle as the text of a TOML file, with exact numbers.
