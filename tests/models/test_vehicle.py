@@ -1,7 +1,7 @@
 """The car as data: what is refused, what comes back from a file, and the documented sedan."""
 
 import math
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,11 +56,6 @@ def test_springs_too_soft_for_the_body_are_refused():
         replace(car, chassis=soft)
 
 
-def test_a_vehicle_cannot_be_changed():
-    with pytest.raises(FrozenInstanceError):
-        sedan().mass = 1.0  # type: ignore[misc]
-
-
 def test_axle_loads_balance_weight_and_pitch_moment():
     car = sedan()
     front, rear = car.axle_loads
@@ -102,11 +97,6 @@ def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):
     assert message.startswith(f"{path}: ")
     assert said in message
     assert "\n" not in message
-
-
-def test_a_missing_file_says_so(tmp_path):
-    with pytest.raises(VehicleError, match="there is no such file"):
-        Vehicle.from_toml(tmp_path / "none.toml")
 
 
 def test_a_vehicle_comes_back_from_its_file_bit_for_bit(tmp_path, rng):
