@@ -255,11 +255,6 @@ class Method(ABC):
         Parameters
         ----------
         name : of the port.
-
-        Raises
-        ------
-        KeyError
-            Where the method does not describe it.
         """
         for port in (*self.ports, HALF_BAND):
             if port.name == name:
@@ -302,11 +297,6 @@ class Method(ABC):
         Parameters
         ----------
         start : None, or the model.
-
-        Raises
-        ------
-        ValueError
-            Where it is a model.
         """
         if start is not None:
             raise ValueError("what learns no tire cannot begin with a stored model")

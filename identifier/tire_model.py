@@ -289,11 +289,6 @@ class TireModel(ABC):
         axle : "front" or "rear", for a result of the shape of `alpha`; None gives both, (..., 2).
         v_x : speed [m/s]; None takes `curve_speed`. A curve of slip does not look at it, but where
             the car has downforce.
-
-        Raises
-        ------
-        ValueError
-            Where the axle has another name.
         """
         if axle is not None and axle not in AXLES:
             raise ValueError(f"axle must be front or rear, it is {axle!r}")
@@ -428,11 +423,6 @@ class TireModel(ABC):
         ----------
         recording : its signals are the input.
         mean : over the windows: signals (n, ...) -> (m, ...).
-
-        Raises
-        ------
-        ValueError
-            Where the model cannot tell how sure it is.
         """
         del recording, mean
         raise ValueError(f"a {type(self).__name__} cannot tell how sure it is: it has no band")
@@ -573,11 +563,6 @@ class TireModel(ABC):
         alpha, axle : as of `force`.
         rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
             one number: a force may be late. 0 is steady.
-
-        Raises
-        ------
-        ValueError
-            Where the axle has another name.
         """
         if axle is not None and axle not in AXLES:
             raise ValueError(f"axle must be front or rear, it is {axle!r}")
@@ -599,11 +584,6 @@ class TireModel(ABC):
         ----------
         n : how many.
         rng : source of randomness.
-
-        Raises
-        ------
-        ValueError
-            Where the model cannot tell how sure it is.
         """
         del n, rng
         raise ValueError(

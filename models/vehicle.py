@@ -396,13 +396,7 @@ class Vehicle:
 
     @property
     def roll_arm(self) -> float:
-        """Height of the center of gravity above the roll axis [m].
-
-        Raises
-        ------
-        VehicleError
-            When the vehicle has no chassis.
-        """
+        """Height of the center of gravity above the roll axis [m]."""
         chassis = self.require_chassis()
         front, rear = chassis.roll_center_height_front, chassis.roll_center_height_rear
         return chassis.cg_height - (self.l_r * front + self.l_f * rear) / self.wheelbase
@@ -416,13 +410,7 @@ class Vehicle:
         )  # fmt: skip
 
     def require_chassis(self) -> Chassis:
-        """Return the chassis to who cannot do without.
-
-        Raises
-        ------
-        VehicleError
-            When the vehicle has none.
-        """
+        """Return the chassis to who cannot do without."""
         if self.chassis is None:
             raise VehicleError(
                 f"vehicle '{self.name}' has no [chassis] table, which a simulated car needs: "

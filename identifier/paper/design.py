@@ -149,11 +149,6 @@ class PaperIdentifier(Method):
         network : structure; None takes `natural_network`.
         dt : sampling interval [s].
         seed : seed of the initial weights.
-
-        Raises
-        ------
-        ValueError
-            Where the law is unknown.
         """
         if law not in VARIANTS:
             raise ValueError(f"law must be one of {list(VARIANTS)}, not {law!r}")

@@ -71,11 +71,6 @@ class LogMap:
         one, of second order, which looks at no later sample: so none is late against another.
     wheels : what they are, where v_x is made of their speeds.
     repair : what is taken out of the recording, and told of the car, after reading.
-
-    Raises
-    ------
-    RecordingError
-        Where a signal, word or number is none that can be.
     """
 
     signals: Mapping[str, Signal] = field(default_factory=dict)

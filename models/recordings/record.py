@@ -188,11 +188,6 @@ class Recording:
         Parameters
         ----------
         name : "v_y" [m/s] or "a_y" [m/s²].
-
-        Raises
-        ------
-        RecordingError
-            Where it was not logged.
         """
         signal: Array | None = getattr(self, name)
         if signal is None:
@@ -301,11 +296,6 @@ class Recording:
         Parameters
         ----------
         kept : consecutive samples as a slice, which is not copied, or indices that rise.
-
-        Raises
-        ------
-        RecordingError
-            Where no stretch of 10 samples is left.
         """
         pieces = self._pieces(kept)
         whole = [piece for piece in pieces if piece.stop - piece.start >= MINIMUM_SAMPLES]

@@ -150,11 +150,6 @@ class Repair:
         Parameters
         ----------
         vehicle : as it was told.
-
-        Raises
-        ------
-        VehicleError
-            Where these are the numbers of no car.
         """
         if not self.vehicle:
             return vehicle
@@ -268,11 +263,6 @@ class Repair:
         Parameters
         ----------
         table : as `tables` returns it; what is missing repairs nothing.
-
-        Raises
-        ------
-        ValueError
-            Of the table's class for a key or type that is not known; `RecordingError` for a value.
         """
         table.only(*SCALARS, "sideslip", *TABLES)
         given: dict[str, Any] = {name: table.number(name) for name in SCALARS if name in table}

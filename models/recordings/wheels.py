@@ -113,11 +113,6 @@ class Wheels:
         Parameters
         ----------
         table : as `table` returns it.
-
-        Raises
-        ------
-        ValueError
-            Of the table's class for a key or type that is not known; `RecordingError` for a value.
         """
         table.only(*(one.name for one in fields(cls)))
         given: dict[str, Any] = {}

@@ -149,11 +149,6 @@ def constant_radius(
     left : whether to the left.
     run_in : straights before and after [m].
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
     """
     if not (radius > 0.0 and turns >= 0.1 and math.isfinite(radius * turns)):
         raise PathError(f"radius must be positive and turns 0.1 at least: {radius} m, {turns}")
@@ -176,11 +171,6 @@ def handling_course(*, spacing: float = 0.25) -> Path:
     Parameters
     ----------
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing is not positive.
 
     Examples
     --------

@@ -184,11 +184,6 @@ def iso_3888_1(
     run_in : lane before the first cones [m].
     run_out : lane after the last cones [m].
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
     """
     first, middle, last = (share * _checked(car_width) + 0.25 for share in (1.1, 1.2, 1.3))
     right = -0.5 * first
@@ -292,11 +287,6 @@ def slalom(
     run_in : way before the first cone [m].
     run_out : way after the last cone [m].
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
     """
     if not (cones >= 1 and gap >= 5.0 and math.isfinite(gap)):
         raise PathError(f"a slalom needs a cone and 5 m between them, got {cones} and {gap} m")

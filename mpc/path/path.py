@@ -308,11 +308,6 @@ class Path:
         near : s of the last projection [m], laps included: the search follows the path from there
             and does not jump to another leg. None: the nearest point of the whole path.
         search_distance : how far from `near` to look [m].
-
-        Raises
-        ------
-        PathError
-            Where X, Y or near is not finite.
         """
         if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
             raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")
