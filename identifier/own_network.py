@@ -28,7 +28,7 @@ from identifier.frozen import (
 from identifier.method import Method
 from identifier.paper.network import SIGNALS, network_signals
 from identifier.setup import Setup
-from identifier.tire_model import TireModel, drift
+from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters
 from models.rules import LARGEST_FORCE
 from models.schema import Table, read_bytes
@@ -170,7 +170,7 @@ OVER = ("x", "u", "v_x")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class OnnxModel(TireModel):
+class OnnxModel(StaticModel):
     """Axle forces of a static network in the frame of the body, left positive.
 
     A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
@@ -260,20 +260,7 @@ class OnnxModel(TireModel):
             },
         )
 
-    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
-        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
-
-    def force_expression(
-        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
-    ) -> tuple[Any, Any]:
-        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
-        slip : empty.
-        """
-        del slip, least_lag
-        return self._static_force(x, delta, v_x), ca.MX(0, 1)
-
-    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+    def static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
         return self.step(x, ca.vertcat(delta, 0), v_x, ca.vertcat(*self.vehicle.bicycle))
 
     def to_dict(self) -> dict[str, Any]:

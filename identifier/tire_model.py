@@ -705,6 +705,25 @@ class TireModel(ABC):
         return f"<{name}: stiffness {front} / {rear} kN/rad{known}>"
 
 
+class StaticModel(TireModel):
+    """A model whose forces follow the state at once: nothing lags."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+        """Return the axle forces (2,) [N] as a CasADi expression of x = [v_y, r], δ_f and v_x."""
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        return self.static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        del slip, least_lag
+        return self.static_force(x, delta, v_x), ca.MX(0, 1)
+
+
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
     """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
     min_speed : below which they do [m/s].

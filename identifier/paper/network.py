@@ -25,7 +25,7 @@ from identifier.frozen import (
 )
 from identifier.method import OTHER_STRUCTURE, resumed
 from identifier.setup import Setup
-from identifier.tire_model import TireModel, drift
+from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
 from models.rules import require_positive, require_within
 from models.schema import Table, require_few
@@ -190,7 +190,7 @@ def _replay_scan(network: Network) -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
-class NetworkModel(TireModel):
+class NetworkModel(StaticModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
     weights : W (2, n_h) in the force unit and V (n_h, n_in).   force_unit : U [N].
     min_speed : below this speed [m/s] the forces read zero.
@@ -235,20 +235,7 @@ class NetworkModel(TireModel):
             },
         )
 
-    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
-        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
-
-    def force_expression(
-        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
-    ) -> tuple[Any, Any]:
-        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
-        slip : empty.
-        """
-        del slip, least_lag
-        return self._static_force(x, delta, v_x), ca.MX(0, 1)
-
-    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+    def static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
         W, V = self.weights
         vehicle, unit = self.vehicle.bicycle, self.force_unit
         u = ca.vertcat(delta, 0)
