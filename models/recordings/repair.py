@@ -198,12 +198,9 @@ class Repair:
             factor[key] = factor.get(key, 1.0) * value
         places = {name: getattr(self, name) + getattr(other, name) for name in SCALARS}
         return Repair(
-            factor=factor,
-            sideslip=self.sideslip or other.sideslip,
-            vehicle={**self.vehicle, **other.vehicle},
-            **sums,
-            **places,
-        )
+            factor=factor, sideslip=self.sideslip or other.sideslip,
+            vehicle={**self.vehicle, **other.vehicle}, **sums, **places,
+        )  # fmt: skip
 
     def then(self, other: "Repair") -> "Repair":
         """Return one repair that does what this and, of what it leaves, another do.
