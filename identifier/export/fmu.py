@@ -340,13 +340,10 @@ def _description(
     version, key, token = said
     table = variables(specialized)
     about = {
-        "fmiVersion": version,
-        "modelName": specialized.name,
-        key: token,
-        "description": _sentence(specialized),
-        "generationTool": TOOL,
+        "fmiVersion": version, "modelName": specialized.name, key: token,
+        "description": _sentence(specialized), "generationTool": TOOL,
         "variableNamingConvention": "flat",
-    }
+    }  # fmt: skip
     experiment = {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
     model = element(
         "fmiModelDescription",
@@ -400,13 +397,10 @@ def _units(table: Sequence[Variable]) -> Element:
 
 def _about(variable: Variable) -> dict[str, object]:
     return {
-        "name": variable.name,
-        "valueReference": variable.reference,
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-        "initial": _initial(variable),
-    }
+        "name": variable.name, "valueReference": variable.reference,
+        "description": variable.description, "causality": variable.causality,
+        "variability": variable.variability, "initial": _initial(variable),
+    }  # fmt: skip
 
 
 def _variable_2(variable: Variable) -> Element:
