@@ -156,7 +156,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : as of `setup`; its calibration is that of the band.
 
         Raises
@@ -179,12 +178,7 @@ class Method(ABC):
         return Certificate()
 
     def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of what a run of it taught: nothing, where it does not say more.
-
-        Parameters
-        ----------
-        history : of this method.
-        """
+        """Return what is proven of what a run of it taught: nothing, where it does not say more."""
         del history
         return Certificate()
 
@@ -213,12 +207,7 @@ class Method(ABC):
         return ()
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return the learnt numbers that rest at their bounds: none, where there are no bounds.
-
-        Parameters
-        ----------
-        state : carried values by port at one instant.
-        """
+        """Return the learnt numbers that rest at their bounds: none, where there are no bounds."""
         del vehicle, state
         return ()
 
@@ -240,22 +229,12 @@ class Method(ABC):
         return None
 
     def believed_body(self, vehicle: Vehicle) -> "Body | None":
-        """Return how a car's body is believed to roll; None where no accelerometer tells v_y.
-
-        Parameters
-        ----------
-        vehicle : the car, as far as the method knows it.
-        """
+        """Return how a car's body is believed to roll; None where no accelerometer tells v_y."""
         del vehicle
         return None
 
     def port(self, name: str) -> Port:
-        """Return what stands in an output or a carried value.
-
-        Parameters
-        ----------
-        name : of the port.
-        """
+        """Return what stands in an output or a carried value."""
         for port in (*self.ports, HALF_BAND):
             if port.name == name:
                 return port
@@ -267,7 +246,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car, as far as the method knows it.
         start : model whose weights the run begins with; None begins with those of the method.
 
         Raises
@@ -278,10 +256,6 @@ class Method(ABC):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Return the model that carried values make: none, where a method does not say more.
-
-        Parameters
-        ----------
-        state : values of the carried ports at one instant.
 
         Raises
         ------

@@ -17,8 +17,6 @@ class Prediction:
 
     Parameters
     ----------
-    model : that predicted.
-    recording : what was predicted.
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over the samples that count, against the true force; None without truth.
     true_force : root mean square of the true force over the same samples, None without truth.

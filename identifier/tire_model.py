@@ -161,7 +161,6 @@ class TireModel(ABC):
         Parameters
         ----------
         data : as from `to_dict`.
-        source : name of the file, for errors.
 
         Raises
         ------
@@ -206,10 +205,6 @@ class TireModel(ABC):
 
     def mounted_on(self, vehicle: Vehicle) -> "TireModel":
         """Return the tires on another car, their forces scaled by its static axle loads.
-
-        Parameters
-        ----------
-        vehicle : that carries them.
 
         Raises
         ------
@@ -364,10 +359,6 @@ class TireModel(ABC):
     def slope_over(self, recording: Recording) -> Array:
         """Return the slope of the force curves over the slip of a drive [static loads/rad], (n, 2).
 
-        Parameters
-        ----------
-        recording : its signals are the input.
-
         Raises
         ------
         ValueError
@@ -421,7 +412,6 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        recording : its signals are the input.
         mean : over the windows: signals (n, ...) -> (m, ...).
         """
         del recording, mean
@@ -432,10 +422,6 @@ class TireModel(ABC):
 
         Of the steady forces, without noise of the drive's sensors. None where the model cannot
         tell.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
         """
         del recording, level
         return None
@@ -460,7 +446,6 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        recording : its signals are the input.
         level : share of samples that the band shall hold, above 0 and below 1.
         """
         del recording, level
@@ -532,12 +517,7 @@ class TireModel(ABC):
         return None
 
     def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated."""
         del recording
         return None
 
@@ -578,13 +558,7 @@ class TireModel(ABC):
         return (float(low), float(high)) if slip.ndim == 0 else (low, high)
 
     def samples(self, n: int, rng: np.random.Generator) -> "tuple[TireModel, ...]":
-        """Return models drawn from what is not known of the tires.
-
-        Parameters
-        ----------
-        n : how many.
-        rng : source of randomness.
-        """
+        """Return models drawn from what is not known of the tires."""
         del n, rng
         raise ValueError(
             f"a {type(self).__name__} cannot tell how sure it is: nothing to draw from"

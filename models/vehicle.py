@@ -217,7 +217,6 @@ class Vehicle:
 
     Parameters
     ----------
-    name : what reports and figures call the car.
     mass : total mass [kg].
     yaw_inertia : moment of inertia about the vertical axis [kg m^2].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
@@ -311,12 +310,7 @@ class Vehicle:
             require_within(VehicleError, 0.0, highest.get(name, 1.0), **{name: value})
 
     def lengthwise(self, name: str) -> float | None:
-        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, None as neither.
-
-        Parameters
-        ----------
-        name : of the number.
-        """
+        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, None as neither."""
         told: float | None = getattr(self, name)
         if told is None and self.chassis is not None:
             told = getattr(self.chassis, name)
@@ -420,12 +414,7 @@ class Vehicle:
         return self.chassis
 
     def origin(self, name: str) -> str:
-        """Return where a value comes from, in a word: "told", or "estimated" of what was left out.
-
-        Parameters
-        ----------
-        name : of the value.
-        """
+        """Return where a value comes from, in a word: "told", or "estimated" of what was left out."""
         return "estimated" if name in self.estimated else "told"
 
     @property

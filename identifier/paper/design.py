@@ -69,8 +69,6 @@ class PaperIdentifier(Method):
 
     Parameters
     ----------
-    gains : gains of observer, filter and laws.
-    network : structure of the network.
     law : the driving error, "integral" (the paper's), "instantaneous" (the conventional one) or
         "pi_lead" (which needs the gain `lead`).
     input_source : where the network reads the state, "measured" or "estimated" (the paper's).
@@ -78,7 +76,6 @@ class PaperIdentifier(Method):
     dt : sampling interval T_s [s].
     force_unit : the unit U of forces inside the identifier [N]; gains are meant in it.
     min_speed : below this speed [m/s] learning rests and forces read zero.
-    seed : seed of the initial weights.
     driving : the conditions that it was designed for and is judged at; None takes those of the
         car, `identifier.driving.natural_driving`.
 
@@ -148,7 +145,6 @@ class PaperIdentifier(Method):
         law : one of `VARIANTS`.
         network : structure; None takes `natural_network`.
         dt : sampling interval [s].
-        seed : seed of the initial weights.
         """
         if law not in VARIANTS:
             raise ValueError(f"law must be one of {list(VARIANTS)}, not {law!r}")

@@ -126,12 +126,7 @@ class LogMap:
         return set(NEEDED) <= told_by(self.signals)
 
     def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
-        """Return the map with some signals told otherwise; v_y and beta replace one another.
-
-        Parameters
-        ----------
-        signals : by our name.
-        """
+        """Return the map with some signals told otherwise; v_y and beta replace one another."""
         merged = dict(self.signals)
         for name in signals:
             merged.pop(INSTEAD.get(name, ""), None)
@@ -140,10 +135,6 @@ class LogMap:
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> "LogMap":
         """Read a log.toml.
-
-        Parameters
-        ----------
-        path : of the file.
 
         Raises
         ------

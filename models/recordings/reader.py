@@ -98,8 +98,6 @@ def read_repaired(
 
     Parameters
     ----------
-    path : a log of any format.
-    vehicle : as it was told.
     run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
     columns, log_map : as of `read_recording`.

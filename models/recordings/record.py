@@ -323,12 +323,7 @@ class Recording:
         return replace(self, **cut, breaks=tuple(int(k) for k in ends[:-1]), notes=notes)
 
     def without_scraps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Return samples but for those of stretches that `taken` would leave out.
-
-        Parameters
-        ----------
-        samples : indices, rising.
-        """
+        """Return samples but for those of stretches that `taken` would leave out."""
         pieces = self._pieces(samples)
         lengths = np.array([piece.stop - piece.start for piece in pieces], dtype=np.intp)
         return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]

@@ -80,11 +80,6 @@ class Repair:
     def apply(self, recording: Recording, vehicle: Vehicle) -> tuple[Recording, Vehicle]:
         """Return the recording and the car without the faults; true forces stay those of the drive.
 
-        Parameters
-        ----------
-        recording : as it was logged.
-        vehicle : as it was told.
-
         Raises
         ------
         RecordingError
@@ -145,12 +140,7 @@ class Repair:
         return signal
 
     def on(self, vehicle: Vehicle) -> Vehicle:
-        """Return the car with the numbers that are told in place of its own.
-
-        Parameters
-        ----------
-        vehicle : as it was told.
-        """
+        """Return the car with the numbers that are told in place of its own."""
         if not self.vehicle:
             return vehicle
         numbers: dict[str, Any] = dict(self.vehicle)
@@ -184,10 +174,6 @@ class Repair:
         """Return what both take out, as of numbers that were estimated together.
 
         Factors multiply, all else adds; of the numbers of the car the other's hold.
-
-        Parameters
-        ----------
-        other : repairs that come beside these.
         """
         sums: dict[str, Any] = {
             name: _added(getattr(self, name), getattr(other, name))
@@ -209,10 +195,6 @@ class Repair:
         taken off behind a turned sensor; a place is that of the signals as they end. It is exact
         but for products of small numbers: a turn before v_x and v_y are scaled by different sizes,
         a place before a turn, and channels that are late and are used for another.
-
-        Parameters
-        ----------
-        other : what the log, repaired by this, still wants.
 
         Raises
         ------

@@ -69,12 +69,7 @@ class Wheels:
             )
 
     def radius_of(self, name: str) -> float | None:
-        """Return the radius of a wheel [m], of `wheel` that of the rear axle; None where unknown.
-
-        Parameters
-        ----------
-        name : of its signal.
-        """
+        """Return the radius of a wheel [m], of `wheel` that of the rear axle; None where unknown."""
         if not self.radius:
             return None
         k = WHEELS.index(name) if name in WHEELS[:4] else 2
@@ -84,12 +79,7 @@ class Wheels:
         return self.radius[min(k // 2, len(self.radius) - 1)]
 
     def completed(self, vehicle: Vehicle) -> "Wheels":
-        """Return it with what a car tells of it and nobody has told.
-
-        Parameters
-        ----------
-        vehicle : that drove.
-        """
+        """Return it with what a car tells of it and nobody has told."""
         track, chassis = self.track, vehicle.chassis
         if not track and chassis is not None:
             track = (chassis.track_front, chassis.track_rear)

@@ -146,7 +146,6 @@ def constant_radius(
     ----------
     radius : [m].
     turns : how often the car goes round [-].
-    left : whether to the left.
     run_in : straights before and after [m].
     spacing : longest step of the samples [m].
     """

@@ -281,7 +281,6 @@ def slalom(
     Parameters
     ----------
     gap : distance of the cones [m].
-    cones : how many there are.
     car_width : width of the car without mirrors [m].
     margin : room between the side of the car and the cones [m].
     run_in : way before the first cone [m].

@@ -91,7 +91,6 @@ class Path:
 
     Parameters
     ----------
-    name : for tables and pictures.
     s : arc length [m], (n,), from 0.
     X : [m], (n,).
     Y : [m], (n,).
@@ -150,7 +149,6 @@ class Path:
         Parameters
         ----------
         line : samples at equal steps of arc length.
-        name : for tables and pictures.
         closed : whether the last sample is the first one again.
         cones : X, Y [m], (k, 2).
         """
@@ -175,7 +173,6 @@ class Path:
         X : of the way-points in driving order [m], (k,).
         Y : of the way-points [m], (k,).
         closed : whether the last way-point leads back to the first; that may be repeated.
-        name : for messages, tables and pictures.
         spacing : longest step of the samples [m].
         smoothing : root mean square distance that the path may keep from the way-points [m]; 0
             passes through them all. Points that were measured need about their noise.

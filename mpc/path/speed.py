@@ -22,7 +22,6 @@ def grip_speed(
 
     Parameters
     ----------
-    path : what is driven.
     a_y_max : lateral acceleration allowed [m/s²].
     v_max : speed allowed [m/s].
     a_accel : acceleration on the straight [m/s²].
@@ -53,7 +52,6 @@ def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:
 
     Parameters
     ----------
-    path : what is driven.
     a_y_max : lateral acceleration at the limit of grip [m/s²].
     share : of a_y_max [-].
     """
