@@ -310,7 +310,7 @@ class Vehicle:
             require_within(VehicleError, 0.0, highest.get(name, 1.0), **{name: value})
 
     def lengthwise(self, name: str) -> float | None:
-        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, None as neither."""
+        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, or None."""
         told: float | None = getattr(self, name)
         if told is None and self.chassis is not None:
             told = getattr(self.chassis, name)
@@ -414,7 +414,7 @@ class Vehicle:
         return self.chassis
 
     def origin(self, name: str) -> str:
-        """Return where a value comes from, in a word: "told", or "estimated" of what was left out."""
+        """Return where a value comes from: "told", or "estimated" of what was left out."""
         return "estimated" if name in self.estimated else "told"
 
     @property

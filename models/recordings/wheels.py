@@ -69,7 +69,7 @@ class Wheels:
             )
 
     def radius_of(self, name: str) -> float | None:
-        """Return the radius of a wheel [m], of `wheel` that of the rear axle; None where unknown."""
+        """Return the radius of a wheel [m], of `wheel` that of the rear axle; None: unknown."""
         if not self.radius:
             return None
         k = WHEELS.index(name) if name in WHEELS[:4] else 2
