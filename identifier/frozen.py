@@ -40,7 +40,6 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
-    """Return the car that `vehicle_numbers` describes."""
     table = Table(data, "", FrozenModelError, "vehicle.")
     return Vehicle(**table.record(Vehicle, skip=("chassis",)))
 

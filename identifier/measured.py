@@ -42,7 +42,6 @@ def printed_value(value: float, sd: float | None, unit: str) -> str:
 
 
 def printed_scale(unit: str) -> float:
-    """Return what values in a unit of files are multiplied by to be printed."""
     return _PRINTED.get(unit, (1.0, unit))[0]
 
 

@@ -55,7 +55,6 @@ GAINS = Gains(
 def paper_design(
     law: str, seed: int, *, gains: Gains = GAINS, network: Network = NETWORK
 ) -> PaperIdentifier:
-    """Return the design of the study.   law : one of `LAWS`."""
     return PaperIdentifier(gains=gains, network=network, seed=seed).with_law(law)
 
 
@@ -105,7 +104,6 @@ def drive_maneuvers() -> dict[str, Recording]:
 
 
 def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> Trial:
-    """Run one design.   maneuver : "step_steer" or "slalom".   design : from `paper_design`."""
     history = identify(recording, sedan(), design)
     if history.diverged_at is not None:
         return Trial(history=history, replays={}, errors={})

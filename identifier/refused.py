@@ -38,7 +38,6 @@ class SampleLimits(NamedTuple):
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> "SampleLimits":
-        """Return the limits of a car, by its size and weight."""
         return cls(
             speed=_FROUDE * vehicle.froude_speed,
             yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),

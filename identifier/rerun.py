@@ -161,5 +161,4 @@ class Recalled(_OnDemand):
         return found
 
     def of(self, first: int, end: int) -> "Recalled":
-        """Return the same of the samples from first to before end."""
         return Recalled(replace(self.run, first=first, end=end), self._kind)

@@ -443,7 +443,6 @@ class OnlineIdentifier:
         return self._stepper.state()
 
     def model(self) -> TireModel:
-        """Return the model with the weights in effect now."""
         if self._diverged:
             raise DivergedError(f"the law diverged within {self.counts.samples} samples")
         if self._stepper is None and self._start is not None:

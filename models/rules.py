@@ -10,7 +10,6 @@ LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
 
 
 def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
-    """Refuse what is no single real number."""
     try:
         if not isinstance(value, str | bytes):
             float(value)

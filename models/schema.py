@@ -130,7 +130,6 @@ def read_text(
 
 
 def read_json(path: Path, refusal: type[ValueError]) -> Any:
-    """Read a JSON file."""
     text = read_text(path, refusal)
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -208,7 +207,6 @@ class Table:
         raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
 
     def value(self, key: str) -> Any:
-        """Return a value that must be there, of any type."""
         if key not in self.data:
             self.refuse(key, "is missing")
         return self.data[key]

@@ -104,7 +104,6 @@ class DoubleTrackCar:
         self.speed_gain = driver.gain
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
-        """Return the car rolling straight ahead."""
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:

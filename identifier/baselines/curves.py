@@ -151,7 +151,6 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
 
 @cache
 def _curve_scan(name: str, *, lagged: bool) -> Scan:
-    """Return the compiled loop of `_build_curve`.   name : one of `CURVES`."""
     return Scan(_build_curve(name, lagged=lagged), carry=LAG_PORTS if lagged else (), over=OVER)
 
 

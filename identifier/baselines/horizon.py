@@ -329,5 +329,4 @@ class HorizonEstimator(Method):
         )  # fmt: skip
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters."""
         return self.filter.frozen(vehicle, state)

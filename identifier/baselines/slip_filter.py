@@ -251,7 +251,6 @@ class SlipFilter(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters."""
         if not self.learns:
             Method.frozen(self, vehicle, state)
         theta = state["estimate"].ravel()[2:].reshape(2, 2)

@@ -35,7 +35,6 @@ class Line(NamedTuple):
     deviations: Array
 
     def of(self, parameter: str) -> tuple[float, float]:
-        """Return the value of a suspect, and its deviation."""
         k = OF_A_Y.index(parameter)
         value = float(self.numbers[k])
         return 1.0 / value - 1.0 if parameter == "a_y.factor" else value, float(self.deviations[k])

@@ -131,7 +131,6 @@ class Search:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The car as it was told."""
         return self.problem.vehicle
 
     def priors(self, wide: _Widths) -> Priors:
@@ -150,17 +149,14 @@ class Search:
         return replace(priors, mean=mean, typed=())
 
     def nominal(self) -> Posterior:
-        """Return the estimate before anything is searched."""
         problem = self.problem.under(self.priors(self.wide))
         found = [descend(problem, start, enough=RULES.enough) for start in starts(problem)]
         return min(found, key=lambda one: one.cost)
 
     def least(self, one: Suspect) -> float:
-        """Return the least size of a suspect that matters, of its parameter."""
         return one.scaled(one.least, self.vehicle)
 
     def widened(self, one: Suspect) -> dict[str, float]:
-        """Return what is believed wide with one more."""
         return {**self.wide, one.parameter: one.scaled(one.wide, self.vehicle)}
 
     def line(self, p: Array, wide: _Widths) -> Line | None:
@@ -299,7 +295,6 @@ class Search:
         return telling and possible and abs(one.value) < most and one.felt > -RULES.against
 
     def deviation(self, one: Candidate) -> float:
-        """Return the deviation of a value, with the least that matters in it."""
         return math.hypot(one.deviation, self.least(one.suspect))
 
     def run(self) -> Posterior:
@@ -429,9 +424,6 @@ class Search:
     def finding(
         self, one: Candidate, likely: tuple[float, float], alike: Sequence[Candidate], *, sure: bool
     ) -> Finding:
-        """Return a candidate as a finding.
-        likely : that it is this, and that it is this or one of those that are alike.
-        """
         suspect, vehicle, deviation = one.suspect, self.vehicle, self.deviation(one)
         size = suspect.size(one.value)
         text = suspect.words(size, deviation, vehicle)

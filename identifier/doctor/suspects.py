@@ -64,7 +64,6 @@ class Suspect(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its code and channel, in words."""
         return f"{self.code.replace('_', ' ')} {self.channel}".strip()
 
     @property
@@ -76,7 +75,6 @@ class Suspect(NamedTuple):
         return ("downforce_f", "downforce_r") if pair else (self.parameter,)
 
     def scaled(self, value: float, vehicle: Vehicle) -> float:
-        """Return `wide` or `least` of a car."""
         return float(value * (vehicle.wheelbase / SEDAN) ** _POWERS[self.grows])
 
     def size(self, value: float) -> float:

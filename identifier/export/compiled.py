@@ -216,7 +216,6 @@ class CompiledPackage:
             raise ValueError("weights must be finite, and covariances and errors not negative")
 
     def set_adaptation(self, adapts: bool) -> None:
-        """Learn, or hold what is learnt."""
         if not self._weights:
             raise ValueError(f"{self.name} estimates a signal: there is nothing to freeze")
         self._call("instance_adapt")(self._instance, int(adapts))

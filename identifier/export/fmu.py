@@ -279,7 +279,6 @@ TOOL = "tireid"
 
 
 def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
-    """Return modelDescription.xml of FMI 2.0."""
     table = variables(specialized)
     unknowns = [
         element("Unknown", {"index": i})
@@ -303,7 +302,6 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
 
 
 def description_3(specialized: SpecializedStep, token: str) -> str:
-    """Return modelDescription.xml of FMI 3.0."""
     table = variables(specialized)
     outputs = [variable for variable in table if variable.causality == "output"]
     time = element(

@@ -26,7 +26,6 @@ class Member(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers."""
         return self.shape[0] * self.shape[1]
 
     @property
@@ -42,14 +41,12 @@ class Member(NamedTuple):
         return line if len(line) <= 100 else f"    {words}\n{code}\n"
 
     def element(self, entry: int) -> str:
-        """Return the C index of an entry."""
         row, column = entry % self.shape[0], entry // self.shape[0]
         pair = zip((row, column), self.shape, strict=True)
         return "".join(f"[{index}]" for index, size in pair if size > 1)
 
 
 def carried_members(specialized: SpecializedStep) -> list[Member]:
-    """Return the carried ports in their order."""
     return [
         Member(signal, specialized.function.size_in(signal.name), signal.name in specialized.learnt)
         for signal in specialized.state
@@ -64,7 +61,6 @@ def output_members(specialized: SpecializedStep) -> list[Member]:
 
 
 def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
-    """Return the C expression of an entry of an input of the step."""
     name = specialized.function.name_in(port)
     if name in SAMPLED:
         return f"in->{READS[name][entry]}"
@@ -74,7 +70,6 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
 
 
 def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
-    """Return the C lvalue of an entry of an output of the step."""
     state = carried_members(specialized)
     if port < len(state):
         part = "learnt" if state[port].learnt else "next"

@@ -243,7 +243,6 @@ class _InPlace:
 
 
 def vectors(specialized: SpecializedStep) -> Vectors:
-    """Return the self-test of a package."""
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
     return Vectors(samples, outputs[:, :2])
@@ -320,7 +319,6 @@ def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
 
 
 def readme(package: Package, about_figures: str) -> str:
-    """Return the README of a package."""
     specialized = package.specialized
     state = carried_members(specialized)
     carry_table = "".join(

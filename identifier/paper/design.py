@@ -47,7 +47,6 @@ class _Variant(NamedTuple):
     scaled: bool = False
 
     def gains(self, found: Gains) -> Gains:
-        """Return the gains.   found : for the law `gains_of`."""
         return found.scaled_by_forgetting() if self.scaled else found
 
 

@@ -58,7 +58,6 @@ class DrivingError(NamedTuple):
     xi_tilde: Any
 
     def drive(self, z: Any, xi_tilde: Any) -> Any:
-        """Return the driving error."""
         return self.z * z + self.xi_tilde * xi_tilde
 
 

@@ -277,7 +277,6 @@ class Search:
     def best(
         self, rng: np.random.Generator, progress: Callable[[float], None] | None = None
     ) -> Pass:
-        """Return the pass that teaches most."""
         least: list[float] = []  # cost, after each generation
 
         def costs(numbers: Array) -> Array:
@@ -329,5 +328,4 @@ class Search:
 
 
 def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:
-    """Return the tires when a pass was driven."""
     return replace(tires, covariance=one.covariance)

@@ -210,9 +210,6 @@ def dead_zone(gains: Gains, known: Operation) -> Gains:
 
 
 def projection(gains: Gains, known: Operation) -> Gains:
-    """Return the gains with a projection on the balls, and no leakage.
-    gains : of `design_gains`.
-    """
     return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)
 
 

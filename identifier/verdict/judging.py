@@ -84,7 +84,6 @@ class Asked(NamedTuple):
 
     @property
     def forceless(self) -> list[bool]:
-        """Which axles have no force to judge by."""
         return [bool(peak < RULES.force) for peak in self.found.peak]
 
 

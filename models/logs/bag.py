@@ -111,7 +111,6 @@ _OF_TF = tuple(
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
-    """List the channels of a bag."""
     with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
         definitions, undefined = _definitions(path, bag)
         topics, rates, skipped = _topics(bag, definitions)
@@ -371,7 +370,6 @@ class _Reading:
         self.parts = {name: Growing() for name in fields}
 
     def add(self, time: int, raw: bytes) -> None:
-        """Take the next message."""
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)

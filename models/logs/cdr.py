@@ -125,7 +125,6 @@ class _Walk:
                 self.many(value[0], count, depth)
 
     def one(self, node: Any, path: str | None, depth: int) -> None:
-        """Go through one value."""
         number, value = _kind(node), node[1]
         if number == NAME:
             self.message(value, None if path is None else f"{path}.", depth + 1)

@@ -195,7 +195,6 @@ def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) 
 
 
 def require_rising(label: str, raw: Raw) -> None:
-    """Refuse time that does not rise."""
     wrong = np.flatnonzero(~(np.diff(raw.t) > 0.0))
     if wrong.size:
         raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")

@@ -47,7 +47,6 @@ FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 
 
 def group_of(identifier: int) -> int:
-    """Return the parameter group of J1939 that a long identifier is of."""
     group = (identifier >> 8) & 0x3FFFF
     return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00  # else it has a receiver
 
@@ -89,7 +88,6 @@ class _Gathered:
         self._t, self._data = Growing(), Growing(np.uint8)
 
     def add(self, time: float, data: bytes) -> None:
-        """Take the next frame."""
         self._times.append(time)
         self._bytes += data[: self.width]
         if len(self._times) == TOGETHER:

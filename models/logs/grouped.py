@@ -105,7 +105,6 @@ class GroupedLog(Generic[P]):
         return (*self.said, *dict.fromkeys(self._mended))
 
     def headings(self) -> tuple[Heading, ...]:
-        """Return names and units of the channels."""
         return tuple(Heading(listed.name, listed.unit) for listed, _ in self.channels)
 
     def listed(self) -> tuple[Listed, ...]:

@@ -43,7 +43,6 @@ class _Reader:
         return [(name, group[name]) for name in hard]
 
     def tree(self, node: Any, depth: int) -> Tree:
-        """Return what a group or dataset holds."""
         self.count += 1
         require_few(RecordingError, str(self.path), depth, "depth", "levels of groups")
         require_few(RecordingError, str(self.path), self.count, "values", "groups and arrays")

@@ -98,7 +98,6 @@ def _kept(values: Array) -> Array:
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
-    """List the channels of a file."""
     with one_line(path, "an MDF file"), opened(path, "MDF") as file:
         return _list(path, file)
 

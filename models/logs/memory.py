@@ -72,7 +72,6 @@ class ArrayLog:
 
     @property
     def path(self) -> Path:
-        """The name, in place of a file."""
         return Path(self._name)
 
     @property

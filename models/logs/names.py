@@ -127,7 +127,6 @@ def _with_corner(word: str) -> tuple[str, ...]:
 
 
 def wheel_words(signal: str, words: Sequence[str]) -> bool:
-    """Return whether a name is that of the speed of a wheel.   signal : one of `WHEELS`."""
     listed = frozenset(part for word in words for part in _with_corner(word))
     if listed & OTHERS:
         return False

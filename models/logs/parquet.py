@@ -65,13 +65,9 @@ class _ParquetTable:
 
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
-        """Which columns hold numbers."""
         return tuple(_is_numeric(one.type) for one in self.schema)
 
     def first_rows(self, column: int) -> list[str]:
-        """Return the first cells of a column as text, "" where one is missing.
-        column : from 0.
-        """
         with one_line(self.path, WHAT):
             if column not in self._head:
                 return ["?"] * min(self.rows, HEAD)

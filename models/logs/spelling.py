@@ -27,7 +27,6 @@ def is_unit(word: str) -> bool:
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Return whether cells are a row of units: all in brackets, or all known, and not all "1"."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     if not filled:
         return False

@@ -462,7 +462,6 @@ def risen(
     mend: bool = False,
     restarts: bool = True,
 ) -> Stamps:
-    """Return times in seconds as `seconds` does."""
     clock = Clock(0, name, "s", False, "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 

@@ -397,5 +397,4 @@ class TableLog:
 
 
 def kind_of(clock: Clock) -> Kind:
-    """Return how the cells of a clock are read."""
     return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER

@@ -76,7 +76,6 @@ class Signal(NamedTuple):
 
     @property
     def samples(self) -> int:
-        """How many there are."""
         return self.leaf.shape[self.along]
 
 
@@ -161,7 +160,6 @@ class _Walk:
                 self.other(child, name, clocks)
 
     def other(self, node: Tree, path: str, clocks: tuple[Clock, ...]) -> None:
-        """Collect the channels of anything."""
         if isinstance(node, Leaf):
             self.leaf(node, path, "", clocks, None)
         elif isinstance(node, Unread):
@@ -181,7 +179,6 @@ class _Walk:
         clocks: tuple[Clock, ...],
         columns: tuple[list[str], list[str]] | None,
     ) -> None:
-        """Collect a vector, or the columns of a matrix."""
         rows, width = leaf.shape
         if rows * width < 2:
             self.told(name, leaf)

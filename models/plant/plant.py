@@ -139,7 +139,6 @@ _GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 
 def tire_of(vehicle: Vehicle) -> MagicFormula:
-    """Return the tire of the file that a chassis names."""
     file = vehicle.require_chassis().tire
     if file is None:
         raise VehicleError(

@@ -357,7 +357,6 @@ def _scale_note(
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
-    """Return the units of wheels, told or else of the file, by signal."""
     units = {one.name: one.unit for one in headings}
     return {
         name: one.unit if is_told(one.unit) else units[one.channel[0]]

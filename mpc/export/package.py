@@ -78,7 +78,6 @@ class Vectors(NamedTuple):
     stride: int
 
     def measurement(self, k: int, horizon: int) -> Measurement:
-        """Return what the tracker is told at a step."""
         rows = np.append(k, k + self.offset + self.stride * np.arange(horizon))
         e_y, e_psi, v_y, r = map(float, self.measured[k])
         kappa, v_x = self.road[rows].T

@@ -33,7 +33,6 @@ class NoHandoverError(TireidError, ValueError):
 
 
 def frozen_start(package: Package) -> TireModel:
-    """Return the model that an exported identifier begins with."""
     specialized = package.specialized
     if specialized.vehicle.has_downforce:
         raise NoHandoverError(

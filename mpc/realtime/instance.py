@@ -80,7 +80,6 @@ _MACRO = re.compile(r"#define TIREID_MPC_(\w+) (\d+)U\b")
 def c_types(
     structure: TireStructure, horizon: int, *, single: bool
 ) -> dict[str, np.dtype[np.void]]:
-    """Return the types of `params`, `input` and `state`."""
     text = re.sub(r"/\*.*?\*/", "", (C / "tireid_mpc.h").read_text(encoding="utf-8"), flags=re.S)
     sizes = {f"TIREID_MPC_{name}": int(value) for name, value in _MACRO.findall(text)}
     sizes |= {f"TIREID_MPC_{key}": n for key, (n, _) in c_sizes(structure, horizon).items()}

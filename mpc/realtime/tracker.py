@@ -187,7 +187,6 @@ class Tracker:
         return self._clock() - start
 
     def step(self, measurement: Measurement) -> Command:
-        """Return what to steer from `delay` after the measurement on."""
         instance, ports = self.instance, self.instance.input
         ports["e_y"], ports["e_psi"], ports["v_y"], ports["r"] = measurement[:4]
         ports["kappa"], ports["v_x"] = measurement[4:6]

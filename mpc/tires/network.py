@@ -108,7 +108,6 @@ def _loaded(program: str) -> ca.Function:
 
 
 def onnx_tire(model: OnnxModel) -> PredictionTire:
-    """Return the prediction tire of a user's network."""
     network, weights = _lifted(model.content, model.inputs)
     structure = _OnnxAxles(
         program=network.serialize(),
