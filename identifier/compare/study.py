@@ -7,12 +7,9 @@ from functools import partial
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
 from identifier.method import Method
 from identifier.methods import REFERENCE, make_method
-from identifier.reproducibility import AxleRmse
 from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
-
-Frozen = Mapping[str, Mapping[str, AxleRmse]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -175,11 +175,6 @@ def _build_replay(network: Network) -> ca.Function:
 
 
 @cache
-def _frozen(network: Network) -> ca.Function:
-    return build_frozen(network)
-
-
-@cache
 def _replay_scan(network: Network) -> Scan:
     return Scan(_build_replay(network), carry=(), over=("x", "u", "v_x"))
 

@@ -204,13 +204,6 @@ class Instance:
         """Do ahead of a measurement what does not ask for it, on the road in `input`."""
         return Status(self._library.mpc_prepare(*self._step[:4]))
 
-    def prepare_from(self, x0: ArrayLike) -> None:
-        """Do ahead of `solve` what does not ask for its state, on the road in `input`.
-        x0 : state that is expected (n_x,).
-        """
-        self.start[:] = x0
-        self._library.mpc_prepare_from(*self.solve_arguments)
-
     def solve(self) -> int:
         """Take one iteration from the plan as it is; return the status."""
         return int(self._library.mpc_solve(*self.solve_arguments))
