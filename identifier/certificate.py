@@ -67,14 +67,18 @@ class Certificate:
             "verdict": self.verdict,
             "properties": {
                 entry.name: {
-                    "value": _finite(entry.value), "limit": _finite(entry.limit),
-                    "margin": _finite(entry.margin), "status": entry.status, "unit": entry.unit,
-                    "title": entry.title, "advice": entry.advice,
+                    "value": _finite(entry.value),
+                    "limit": _finite(entry.limit),
+                    "margin": _finite(entry.margin),
+                    "status": entry.status,
+                    "unit": entry.unit,
+                    "title": entry.title,
+                    "advice": entry.advice,
                 }
                 for entry in self.properties
             },
             "held_by_construction": dict(self.held),
-        }  # fmt: skip
+        }
 
 
 def at_most(value: float, *, good: float, bad: float | None) -> Status:

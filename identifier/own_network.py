@@ -263,12 +263,15 @@ class OnnxModel(StaticModel):
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON; the network in base64."""
         return {
-            "format": FORMAT, "kind": self.kind, "units": {"inputs": "SI", "outputs": "N"},
-            "vehicle": vehicle_numbers(self.vehicle), "min_speed_m_s": self.min_speed,
+            "format": FORMAT,
+            "kind": self.kind,
+            "units": {"inputs": "SI", "outputs": "N"},
+            "vehicle": vehicle_numbers(self.vehicle),
+            "min_speed_m_s": self.min_speed,
             "inputs": None if self.inputs is None else list(self.inputs),
             "slip_sign": self.slip_sign,
             "onnx_base64": base64.b64encode(self.content).decode("ascii"),
-        }  # fmt: skip
+        }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":

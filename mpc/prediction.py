@@ -77,9 +77,12 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     c, s = ca.cos(e_psi), ca.sin(e_psi)
     s_dot = (p.v_x * c - v_y * s) * (1 / ca.fmax(1 - p.kappa * e_y, NEAREST))
     rates = [
-        p.v_x * s + v_y * c, r - p.kappa * s_dot, (F[0] + F[1]) * (1 / car.m) - p.v_x * r,
-        (car.l_f * F[0] - car.l_r * F[1]) * (1 / car.I_z), p.u,
-    ]  # fmt: skip
+        p.v_x * s + v_y * c,
+        r - p.kappa * s_dot,
+        (F[0] + F[1]) * (1 / car.m) - p.v_x * r,
+        (car.l_f * F[0] - car.l_r * F[1]) * (1 / car.I_z),
+        p.u,
+    ]
     if structure.lagged:
         lengths = _lag_lengths(structure, slip, at, p.grip)
         for now, behind, length in zip(kinematic, slip, lengths, strict=True):

@@ -247,13 +247,16 @@ class CurveModel(TireModel):
         """Return the model as plain numbers and words, ready for JSON."""
         names = CURVES[self.curve].parameters
         return {
-            "format": FORMAT, "kind": self.kind, "vehicle": vehicle_numbers(self.vehicle),
-            "curve": self.curve, "min_speed_m_s": self.min_speed,
+            "format": FORMAT,
+            "kind": self.kind,
+            "vehicle": vehicle_numbers(self.vehicle),
+            "curve": self.curve,
+            "min_speed_m_s": self.min_speed,
             "relaxation_length_m": self.relaxation_length.tolist(),
             "offset_rad_m_s": self.offset.tolist(),
             "front": dict(zip(names, self.parameters[0].tolist(), strict=True)),
             "rear": dict(zip(names, self.parameters[1].tolist(), strict=True)),
-        }  # fmt: skip
+        }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "CurveModel":

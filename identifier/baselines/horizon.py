@@ -237,10 +237,14 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     estimate, now = bounded(stages[-1].z), stages[-1]
     sane = ca.fabs(now.z[0]) < MOST_SLIDING * begun.speed
     following = {
-        "estimate": estimate, "P": now.P, "arrival": z, "arrival_P": P,
-        "trajectory": ca.horzcat(*at), "window": ca.horzcat(*columns),
+        "estimate": estimate,
+        "P": now.P,
+        "arrival": z,
+        "arrival_P": P,
+        "trajectory": ca.horzcat(*at),
+        "window": ca.horzcat(*columns),
         "running": ca.logic_and(begun.fast, sane),
-    }  # fmt: skip
+    }
     told = _build_told()(estimate, port["estimate"], port["u"], port["v_x"], *known)
     return ca.Function(
         f"horizon_{samples}_{iterations}",
@@ -321,12 +325,16 @@ class HorizonEstimator(Method):
         return Setup(
             scan=_scan(N, self.iterations),
             carry={
-                "estimate": z, "P": P, "arrival": z, "arrival_P": P,
+                "estimate": z,
+                "P": P,
+                "arrival": z,
+                "arrival_P": P,
                 "trajectory": np.tile(z[:, None], N + 1),
-                "window": np.zeros((len(Sampled._fields), N + 1)), "running": np.zeros(1),
+                "window": np.zeros((len(Sampled._fields), N + 1)),
+                "running": np.zeros(1),
             },
             constants=joint.constants,
-        )  # fmt: skip
+        )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         return self.filter.frozen(vehicle, state)

@@ -120,13 +120,16 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
         ],
         [
             ca.vertcat(following[: 2 + lags], theta_next),
-            ca.densify(ca.if_else(going, P_corrected, P_afresh)), ca.vertcat(s.u, s.v_x),
-            ca.if_else(learning, 1, 0), *lag_next, ca.if_else(s.moving, axle_force, 0),
+            ca.densify(ca.if_else(going, P_corrected, P_afresh)),
+            ca.vertcat(s.u, s.v_x),
+            ca.if_else(learning, 1, 0),
+            *lag_next,
+            ca.if_else(s.moving, axle_force, 0),
         ],
         [*tire.carry, *OVER, *CONSTANTS, "vehicle", "sampling"],
         [*(f"{port}_next" for port in tire.carry), "axle_force"],
         {"cse": True},
-    )  # fmt: skip
+    )
 
 
 def midpoint(estimate: Any, rate: Any, dt: Any) -> Any:

@@ -120,14 +120,17 @@ def build_step(name: str) -> ca.Function:
         name,
         [estimate, P, before, running, *last, *heard.ports, numbers],
         [
-            ca.if_else(going, after, afresh), ca.densify(P_next), ca.vertcat(s.u, s.v_x),
-            ca.if_else(learning, 1, 0), *(told_slip, alpha_now, ca.if_else(s.moving, 1, 0)),
+            ca.if_else(going, after, afresh),
+            ca.densify(P_next),
+            ca.vertcat(s.u, s.v_x),
+            ca.if_else(learning, 1, 0),
+            *(told_slip, alpha_now, ca.if_else(s.moving, 1, 0)),
             ca.if_else(s.moving, axle_force, 0),
         ],
         [*CARRY, *LAG_PORTS, *OVER, "vehicle", "sampling", "numbers"],
         [*(f"{port}_next" for port in (*CARRY, *LAG_PORTS)), "axle_force"],
         {"cse": True},
-    )  # fmt: skip
+    )
 
 
 @cache

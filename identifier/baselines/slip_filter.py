@@ -140,14 +140,18 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
         name,
         [estimate, P, before, running, *heard.ports, numbers],
         [
-            following, ca.densify(P_next), ca.vertcat(s.u, s.v_x), ca.logic_and(fast, sane),
-            ca.if_else(s.moving, told_force, 0), ca.if_else(s.moving, following[0], 0),
+            following,
+            ca.densify(P_next),
+            ca.vertcat(s.u, s.v_x),
+            ca.logic_and(fast, sane),
+            ca.if_else(s.moving, told_force, 0),
+            ca.if_else(s.moving, following[0], 0),
             ca.sqrt(P_next[0, 0]),
         ],
         [*CARRY, *OVER, "vehicle", "sampling", "numbers"],
         [*(f"{port}_next" for port in CARRY), "axle_force", "v_y", "v_y_sd"],
         {"cse": True},
-    )  # fmt: skip
+    )
 
 
 @cache

@@ -52,12 +52,15 @@ def build_step() -> ca.Function:
         "washout",
         [washed, rate, running, *heard.ports, cutoff],
         [
-            v_y, now, ca.if_else(s.moving, 1, 0), ca.if_else(s.moving, force, 0),
+            v_y,
+            now,
+            ca.if_else(s.moving, 1, 0),
+            ca.if_else(s.moving, force, 0),
             ca.if_else(s.moving, v_y, 0),
         ],
         [*CARRY, *OVER, "vehicle", "sampling", "cutoff"],
         [*(f"{port}_next" for port in CARRY), "axle_force", "v_y"],
-    )  # fmt: skip
+    )
 
 
 @cache

@@ -73,8 +73,15 @@ class Finding:
             return value if math.isfinite(value) else None
 
         return {
-            "code": self.code, "channel": self.channel, "size": number(self.size),
-            "deviation": number(self.deviation), "unit": self.unit, "confidence": self.confidence,
-            "alarm": self.alarm, "text": self.text, "sure": self.sure, "note": self.note,
+            "code": self.code,
+            "channel": self.channel,
+            "size": number(self.size),
+            "deviation": number(self.deviation),
+            "unit": self.unit,
+            "confidence": self.confidence,
+            "alarm": self.alarm,
+            "text": self.text,
+            "sure": self.sure,
+            "note": self.note,
             "repair": None if self.repair is None else self.repair.tables(),
-        }  # fmt: skip
+        }

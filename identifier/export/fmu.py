@@ -338,10 +338,13 @@ def _description(
     version, key, token = said
     table = variables(specialized)
     about = {
-        "fmiVersion": version, "modelName": specialized.name, key: token,
-        "description": _sentence(specialized), "generationTool": TOOL,
+        "fmiVersion": version,
+        "modelName": specialized.name,
+        key: token,
+        "description": _sentence(specialized),
+        "generationTool": TOOL,
         "variableNamingConvention": "flat",
-    }  # fmt: skip
+    }
     experiment = {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
     model = element(
         "fmiModelDescription",
@@ -395,10 +398,13 @@ def _units(table: Sequence[Variable]) -> Element:
 
 def _about(variable: Variable) -> dict[str, object]:
     return {
-        "name": variable.name, "valueReference": variable.reference,
-        "description": variable.description, "causality": variable.causality,
-        "variability": variable.variability, "initial": _initial(variable),
-    }  # fmt: skip
+        "name": variable.name,
+        "valueReference": variable.reference,
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": _initial(variable),
+    }
 
 
 def _variable_2(variable: Variable) -> Element:

@@ -124,9 +124,14 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
     return {
-        "v_y": x[0], "r": x[1], "delta_f": u[0], "delta_r": u[1], "v_x": v_x, "alpha_f": alpha[0],
+        "v_y": x[0],
+        "r": x[1],
+        "delta_f": u[0],
+        "delta_r": u[1],
+        "v_x": v_x,
+        "alpha_f": alpha[0],
         "alpha_r": alpha[1],
-    }  # fmt: skip
+    }
 
 
 # The paper's network, frozen: weights at one instant and all that axle forces need.
@@ -234,12 +239,16 @@ class NetworkModel(StaticModel):
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""
         return {
-            "format": FORMAT, "kind": self.kind,
+            "format": FORMAT,
+            "kind": self.kind,
             "units": {"W": "force_unit_N newtons", "V": "-", "scale": "SI, by input"},
-            "vehicle": vehicle_numbers(self.vehicle), "network": asdict(self.network),
-            "force_unit_N": self.force_unit, "min_speed_m_s": self.min_speed,
-            "W": self.weights.W.tolist(), "V": self.weights.V.tolist(),
-        }  # fmt: skip
+            "vehicle": vehicle_numbers(self.vehicle),
+            "network": asdict(self.network),
+            "force_unit_N": self.force_unit,
+            "min_speed_m_s": self.min_speed,
+            "W": self.weights.W.tolist(),
+            "V": self.weights.V.tolist(),
+        }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":

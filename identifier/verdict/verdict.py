@@ -158,10 +158,13 @@ class Verdict:
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain numbers and words, ready for JSON."""
         return {
-            "valid": self.valid, "findings": [finding._asdict() for finding in self.findings],
+            "valid": self.valid,
+            "findings": [finding._asdict() for finding in self.findings],
             "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
-            "measures": dict(self.measures), "reach": self.reach, "unseen": [*UNSEEN, *self.blind],
-        }  # fmt: skip
+            "measures": dict(self.measures),
+            "reach": self.reach,
+            "unseen": [*UNSEEN, *self.blind],
+        }
 
     def __repr__(self) -> str:
         codes = ", ".join(

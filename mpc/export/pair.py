@@ -150,10 +150,13 @@ def build_pair(
         caution=caution,
     )
     values: dict[str, str | Words] = {
-        "name": specialized.name, "NAME": specialized.name.upper(),
-        "version": identifier.about["version"], "vehicle": Words(specialized.vehicle.name),
-        "identifier_hash": identifier.about["hash"], "mpc_hash": tracker.about["hash"],
-    }  # fmt: skip
+        "name": specialized.name,
+        "NAME": specialized.name.upper(),
+        "version": identifier.about["version"],
+        "vehicle": Words(specialized.vehicle.name),
+        "identifier_hash": identifier.about["hash"],
+        "mpc_hash": tracker.about["hash"],
+    }
     files = {path: filled(C / path, values) for path in ("CMakeLists.txt", "README.md")}
     files |= c_files(C, EXAMPLES, {PREFIX: specialized.name})
     return Pair(identifier, tracker, files | _handover_sources(identifier, tracker))

@@ -178,17 +178,25 @@ def handling_course(*, spacing: float = 0.25) -> Path:
     '802 m, tightest radius 12.0 m'
     """
     sections: list[Section] = [
-        Straight(length=50.0), Turn(radius=30.0, angle=radians(110.0), easing=12.0),
-        Straight(length=30.0), Turn(radius=12.0, angle=radians(-180.0), easing=7.0),
-        Straight(length=35.0), Turn(radius=18.0, angle=radians(120.0), easing=8.0),
-        Straight(length=20.0), Turn(radius=60.0, angle=radians(60.0), easing=20.0),
-        Straight(length=30.0), Turn(radius=40.0, angle=radians(90.0), easing=15.0),
+        Straight(length=50.0),
+        Turn(radius=30.0, angle=radians(110.0), easing=12.0),
+        Straight(length=30.0),
+        Turn(radius=12.0, angle=radians(-180.0), easing=7.0),
+        Straight(length=35.0),
+        Turn(radius=18.0, angle=radians(120.0), easing=8.0),
+        Straight(length=20.0),
+        Turn(radius=60.0, angle=radians(60.0), easing=20.0),
+        Straight(length=30.0),
+        Turn(radius=40.0, angle=radians(90.0), easing=15.0),
         Turn(radius=22.0, angle=radians(-70.0), easing=9.0),
-        Turn(radius=15.0, angle=radians(100.0), easing=8.0), Straight(length=40.0),
-        Turn(radius=45.0, angle=radians(55.0), easing=16.0), Straight(length=10.0),
-        Turn(radius=35.0, angle=radians(-55.0), easing=14.0), Straight(length=30.0),
+        Turn(radius=15.0, angle=radians(100.0), easing=8.0),
+        Straight(length=40.0),
+        Turn(radius=45.0, angle=radians(55.0), easing=16.0),
+        Straight(length=10.0),
+        Turn(radius=35.0, angle=radians(-55.0), easing=14.0),
+        Straight(length=30.0),
         Turn(radius=25.0, angle=radians(130.0), easing=10.0),
-    ]  # fmt: skip
+    ]
     line = line_along(close(sections, (0, 16)), spacing=spacing)
     path = Path.from_line(line, name="handling course", closed=True)
     return Path.from_line(line, name=path.name, closed=True, cones=pairs_beside(path))
