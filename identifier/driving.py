@@ -77,7 +77,12 @@ def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Drivin
     sliding = max(load / c for load, c in zip(vehicle.axle_loads, stiffness, strict=True))
     ratio = math.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
     return Driving(
-        v_x=4.0 * vehicle.froude_speed, slip=2.0 * sliding, friction=1.0, bandwidth=bandwidth,
-        noise_v_x=_PEAK_NOISE["v_x"] * ratio, noise_v_y=_PEAK_NOISE["v_y"] * ratio,
-        noise_r=_PEAK_NOISE["r"] / ratio, noise_delta=_PEAK_NOISE["delta"],
-    )  # fmt: skip
+        v_x=4.0 * vehicle.froude_speed,
+        slip=2.0 * sliding,
+        friction=1.0,
+        bandwidth=bandwidth,
+        noise_v_x=_PEAK_NOISE["v_x"] * ratio,
+        noise_v_y=_PEAK_NOISE["v_y"] * ratio,
+        noise_r=_PEAK_NOISE["r"] / ratio,
+        noise_delta=_PEAK_NOISE["delta"],
+    )

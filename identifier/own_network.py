@@ -223,9 +223,12 @@ class OnnxModel(StaticModel):
         """Read a network file; arguments are those of the class."""
         try:
             return cls(
-                vehicle=vehicle, content=read_bytes(Path(path), UnusableNetworkError),
-                min_speed=min_speed, inputs=inputs, slip_sign=slip_sign,
-            )  # fmt: skip
+                vehicle=vehicle,
+                content=read_bytes(Path(path), UnusableNetworkError),
+                min_speed=min_speed,
+                inputs=inputs,
+                slip_sign=slip_sign,
+            )
         except OSError as error:
             reason = (error.strerror or "cannot be read").lower()
             raise UnusableNetworkError(f"{path}: {reason}") from error

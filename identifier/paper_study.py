@@ -34,14 +34,21 @@ ONSETS = {"step_steer": 29.0, "slalom": 25.0}  # s, errors count from here on
 FREEZES = {"step_steer": (32.0, 35.0), "slalom": (32.0, 40.0)}  # s, as in the paper
 MANEUVERS: Mapping[str, Maneuver] = {
     "step_steer": TwoStepSteer(
-        amplitude=np.radians(4.0), second_share=0.5, onset=ONSETS["step_steer"], second_onset=36.0,
-        rate_limit=np.radians(20.0), duration=45.0,
+        amplitude=np.radians(4.0),
+        second_share=0.5,
+        onset=ONSETS["step_steer"],
+        second_onset=36.0,
+        rate_limit=np.radians(20.0),
+        duration=45.0,
     ),
     "slalom": Slalom(
-        amplitude=np.radians(4.0), frequency=0.7, onset=ONSETS["slalom"],
-        rate_limit=np.radians(20.0), duration=45.0,
+        amplitude=np.radians(4.0),
+        frequency=0.7,
+        onset=ONSETS["slalom"],
+        rate_limit=np.radians(20.0),
+        duration=45.0,
     ),
-}  # fmt: skip
+}
 # The paper does not print its gains. These are what benchmarks/paper_gains.py prints as its best:
 # the calmest of the random designs that show the pattern of Table II, equal online error and a far
 # worse frozen error of the instantaneous law. It needs a slow observer, λ well above a, and a high

@@ -223,10 +223,15 @@ def identify(
         model = design.fitted(recording, vehicle, start, progress=progress)
         recording, outputs = _with_v_y(recording, model)
         return History(
-            vehicle=vehicle, design=design, recording=recording,
-            axle_force=model.axle_force(recording), state={}, outputs=outputs, start=start,
+            vehicle=vehicle,
+            design=design,
+            recording=recording,
+            axle_force=model.axle_force(recording),
+            state={},
+            outputs=outputs,
+            start=start,
             models={len(recording): model},
-        )  # fmt: skip
+        )
     setup = design.setup(vehicle, start)
     v_y = None if recording.v_y is not None else large((len(recording),))
     force, begins = large((len(recording), 2)), []
@@ -242,16 +247,26 @@ def identify(
         if progress is not None:
             progress(block.part.stop / len(recording))
     run = Rerun(
-        setup=setup, recording=recording, parts=parts, begins=tuple(begins), last=following,
-        first=0, end=len(recording),
-    )  # fmt: skip
+        setup=setup,
+        recording=recording,
+        parts=parts,
+        begins=tuple(begins),
+        last=following,
+        first=0,
+        end=len(recording),
+    )
     if v_y is not None and np.isfinite(v_y).all():
         v_y.setflags(write=False)
         recording = replace(recording, v_y=v_y, estimated=("v_y",))
     return History(
-        vehicle=vehicle, design=design, recording=recording, axle_force=force,
-        state=Recalled(run, "state"), outputs=Recalled(run, "outputs"), start=start,
-    )  # fmt: skip
+        vehicle=vehicle,
+        design=design,
+        recording=recording,
+        axle_force=force,
+        state=Recalled(run, "state"),
+        outputs=Recalled(run, "outputs"),
+        start=start,
+    )
 
 
 def _with_v_y(recording: Recording, model: TireModel) -> tuple[Recording, Mapping[str, Array]]:

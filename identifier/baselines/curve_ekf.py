@@ -150,12 +150,18 @@ class CurveEkf(Method):
         time, speed = vehicle.froude_time, vehicle.froude_speed
         missed = 1.0 if textbook else 0.5
         return cls(
-            walk=0.0075 / math.sqrt(time), v_y_noise=0.004 * speed, r_noise=0.001 / time,
+            walk=0.0075 / math.sqrt(time),
+            v_y_noise=0.004 * speed,
+            r_noise=0.001 / time,
             v_y_disturbance=0.08 * missed * speed / math.sqrt(time),
-            r_disturbance=0.12 * missed / time**1.5, relaxation_length=0.4 * vehicle.wheelbase,
-            v_y_spread=0.005 * speed, textbook=textbook, dt=dt, learning_speed=0.6 * speed,
+            r_disturbance=0.12 * missed / time**1.5,
+            relaxation_length=0.4 * vehicle.wheelbase,
+            v_y_spread=0.005 * speed,
+            textbook=textbook,
+            dt=dt,
+            learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
-        )  # fmt: skip
+        )
 
     @property
     def ports(self) -> tuple[Port, ...]:

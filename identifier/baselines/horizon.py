@@ -168,11 +168,14 @@ def _build_beginning() -> ca.Function:
     column = Sampled(going, heard.hears, s.u[0], s.u[1], s.v_x, heard.r, heard.a_y)
     first = ca.diag(ca.vertcat(told.start_slip * s.speed, told.r_noise) ** 2)
     begun = Begun(
-        going=going, fast=fast, speed=speed, column=ca.vertcat(*column),
+        going=going,
+        fast=fast,
+        speed=speed,
+        column=ca.vertcat(*column),
         start=ca.vertcat(steady_v_y(p, s.speed, heard.r, s.u), heard.r, estimate[2:]),
         start_P=ca.diagcat(first, P[2:, 2:]),
         ahead=predicted(TIRE, p, told.friction, estimate, v_mean, u_mean, s.sampling[0]),
-    )  # fmt: skip
+    )
     return ca.Function(
         "horizon_beginning",
         [estimate, P, running, last, *heard.ports, numbers],

@@ -183,11 +183,15 @@ class LaggedEkf(Method):
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
-            v_y_noise=0.02 * speed, r_noise=0.002 / time,
-            v_y_disturbance=0.05 * speed / math.sqrt(time), r_disturbance=0.03 / time**1.5,
-            relaxation_length=0.12 * vehicle.wheelbase, dt=dt, learning_speed=0.6 * speed,
+            v_y_noise=0.02 * speed,
+            r_noise=0.002 / time,
+            v_y_disturbance=0.05 * speed / math.sqrt(time),
+            r_disturbance=0.03 / time**1.5,
+            relaxation_length=0.12 * vehicle.wheelbase,
+            dt=dt,
+            learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
-        )  # fmt: skip
+        )
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""
@@ -220,7 +224,10 @@ class LaggedEkf(Method):
         z = state["estimate"].ravel()
         values = _curve_parameters(ca.DM(z[TIRE]), ca.DM(vehicle.axle_loads))
         return CurveModel(
-            vehicle=vehicle, curve="magic_formula", parameters=np.array(ca.DM(values)),
-            min_speed=self.min_speed, relaxation_length=np.full(2, self.relaxation_length),
+            vehicle=vehicle,
+            curve="magic_formula",
+            parameters=np.array(ca.DM(values)),
+            min_speed=self.min_speed,
+            relaxation_length=np.full(2, self.relaxation_length),
             offset=np.array([z[8], 0.0]),
-        )  # fmt: skip
+        )

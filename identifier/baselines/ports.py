@@ -46,10 +46,13 @@ class Sample(NamedTuple):
 def sample_ports() -> Sample:
     vehicle = ca.SX.sym("vehicle", 6)
     return Sample(
-        x=ca.SX.sym("x", 2), u=ca.SX.sym("u", 2), v_x=ca.SX.sym("v_x"), vehicle=vehicle,
+        x=ca.SX.sym("x", 2),
+        u=ca.SX.sym("u", 2),
+        v_x=ca.SX.sym("v_x"),
+        vehicle=vehicle,
         sampling=ca.SX.sym("sampling", len(_SAMPLING)),
         parameters=BicycleParameters(*ca.vertsplit(vehicle)),
-    )  # fmt: skip
+    )
 
 
 def axle_loads(p: BicycleParameters, gravity: float) -> Any:

@@ -212,11 +212,16 @@ class SlipFilter(Method):
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
-            tire=tire, r_noise=0.0023 / time, a_y_noise=1.5,
-            v_y_disturbance=0.09 * speed / math.sqrt(time), r_disturbance=0.26 / time**1.5,
-            walk=0.002 / math.sqrt(time), dt=dt, learning_speed=0.6 * speed,
+            tire=tire,
+            r_noise=0.0023 / time,
+            a_y_noise=1.5,
+            v_y_disturbance=0.09 * speed / math.sqrt(time),
+            r_disturbance=0.26 / time**1.5,
+            walk=0.002 / math.sqrt(time),
+            dt=dt,
+            learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
-        )  # fmt: skip
+        )
 
     @property
     def learns(self) -> bool:

@@ -73,9 +73,12 @@ def run_comparison(
         progress(f"{name}: learnt on {len(recordings)} recordings, replayed on all{lost}")
     timed = {REFERENCE: make_method(REFERENCE, vehicle, seed)} | methods
     return Comparison(
-        course=course, seed=seed, trials=trials,
-        step_times=step_times(timed, vehicle, max(recordings, key=len)), left_out=left_out or {},
-    )  # fmt: skip
+        course=course,
+        seed=seed,
+        trials=trials,
+        step_times=step_times(timed, vehicle, max(recordings, key=len)),
+        left_out=left_out or {},
+    )
 
 
 def ranking(comparison: Comparison) -> list[str]:

@@ -95,10 +95,19 @@ class Motion(NamedTuple):
         v_y, delta_f, delta_r, v_x_r, turn, sideslip = means[:, some]
         v_y_dot, r_dot, v_x_v_y_dot = rates[:, some]
         return cls(
-            v_y=v_y, delta_f=delta_f, delta_r=delta_r, v_x_r=v_x_r, turn=turn, sideslip=sideslip,
-            a_y=a_y, v_y_dot=v_y_dot, r_dot=r_dot, v_x_v_y_dot=v_x_v_y_dot, speed=speed,
+            v_y=v_y,
+            delta_f=delta_f,
+            delta_r=delta_r,
+            v_x_r=v_x_r,
+            turn=turn,
+            sideslip=sideslip,
+            a_y=a_y,
+            v_y_dot=v_y_dot,
+            r_dot=r_dot,
+            v_x_v_y_dot=v_x_v_y_dot,
+            speed=speed,
             hidden=_hidden(pieces, SLOWEST * speed),
-        )  # fmt: skip
+        )
 
     @staticmethod
     def _of_piece(recording: Recording, fast: float) -> tuple[Array, Array, Array]:

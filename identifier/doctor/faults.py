@@ -432,11 +432,18 @@ class Search:
         repair = suspect.repair(size, vehicle)
         real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
         return Finding(
-            code=suspect.code, channel=suspect.channel, size=size, deviation=deviation,
-            unit=suspect.unit, confidence=real * likely[0], group=real * likely[1], text=text,
-            repair=repair, sure=sure and repair is not None and suspect.possible(size, vehicle),
+            code=suspect.code,
+            channel=suspect.channel,
+            size=size,
+            deviation=deviation,
+            unit=suspect.unit,
+            confidence=real * likely[0],
+            group=real * likely[1],
+            text=text,
+            repair=repair,
+            sure=sure and repair is not None and suspect.possible(size, vehicle),
             note=suspect.code in NOTES,
-        )  # fmt: skip
+        )
 
     def unseen(self, post: Posterior) -> Iterator[str]:
         """Yield what this drive tells next to nothing of, beside what was found."""

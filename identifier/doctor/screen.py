@@ -275,9 +275,14 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
         unit = "deg/s" if change.unit == "deg" and change.channels == ("r",) else change.unit
         text = f"{names} is in {unit}{doubt}"
     return Finding(
-        code=change.code, channel=change.channels[0], size=1.0 / factor, confidence=confidence,
-        text=text, repair=repair, sure=confidence > SURE,
-    )  # fmt: skip
+        code=change.code,
+        channel=change.channels[0],
+        size=1.0 / factor,
+        confidence=confidence,
+        text=text,
+        repair=repair,
+        sure=confidence > SURE,
+    )
 
 
 def steering_finding(
@@ -312,10 +317,15 @@ def steering_finding(
         code = "factor"
         text = f"delta_f reads {said} times the right value{turned}{doubt}"
     return Finding(
-        code=code, channel="delta_f", size=size, deviation=size * deviation, confidence=confidence,
-        text=text, repair=Repair(factor={"delta_f": factor}),
+        code=code,
+        channel="delta_f",
+        size=size,
+        deviation=size * deviation,
+        confidence=confidence,
+        text=text,
+        repair=Repair(factor={"delta_f": factor}),
         sure=confidence > SURE and code != "factor",
-    )  # fmt: skip
+    )
 
 
 def words(changes: tuple[Change, ...]) -> str:

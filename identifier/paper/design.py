@@ -301,10 +301,17 @@ def design_for(
     """
     network = network or natural_network(vehicle)
     frame = PaperIdentifier(
-        gains=_placeholder(), network=network, law=law, input_source=input_source,
-        integrator=integrator, dt=dt, force_unit=_natural_force_unit(vehicle.mass),
-        min_speed=vehicle.lowest_speed, seed=seed, driving=driving,
-    )  # fmt: skip
+        gains=_placeholder(),
+        network=network,
+        law=law,
+        input_source=input_source,
+        integrator=integrator,
+        dt=dt,
+        force_unit=_natural_force_unit(vehicle.mass),
+        min_speed=vehicle.lowest_speed,
+        seed=seed,
+        driving=driving,
+    )
     known = frame.operation(vehicle, driving)
     feedback = known.input_feedback
     slowest = 0.0 if feedback is None else minimal_decay(feedback)

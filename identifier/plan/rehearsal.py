@@ -45,7 +45,14 @@ def rehearse(
         state = stepwise.step(state, np.array([planned[k] + added, 0.0]), speed)
     v_x, v_y, r, delta, X_, Y_, psi_, a_y, front, rear = np.array(rows).T
     recording = Recording(
-        name="rehearsal", t=t, v_x=v_x, v_y=v_y, r=r, delta_f=delta, delta_r=np.zeros(t.size),
-        a_y=a_y, axle_force=np.column_stack([front, rear]),
-    )  # fmt: skip
+        name="rehearsal",
+        t=t,
+        v_x=v_x,
+        v_y=v_y,
+        r=r,
+        delta_f=delta,
+        delta_r=np.zeros(t.size),
+        a_y=a_y,
+        axle_force=np.column_stack([front, rear]),
+    )
     return recording, np.column_stack([X_, Y_, psi_])

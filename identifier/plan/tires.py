@@ -80,9 +80,14 @@ class PlausibleTires:
         P = prior.covariance(vehicle, ladder)
         own = prior.means(vehicle, ladder)[1]
         return cls(
-            vehicle=vehicle, method=method, W=np.array(W), steering_lag=lag, own=own, covariance=P,
+            vehicle=vehicle,
+            method=method,
+            W=np.array(W),
+            steering_lag=lag,
+            own=own,
+            covariance=P,
             prior=P,
-        )  # fmt: skip
+        )
 
     @classmethod
     def learnt(

@@ -48,8 +48,11 @@ def strongest_along(history: History, design: PaperIdentifier) -> _Strongest:
     at, largest = strongest(G)
     law = LAWS[design.law]
     loop = Loop(
-        A_d=gains.matrix, forgetting=gains.forgetting, law=law.error(gains.lead), G=G[at],
+        A_d=gains.matrix,
+        forgetting=gains.forgetting,
+        law=law.error(gains.lead),
+        G=G[at],
         direction=direction_matrix(law, gains.matrix),
-    )  # fmt: skip
+    )
     margin = gain_margin(loop, INTEGRATORS[design.integrator], design.dt).factor
     return _Strongest(float(recording.t[moving][at]), largest, margin)

@@ -101,10 +101,15 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
 def _enough(name: str, title: str, value: float, least: float, unit: str) -> Property:
     """Return a margin of the loop that is to be above zero, and better above a least one."""
     return Property(
-        name=name, title=title, value=value, limit=least, margin=value / least,
-        status=at_least(value, good=least, bad=1e-9), unit=unit,
+        name=name,
+        title=title,
+        value=value,
+        limit=least,
+        margin=value / least,
+        status=at_least(value, good=least, bad=1e-9),
+        unit=unit,
         advice="" if value >= least else _CALMER[name],
-    )  # fmt: skip
+    )
 
 
 def weight_check(gains: Gains, operation: Operation, kept: float, judged: float) -> Property:
@@ -200,9 +205,15 @@ def _gain_check(
         if math.isfinite(found.frequency):
             advice += f"; at the limit it oscillates at {found.frequency / (2 * math.pi):.2g} Hz"
     return Property(
-        name=name, title=title, value=value, limit=value * found.factor, margin=found.factor,
-        status=status, unit="1/s^4" if loop.law.z > 0.0 else "1/s^3", advice=advice,
-    )  # fmt: skip
+        name=name,
+        title=title,
+        value=value,
+        limit=value * found.factor,
+        margin=found.factor,
+        status=status,
+        unit="1/s^4" if loop.law.z > 0.0 else "1/s^3",
+        advice=advice,
+    )
 
 
 def _above_zero(name: str, title: str, value: float, advice: str) -> Property:

@@ -159,9 +159,14 @@ def design_gains(
         eta_V = min(eta_V, 0.5 * V_max / memory)
     rho_V = _leakage_of_V(replace(layer, drive=eta_V * layer.drive), V_max, bounds.stage)
     gains = Gains(
-        A_d=A_d, forgetting=lam, eta_W=eta_W, eta_V=eta_V, rho_W=rho_W, rho_V=rho_V,
+        A_d=A_d,
+        forgetting=lam,
+        eta_W=eta_W,
+        eta_V=eta_V,
+        rho_W=rho_W,
+        rho_V=rho_V,
         lead=c_xi if c_z > 0.0 else 0.0,
-    )  # fmt: skip
+    )
     return GainDesign(gains=gains, loop_gain=g, bounds=bounds, V_max=V_max)
 
 

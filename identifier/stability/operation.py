@@ -218,9 +218,13 @@ def worst_loop(
         W_max=W,
     )
     return Loop(
-        A_d=gains.matrix, forgetting=gains.forgetting, law=law, G=g * np.eye(2),
-        input_feedback=operation.input_feedback, direction=direction,
-    )  # fmt: skip
+        A_d=gains.matrix,
+        forgetting=gains.forgetting,
+        law=law,
+        G=g * np.eye(2),
+        input_feedback=operation.input_feedback,
+        direction=direction,
+    )
 
 
 # The loop that opens where the network reads the estimate x_hat instead of the measurement.
@@ -399,15 +403,20 @@ def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
     )  # fmt: skip
     estimated = design.input_source == "estimated"
     return Operation(
-        n_h=design.network.hidden, dt=design.dt, integrator=design.integrator,
-        bandwidth=driving.bandwidth, disturbance=found, needed_force=expected / design.force_unit,
+        n_h=design.network.hidden,
+        dt=design.dt,
+        integrator=design.integrator,
+        bandwidth=driving.bandwidth,
+        disturbance=found,
+        needed_force=expected / design.force_unit,
         x_bar_max=_largest_input(design, vehicle, driving),
         V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
         input_feedback=feedback if estimated else None,
-        input_per_error=input_per_error(design, vehicle, driving) if estimated else 0.0, W_M=0.0,
+        input_per_error=input_per_error(design, vehicle, driving) if estimated else 0.0,
+        W_M=0.0,
         w_bar=found.residual,
         W_large=2.0 * expected / design.force_unit / math.sqrt(design.network.hidden),
-    )  # fmt: skip
+    )
 
 
 def _stiffness(vehicle: Vehicle) -> Array:

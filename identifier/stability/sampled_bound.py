@@ -188,10 +188,14 @@ def output_layer(
     dt : sampling interval [s].
     """
     return Learning(
-        law=law, forgetting=gains.forgetting, leakage=gains.rho_W,
+        law=law,
+        forgetting=gains.forgetting,
+        leakage=gains.rho_W,
         drive=gains.eta_W * _norm(direction) * math.sqrt(n_h),
-        dt=0.0 if integrator == "exact" else dt, staged=integrator == "rk4", free=gains.W_free,
-    )  # fmt: skip
+        dt=0.0 if integrator == "exact" else dt,
+        staged=integrator == "rk4",
+        free=gains.W_free,
+    )
 
 
 def by_leakage(

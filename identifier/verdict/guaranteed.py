@@ -67,10 +67,14 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
         return np.stack(columns, axis=1).reshape(-1, *signal.shape[1:])
 
     return Strips(
-        y=mean(impulse, slope) + mean(sideways[:, None], g), h=mean(units, g),
-        beyond=mean(doubt.beyond, g), rate=mean(doubt.rate, g), lost=mean(doubt.lost, g),
-        v_x=mean(recording.v_x[:, None], g)[:, 0], t=recording.t[windows.starts],
-    )  # fmt: skip
+        y=mean(impulse, slope) + mean(sideways[:, None], g),
+        h=mean(units, g),
+        beyond=mean(doubt.beyond, g),
+        rate=mean(doubt.rate, g),
+        lost=mean(doubt.lost, g),
+        v_x=mean(recording.v_x[:, None], g)[:, 0],
+        t=recording.t[windows.starts],
+    )
 
 
 def triangle(n: int, dt: float) -> tuple[Array, Array]:
@@ -116,9 +120,12 @@ def guaranteed(
             raise _violated(strips, axle, chosen, box)
         corners.append(found)
     guarantee = Guarantee(
-        bound=chosen, told=told is not None, corners=(corners[0], corners[1]),
-        speed=float(strips.v_x.mean()), fastest=fastest(strips),
-    )  # fmt: skip
+        bound=chosen,
+        told=told is not None,
+        corners=(corners[0], corners[1]),
+        speed=float(strips.v_x.mean()),
+        fastest=fastest(strips),
+    )
     return replace(carries, guarantee=guarantee)
 
 

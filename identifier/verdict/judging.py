@@ -368,9 +368,13 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
     clock, starts, n = whole.t[asked.portion.samples], found.windows.starts, found.windows.n
     middle = 0.5 * (clock[starts] + clock[starts + n])
     return Verdict(
-        findings=tuple(listed), numbers=numbers, measures=measures, reach=_reach(model, recording),
-        blind=blind, shown=WindowForces(middle, found.measured, found.modelled),
-    )  # fmt: skip
+        findings=tuple(listed),
+        numbers=numbers,
+        measures=measures,
+        reach=_reach(model, recording),
+        blind=blind,
+        shown=WindowForces(middle, found.measured, found.modelled),
+    )
 
 
 def _reach(model: TireModel, recording: Recording) -> str:

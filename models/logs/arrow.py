@@ -74,10 +74,13 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
                 delimiter=layout.delimiter, newlines_in_values=b'"' in block, double_quote=True
             ),
             pyarrow.csv.ConvertOptions(
-                column_types=kinds, include_columns=list(kinds), null_values=_NULLS,
-                strings_can_be_null=False, decimal_point=layout.decimal,
+                column_types=kinds,
+                include_columns=list(kinds),
+                null_values=_NULLS,
+                strings_can_be_null=False,
+                decimal_point=layout.decimal,
             ),
-        )  # fmt: skip
+        )
         if table.num_rows != block.count(b"\n") + (not block.endswith(b"\n")):
             return None
         columns: dict[int, Any] = {}

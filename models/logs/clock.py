@@ -64,9 +64,13 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     if kept.all() or not kept.any() or (not cut and holes(channel).size):
         return channel
     return Channel(
-        name=channel.name, unit=channel.unit, t=channel.t[kept], values=channel.values[kept],
-        place=channel.place, rows=channel.rows[kept],
-    )  # fmt: skip
+        name=channel.name,
+        unit=channel.unit,
+        t=channel.t[kept],
+        values=channel.values[kept],
+        place=channel.place,
+        rows=channel.rows[kept],
+    )
 
 
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:

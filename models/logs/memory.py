@@ -118,11 +118,15 @@ class ArrayLog:
             self._noted.extend(stamps.notes)
         return tuple(
             Channel(
-                name=name, unit="", t=stamps.t, values=stamps.of(columns[name][kept]),
-                place="index", rows=stamps.of(rows),
+                name=name,
+                unit="",
+                t=stamps.t,
+                values=stamps.of(columns[name][kept]),
+                place="index",
+                rows=stamps.of(rows),
             )
             for name in names
-        )  # fmt: skip
+        )
 
     def _column(self, name: str) -> Array:
         value = self._arrays[name]

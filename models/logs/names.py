@@ -427,9 +427,12 @@ def _along_axes(
     for one in found.axes:
         near = KNOWN if is_told(units[one.name]) else KNOWN - _NO_UNIT_LOSS
         guess = Guess(
-            channel=(one.name,), confidence=near, unit=units[one.name], factor=one.factor,
+            channel=(one.name,),
+            confidence=near,
+            unit=units[one.name],
+            factor=one.factor,
             why=one.why,
-        )  # fmt: skip
+        )
         mended[one.signal].append(guess)
     return mended
 

@@ -316,11 +316,20 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     words += [f"units in line {units_line.number}"] if units_line is not None else []
     words += [] if units_line is not None or not any(units) else ["units in the names"]
     return Layout(
-        encoding=encoding, delimiter=way.delimiter, decimal=way.decimal, thousands=way.thousands,
-        names=tuple(names), units=tuple(units), first=lines[first].number, again=again,
-        numeric=_numeric(data, names, way), rows=data, words=tuple(words), made_by=made_by,
+        encoding=encoding,
+        delimiter=way.delimiter,
+        decimal=way.decimal,
+        thousands=way.thousands,
+        names=tuple(names),
+        units=tuple(units),
+        first=lines[first].number,
+        again=again,
+        numeric=_numeric(data, names, way),
+        rows=data,
+        words=tuple(words),
+        made_by=made_by,
         rate=_told_rate([line.text for line in lines[: lines.index(names_line)]]),
-    )  # fmt: skip
+    )
 
 
 def _told_rate(preamble: Sequence[str]) -> float:

@@ -378,11 +378,14 @@ class TableLog:
             asked = k == column and not timed
             channels.append(
                 Channel(
-                    name=name, unit=self.table.units[k], t=stamps.t,
+                    name=name,
+                    unit=self.table.units[k],
+                    t=stamps.t,
                     values=stamps.t if asked else stamps.of(cells.columns[k]),
-                    place=self.table.place, rows=stamps.of(cells.rows),
+                    place=self.table.place,
+                    rows=stamps.of(cells.rows),
                 )
-            )  # fmt: skip
+            )
         return tuple(channels)
 
     @cached_property

@@ -327,11 +327,17 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
     for values in (t, *signals.values()):  # kept as they are, not copied
         values.setflags(write=False)
     return Recording(
-        name=name, t=t, v_x=signals["v_x"], v_y=signals.get("v_y"), r=signals["r"],
+        name=name,
+        t=t,
+        v_x=signals["v_x"],
+        v_y=signals.get("v_y"),
+        r=signals["r"],
         delta_f=signals["delta_f"],
         delta_r=signals["delta_r"] if "delta_r" in signals else np.zeros(t.size),
-        a_y=signals.get("a_y"), a_x=signals.get("a_x"), axle_force=force,
-    )  # fmt: skip
+        a_y=signals.get("a_y"),
+        a_x=signals.get("a_x"),
+        axle_force=force,
+    )
 
 
 def wheel_scales(

@@ -115,13 +115,17 @@ def windows(recording: Recording) -> Means:
 
     v_y, force = recording.logged_v_y, recording.axle_force
     return Means(
-        v_x=mean(recording.v_x), v_y=None if v_y is None else mean(v_y), r=mean(recording.r),
-        delta_f=mean(recording.delta_f), delta_r=mean(recording.delta_r),
-        v_y_dot=None if v_y is None else slope(v_y), r_dot=slope(recording.r),
+        v_x=mean(recording.v_x),
+        v_y=None if v_y is None else mean(v_y),
+        r=mean(recording.r),
+        delta_f=mean(recording.delta_f),
+        delta_r=mean(recording.delta_r),
+        v_y_dot=None if v_y is None else slope(v_y),
+        r_dot=slope(recording.r),
         v_x_r=mean(recording.v_x, recording.r),
         a_y=None if recording.a_y is None else mean(recording.a_y),
         force=None if force is None else np.column_stack([mean(force[:, 0]), mean(force[:, 1])]),
-    )  # fmt: skip
+    )
 
 
 def least_squares(X: Array, y: Array) -> Fit:

@@ -399,9 +399,13 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
             column = missing.replace("_", "")
             notes.append(f"{column} is left out, {', '.join(without)} has none")
     return Recording(
-        name=name, t=t, **signals, breaks=tuple(breaks), notes=tuple(notes),
+        name=name,
+        t=t,
+        **signals,
+        breaks=tuple(breaks),
+        notes=tuple(notes),
         estimated=tuple(sorted({signal for one in recordings for signal in one.estimated})),
-    )  # fmt: skip
+    )
 
 
 def _in_a_row(signals: Sequence[Array]) -> Array:

@@ -184,9 +184,12 @@ class Repair:
             factor[key] = factor.get(key, 1.0) * value
         places = {name: getattr(self, name) + getattr(other, name) for name in SCALARS}
         return Repair(
-            factor=factor, sideslip=self.sideslip or other.sideslip,
-            vehicle={**self.vehicle, **other.vehicle}, **sums, **places,
-        )  # fmt: skip
+            factor=factor,
+            sideslip=self.sideslip or other.sideslip,
+            vehicle={**self.vehicle, **other.vehicle},
+            **sums,
+            **places,
+        )
 
     def then(self, other: "Repair") -> "Repair":
         """Return one repair that does what this and, of what it leaves, another do.

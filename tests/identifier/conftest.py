@@ -31,9 +31,15 @@ def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
 def at_one_speed(name, speed, t, v_y, r, delta_f, axle_force):
     """A recording of a car that steers its front wheels alone and keeps its speed."""
     return Recording(
-        name=name, t=t, v_x=np.full(t.size, speed), v_y=v_y, r=r, delta_f=delta_f,
-        delta_r=np.zeros(t.size), axle_force=axle_force,
-    )  # fmt: skip
+        name=name,
+        t=t,
+        v_x=np.full(t.size, speed),
+        v_y=v_y,
+        r=r,
+        delta_f=delta_f,
+        delta_r=np.zeros(t.size),
+        axle_force=axle_force,
+    )
 
 
 @cache

@@ -55,9 +55,14 @@ def turning(dt: float = DT, v_y: float = 0.3, rear: float = 0.0) -> Recording:
     t = np.arange(0.0, 20.0, dt)
     r = 0.5 * np.sin(2.0 * t)
     return Recording(
-        name="turning", t=t, v_x=np.full(t.size, 10.0), v_y=v_y * r, r=r,
-        delta_f=0.1 * np.sin(2.0 * t), delta_r=rear * np.sin(2.0 * t),
-    )  # fmt: skip
+        name="turning",
+        t=t,
+        v_x=np.full(t.size, 10.0),
+        v_y=v_y * r,
+        r=r,
+        delta_f=0.1 * np.sin(2.0 * t),
+        delta_r=rear * np.sin(2.0 * t),
+    )
 
 
 @pytest.mark.parametrize("dt", [0.002, 0.01, 0.04])

@@ -66,10 +66,17 @@ def test_what_is_written_reads_back_bit_for_bit(
     tmp_path_factory, told, axes, words, gap, low_pass, wheels, repair
 ) -> None:
     made = LogMap(
-        signals=told, axes=axes, run=words[0], clock=words[1], longest_gap=gap,
-        holes="cut" if gap > 1.0 else "refuse", order="mend" if gap < 2.0 else "refuse",
-        low_pass=low_pass, wheels=wheels, repair=repair,
-    )  # fmt: skip
+        signals=told,
+        axes=axes,
+        run=words[0],
+        clock=words[1],
+        longest_gap=gap,
+        holes="cut" if gap > 1.0 else "refuse",
+        order="mend" if gap < 2.0 else "refuse",
+        low_pass=low_pass,
+        wheels=wheels,
+        repair=repair,
+    )
     path = tmp_path_factory.mktemp("map") / "log.toml"
     made.to_toml(path)
     again = LogMap.from_toml(path)

@@ -245,9 +245,14 @@ def test_what_somebody_may_write_is_copied_though_the_view_of_it_is_not_writable
     view.flags.writeable = False
     n = len(table)
     run = Recording(
-        name="a", t=0.01 * np.arange(n), v_x=view[:, 0], v_y=view[:, 1], r=np.zeros(n),
-        delta_f=np.zeros(n), delta_r=np.zeros(n),
-    )  # fmt: skip
+        name="a",
+        t=0.01 * np.arange(n),
+        v_x=view[:, 0],
+        v_y=view[:, 1],
+        r=np.zeros(n),
+        delta_f=np.zeros(n),
+        delta_r=np.zeros(n),
+    )
     table[:] = np.nan
     assert (run.v_x == 20.0).all() and not run.needed("v_y").any()
     again = replace(run, name="b")

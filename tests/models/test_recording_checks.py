@@ -232,10 +232,15 @@ def test_a_drift_with_opposite_lock_passes() -> None:
     wobble = 1.0 + 0.05 * np.sin(2.0 * t)
     v_y = v * np.sin(beta) * wobble
     made = Recording(
-        name="drift", t=t, v_x=np.full(t.size, v * np.cos(beta)), v_y=v_y, r=r * wobble,
-        delta_f=-0.2 * wobble, delta_r=0 * t,
+        name="drift",
+        t=t,
+        v_x=np.full(t.size, v * np.cos(beta)),
+        v_y=v_y,
+        r=r * wobble,
+        delta_f=-0.2 * wobble,
+        delta_r=0 * t,
         a_y=np.gradient(v_y, t) + v * np.cos(beta) * r * wobble,
-    )  # fmt: skip
+    )
     check_physics(made)
 
 

@@ -330,9 +330,15 @@ def mirrored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     t = 0.01 * np.arange(1000)
     r = 0.3 * np.sin(2.0 * t)
     drive = Recording(
-        name="mirrored", t=t, v_x=np.full(t.size, 20.0), v_y=0.0 * t, r=r, delta_f=2.7 / 20.0 * r,
-        delta_r=0.0 * t, a_y=-20.0 * r,
-    )  # fmt: skip
+        name="mirrored",
+        t=t,
+        v_x=np.full(t.size, 20.0),
+        v_y=0.0 * t,
+        r=r,
+        delta_f=2.7 / 20.0 * r,
+        delta_r=0.0 * t,
+        a_y=-20.0 * r,
+    )
     return write_recording(drive, tmp_path_factory.mktemp("logs") / "mirrored.csv")
 
 

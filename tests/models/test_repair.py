@@ -35,10 +35,16 @@ def drive():
         return np.sin(2.0 * np.pi * 0.4 * (t - late)) * np.sin(0.2 * (t - late))
 
     return Recording(
-        name="swings", t=t, v_x=20.0 + 2.0 * np.sin(0.3 * t), v_y=0.5 * swing(0.15),
-        r=0.3 * swing(0.1), delta_f=0.05 * swing(0.0), delta_r=0.0 * t, a_y=6.0 * swing(0.1),
+        name="swings",
+        t=t,
+        v_x=20.0 + 2.0 * np.sin(0.3 * t),
+        v_y=0.5 * swing(0.15),
+        r=0.3 * swing(0.1),
+        delta_f=0.05 * swing(0.0),
+        delta_r=0.0 * t,
+        a_y=6.0 * swing(0.1),
         axle_force=np.column_stack([swing(0.0), swing(0.1)]),
-    )  # fmt: skip
+    )
 
 
 def biased(channel, size):

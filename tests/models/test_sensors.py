@@ -15,10 +15,16 @@ T = 0.01 * np.arange(N)
 def exact(rear: float = 0.0) -> Recording:
     wave = np.sin(2.0 * math.pi * 0.3 * T)
     return Recording(
-        name="exact", t=T, v_x=20.0 + wave, v_y=0.5 * wave, r=0.3 * wave, delta_f=0.05 * wave,
-        delta_r=rear * wave, a_y=6.0 * wave,
+        name="exact",
+        t=T,
+        v_x=20.0 + wave,
+        v_y=0.5 * wave,
+        r=0.3 * wave,
+        delta_f=0.05 * wave,
+        delta_r=rear * wave,
+        a_y=6.0 * wave,
         axle_force=np.column_stack((5000.0 * wave, 4000.0 * wave)),
-    )  # fmt: skip
+    )
 
 
 def test_perfect_sensors_change_nothing(rng):

@@ -53,14 +53,18 @@ TIRES = {
     ),
     "lagged magic": prediction_tire(
         CurveModel(
-            vehicle=CAR, curve="magic_formula", parameters=MAGIC, min_speed=1.0,
-            relaxation_length=np.array([0.5, 0.8]), offset=np.array([0.01, 0.1]),
+            vehicle=CAR,
+            curve="magic_formula",
+            parameters=MAGIC,
+            min_speed=1.0,
+            relaxation_length=np.array([0.5, 0.8]),
+            offset=np.array([0.01, 0.1]),
         )
     ),
     "dugoff": prediction_tire(DugoffTire(**WHEEL), CAR),
     "fiala": prediction_tire(FialaTire(**WHEEL), CAR),
     "oracle": oracle_tire(CAR),
-}  # fmt: skip
+}
 
 
 def situations(tire, count=60, seed=1):

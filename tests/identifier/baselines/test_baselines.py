@@ -35,10 +35,14 @@ def test_a_similar_model_car_learns_the_same(make, car, drive):
     )  # fmt: skip
     dt = 0.01 / np.sqrt(s)
     shrunk = Recording(
-        name="small", t=recording.t / np.sqrt(s), v_x=recording.v_x / np.sqrt(s),
-        v_y=recording.v_y / np.sqrt(s), r=recording.r * np.sqrt(s), delta_f=recording.delta_f,
+        name="small",
+        t=recording.t / np.sqrt(s),
+        v_x=recording.v_x / np.sqrt(s),
+        v_y=recording.v_y / np.sqrt(s),
+        r=recording.r * np.sqrt(s),
+        delta_f=recording.delta_f,
         delta_r=recording.delta_r,
-    )  # fmt: skip
+    )
     shrunk = replace(shrunk, t=np.arange(600) * shrunk.dt)
     large_force = identify(recording, car, make(car)).axle_force
     small_force = identify(shrunk, small, make(small, dt=shrunk.dt)).axle_force

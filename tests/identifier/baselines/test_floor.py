@@ -32,9 +32,13 @@ def test_planted_parameters_are_found_exactly(car, curve_drive, rng):
 
 def test_planted_lag_and_offsets_are_found_too(car, drive, rng):
     true = CurveModel(
-        vehicle=car, curve="magic_formula", parameters=MAGIC, min_speed=1.0,
-        relaxation_length=np.array([0.7, 1.1]), offset=np.array([0.003, -0.05]),
-    )  # fmt: skip
+        vehicle=car,
+        curve="magic_formula",
+        parameters=MAGIC,
+        min_speed=1.0,
+        relaxation_length=np.array([0.7, 1.1]),
+        offset=np.array([0.003, -0.05]),
+    )
     recording = drive(n=600)
     recording = replace(recording, axle_force=true.axle_force(recording))
     model = fit_floor(curve_structure(magic_formula_ekf(car), car), [recording], rng=rng, starts=1)

@@ -25,9 +25,15 @@ def smooth():
     rng = np.random.default_rng(5)
     r, v_x = swing(rng, 0.2), 20.0 + swing(rng, 1.0)
     return Recording(
-        name="made", t=T, v_x=v_x, v_y=swing(rng, 0.4), r=r, delta_f=swing(rng, 0.03),
-        delta_r=np.zeros(T.size), a_y=v_x * r + swing(rng, 0.3),
-    )  # fmt: skip
+        name="made",
+        t=T,
+        v_x=v_x,
+        v_y=swing(rng, 0.4),
+        r=r,
+        delta_f=swing(rng, 0.03),
+        delta_r=np.zeros(T.size),
+        a_y=v_x * r + swing(rng, 0.3),
+    )
 
 
 @pytest.fixture(scope="module")

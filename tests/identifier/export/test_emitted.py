@@ -37,9 +37,14 @@ def fitted(car=CAR, sd=0.1, **numbers):
     for name, value in numbers.items():
         p[INDEX[name]] = value
     return FittedModel(
-        vehicle=car, p=p, covariance=sd**2 * priors.covariance, driven=np.array([0.2, 0.15]),
-        speeds=np.array([5.0, 30.0]), a_x=np.array([-5.0, 3.0]), unexplained=np.zeros(2),
-    )  # fmt: skip
+        vehicle=car,
+        p=p,
+        covariance=sd**2 * priors.covariance,
+        driven=np.array([0.2, 0.15]),
+        speeds=np.array([5.0, 30.0]),
+        a_x=np.array([-5.0, 3.0]),
+        unexplained=np.zeros(2),
+    )
 
 
 TIRES = {

@@ -30,10 +30,14 @@ def swaying(n, dt=0.01):
     """Signals of a car that sways; nothing says that they fit together."""
     t = dt * np.arange(n)
     return Recording(
-        name="swaying", t=t, v_x=20 + 2 * np.sin(0.3 * t), v_y=0.1 + 0.5 * np.sin(2.0 * t),
-        r=0.3 * np.sin(2.0 * t + 0.4), delta_f=0.04 * np.sin(2.0 * t + 0.9),
+        name="swaying",
+        t=t,
+        v_x=20 + 2 * np.sin(0.3 * t),
+        v_y=0.1 + 0.5 * np.sin(2.0 * t),
+        r=0.3 * np.sin(2.0 * t + 0.4),
+        delta_f=0.04 * np.sin(2.0 * t + 0.9),
         delta_r=0.01 * np.sin(1.3 * t),
-    )  # fmt: skip
+    )
 
 
 def rows(drive):

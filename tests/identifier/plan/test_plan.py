@@ -113,9 +113,14 @@ def test_the_identifier_ends_as_sure_as_was_expected_of_it(tires, monkeypatch):
     P = covariance_after(tires, motion, SPEED)[0, 0]
     one = motion.r[:, 0, 0]
     log = Recording(
-        name="as planned", t=t, v_x=np.full(t.size, SPEED), v_y=motion.v_y[:, 0, 0], r=one,
-        delta_f=motion.delta[:, 0, 0], delta_r=np.zeros(t.size),
-    )  # fmt: skip
+        name="as planned",
+        t=t,
+        v_x=np.full(t.size, SPEED),
+        v_y=motion.v_y[:, 0, 0],
+        r=one,
+        delta_f=motion.delta[:, 0, 0],
+        delta_r=np.zeros(t.size),
+    )
     known = identify(log, CAR, AxleIdentifier.for_vehicle(CAR, dt=log.dt)).freeze()
     doubt = asked(tires, SPEED)
     ours, theirs = deviation(doubt, P), deviation(doubt, known.covariance)

@@ -16,9 +16,17 @@ integral, instantaneous, lead_law = (
 )
 
 CITY = Operation(
-    n_h=10, dt=0.01, integrator="euler", bandwidth=0.7, disturbance=Disturbance(residual=4.0),
-    needed_force=4.0, x_bar_max=2.5, input_feedback=None, W_M=3.0, w_bar=0.2,
-)  # fmt: skip
+    n_h=10,
+    dt=0.01,
+    integrator="euler",
+    bandwidth=0.7,
+    disturbance=Disturbance(residual=4.0),
+    needed_force=4.0,
+    x_bar_max=2.5,
+    input_feedback=None,
+    W_M=3.0,
+    w_bar=0.2,
+)
 
 
 def designed(law):

@@ -115,13 +115,26 @@ def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
 def test_the_certificate_finds_no_gain_limit_of_the_lead_even_for_skewed_error_dynamics():
     tau = 1.01 * lead_time(lyapunov(SKEWED, 2.0 * np.eye(2)), forgetting=3.0)
     task = Operation(
-        n_h=4, dt=0.001, integrator="rk4", bandwidth=0.5, disturbance=Disturbance(residual=2.0),
-        needed_force=2.0, x_bar_max=1.0, input_feedback=None, W_M=0.0, w_bar=2.0,
-    )  # fmt: skip
+        n_h=4,
+        dt=0.001,
+        integrator="rk4",
+        bandwidth=0.5,
+        disturbance=Disturbance(residual=2.0),
+        needed_force=2.0,
+        x_bar_max=1.0,
+        input_feedback=None,
+        W_M=0.0,
+        w_bar=2.0,
+    )
     gains = Gains(
-        A_d=tuple(map(tuple, SKEWED)), forgetting=3.0, eta_W=1.0, eta_V=0.0, rho_W=0.1, rho_V=0.1,
+        A_d=tuple(map(tuple, SKEWED)),
+        forgetting=3.0,
+        eta_W=1.0,
+        eta_V=0.0,
+        rho_W=0.1,
+        rho_V=0.1,
         lead=tau,
-    )  # fmt: skip
+    )
     certificate = certify(gains, LAWS["pi_lead"], task)
     assert certificate["gain_continuous"].margin == np.inf
     assert certificate["drift"].limit == np.inf

@@ -33,9 +33,13 @@ LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead
 def learning_of(A_d, law, *, lam, eta_W, rho_W, n_h, integrator="euler", dt=2e-3):
     """How W learns and leaks, along -A_d⁻ᵀ."""
     gains = Gains(
-        A_d=tuple(map(tuple, np.asarray(A_d).tolist())), forgetting=lam, eta_W=eta_W, eta_V=0.0,
-        rho_W=rho_W, rho_V=0.0,
-    )  # fmt: skip
+        A_d=tuple(map(tuple, np.asarray(A_d).tolist())),
+        forgetting=lam,
+        eta_W=eta_W,
+        eta_V=0.0,
+        rho_W=rho_W,
+        rho_V=0.0,
+    )
     return output_layer(gains, law, -np.linalg.inv(A_d).T, n_h=n_h, integrator=integrator, dt=dt)
 
 
@@ -237,10 +241,18 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
     signals = np.hstack([history.recording.x, history.recording.u])
     x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
     operation = Operation(
-        n_h=8, dt=0.01, integrator="euler", bandwidth=0.7, disturbance=Disturbance(residual=f_max),
-        needed_force=f_max, x_bar_max=x_bar_max, input_feedback=None, W_M=0.0, w_bar=f_max,
+        n_h=8,
+        dt=0.01,
+        integrator="euler",
+        bandwidth=0.7,
+        disturbance=Disturbance(residual=f_max),
+        needed_force=f_max,
+        x_bar_max=x_bar_max,
+        input_feedback=None,
+        W_M=0.0,
+        w_bar=f_max,
         V_start=V_start,
-    )  # fmt: skip
+    )
     inverse = np.eye(2) / 6.0
     proven = proven_bounds(history.design.gains, INTEGRAL, operation, inverse)
     bounds = proven.leakage

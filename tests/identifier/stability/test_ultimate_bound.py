@@ -89,13 +89,25 @@ def test_the_canceling_pair_gives_the_closed_form_of_the_tight_bound():
 def best_printed(*, w_bar, W_M, n_h, eta_W, rho_W):
     """The certificate's "printed_bound" for SKEWED."""
     gains = Gains(
-        A_d=tuple(map(tuple, SKEWED.tolist())), forgetting=1.0, eta_W=eta_W, eta_V=0.0,
-        rho_W=rho_W, rho_V=0.0,
-    )  # fmt: skip
+        A_d=tuple(map(tuple, SKEWED.tolist())),
+        forgetting=1.0,
+        eta_W=eta_W,
+        eta_V=0.0,
+        rho_W=rho_W,
+        rho_V=0.0,
+    )
     operation = Operation(
-        n_h=n_h, dt=0.01, integrator="exact", bandwidth=1.0, disturbance=Disturbance(residual=1.0),
-        needed_force=1.0, x_bar_max=1.0, input_feedback=None, W_M=W_M, w_bar=w_bar,
-    )  # fmt: skip
+        n_h=n_h,
+        dt=0.01,
+        integrator="exact",
+        bandwidth=1.0,
+        disturbance=Disturbance(residual=1.0),
+        needed_force=1.0,
+        x_bar_max=1.0,
+        input_feedback=None,
+        W_M=W_M,
+        w_bar=w_bar,
+    )
     entries = printed_bounds(gains, INSTANTANEOUS, operation, trivial=1.0)
     return {entry.name: entry.value for entry in entries}["printed_bound"]
 

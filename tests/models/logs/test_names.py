@@ -102,12 +102,15 @@ class Log:
     def read(self, names, run=None) -> tuple[Channel, ...]:
         return tuple(
             Channel(
-                name=name, unit=self.channels[name][0],
-                t=0.01 * np.arange(self.channels[name][1].size), values=self.channels[name][1],
-                place="sample", rows=np.arange(self.channels[name][1].size),
+                name=name,
+                unit=self.channels[name][0],
+                t=0.01 * np.arange(self.channels[name][1].size),
+                values=self.channels[name][1],
+                place="sample",
+                rows=np.arange(self.channels[name][1].size),
             )
             for name in names
-        )  # fmt: skip
+        )
 
 
 WAVE = np.sin(np.arange(200.0))

@@ -43,11 +43,14 @@ def rows(folder: Path, tire: MagicFormula) -> list[Row]:
     return [
         Row(
             alpha_iso=radians(round(degrees(float(line["alpha_rad"])), 6)),
-            kappa=float(line["kappa"]), gamma=radians(round(degrees(float(line["gamma_rad"])), 6)),
-            F_z=round(float(line["Fz_N"]) / F_z0, 6) * F_z0, F_y0=line["Fy0"], F_y=line["Fy"],
+            kappa=float(line["kappa"]),
+            gamma=radians(round(degrees(float(line["gamma_rad"])), 6)),
+            F_z=round(float(line["Fz_N"]) / F_z0, 6) * F_z0,
+            F_y0=line["Fy0"],
+            F_y=line["Fy"],
         )
         for line in lines
-    ]  # fmt: skip
+    ]
 
 
 @pytest.fixture(scope="module", params=FILES)

@@ -30,10 +30,14 @@ def motions(n=200, speed=(8.0, 40.0), seed=3):
     """A recording of unrelated samples: every sample is another speed, drift and steering."""
     rng = np.random.default_rng(seed)
     return Recording(
-        name="motions", t=0.01 * np.arange(n), v_x=rng.uniform(*speed, n),
-        v_y=rng.normal(0.0, 1.0, n), r=rng.normal(0.0, 0.3, n), delta_f=rng.normal(0.0, 0.1, n),
+        name="motions",
+        t=0.01 * np.arange(n),
+        v_x=rng.uniform(*speed, n),
+        v_y=rng.normal(0.0, 1.0, n),
+        r=rng.normal(0.0, 0.3, n),
+        delta_f=rng.normal(0.0, 0.1, n),
         delta_r=np.zeros(n),
-    )  # fmt: skip
+    )
 
 
 def at(recording):

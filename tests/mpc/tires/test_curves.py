@@ -31,9 +31,13 @@ def test_forces_are_those_of_the_frozen_curve(car, motions, forces, at, curve):
 @pytest.mark.parametrize("curve", CURVES)
 def test_a_lagged_curve_is_the_frozen_models_own_expressions(car, motions, forces, at, curve):
     model = CurveModel(
-        vehicle=car, curve=curve, parameters=CURVES[curve], min_speed=1.0,
-        relaxation_length=np.array([0.5, 0.8]), offset=np.array([0.01, -0.2]),
-    )  # fmt: skip
+        vehicle=car,
+        curve=curve,
+        parameters=CURVES[curve],
+        min_speed=1.0,
+        relaxation_length=np.array([0.5, 0.8]),
+        offset=np.array([0.01, -0.2]),
+    )
     tire = prediction_tire(model)
     assert tire.structure.lagged
     behind = np.random.default_rng(1).normal(0.0, 0.1, (len(motions), 2))
@@ -51,9 +55,12 @@ def test_a_lagged_curve_is_the_frozen_models_own_expressions(car, motions, force
 
 def test_offsets_without_a_lag_add_no_states(car, motions, forces, at):
     model = CurveModel(
-        vehicle=car, curve="magic_formula", parameters=CURVES["magic_formula"], min_speed=1.0,
+        vehicle=car,
+        curve="magic_formula",
+        parameters=CURVES["magic_formula"],
+        min_speed=1.0,
         offset=np.array([0.01, -0.2]),
-    )  # fmt: skip
+    )
     tire = prediction_tire(model)
     assert not tire.structure.lagged
     force, _ = forces(tire, *at(motions))

@@ -19,27 +19,42 @@ W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
 def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.0), weights=W):
     design, n = AxleIdentifier.for_vehicle(car), weights.shape[1]
     return AxleModel(
-        vehicle=car, ladder=design.ladder, sway=design.sway, plausibility=design.plausibility,
-        W=weights, own=np.column_stack([compliance, sway, offset]),
+        vehicle=car,
+        ladder=design.ladder,
+        sway=design.sway,
+        plausibility=design.plausibility,
+        W=weights,
+        own=np.column_stack([compliance, sway, offset]),
         covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
-        prior_covariance=np.tile(np.eye(n + 3), (2, 1, 1)), excitation=np.zeros((2, 9)),
-    )  # fmt: skip
+        prior_covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
+        excitation=np.zeros((2, 9)),
+    )
 
 
 def slalom(n=600, speed=20.0):
     t = 0.01 * np.arange(n)
     wave = np.sin(2.0 * np.pi * 0.7 * t)
     return Recording(
-        name="slalom", t=t, v_x=np.full(n, speed), v_y=0.5 * np.sin(2.0 * np.pi * 0.7 * t + 0.5),
-        r=0.3 * wave, delta_f=0.05 * wave, delta_r=np.zeros(n),
-    )  # fmt: skip
+        name="slalom",
+        t=t,
+        v_x=np.full(n, speed),
+        v_y=0.5 * np.sin(2.0 * np.pi * 0.7 * t + 0.5),
+        r=0.3 * wave,
+        delta_f=0.05 * wave,
+        delta_r=np.zeros(n),
+    )
 
 
 def standing(v_y, r, delta, speed=20.0, n=400):
     return Recording(
-        name="steady", t=0.01 * np.arange(n), v_x=np.full(n, speed), v_y=np.full(n, v_y),
-        r=np.full(n, r), delta_f=np.full(n, delta), delta_r=np.zeros(n),
-    )  # fmt: skip
+        name="steady",
+        t=0.01 * np.arange(n),
+        v_x=np.full(n, speed),
+        v_y=np.full(n, v_y),
+        r=np.full(n, r),
+        delta_f=np.full(n, delta),
+        delta_r=np.zeros(n),
+    )
 
 
 @pytest.mark.parametrize("motion", [(0.4, 0.3, 0.05), (-1.0, -0.2, -0.1), (1.5, 0.5, 0.2)])
@@ -124,9 +139,14 @@ def test_a_body_that_sways_slowly_is_a_softer_carcass(car):
             x[:2] = 0.0
     v_y, r = np.array(rows).T
     drive = Recording(
-        name="rhythm", t=t, v_x=np.full(t.size, v_x), v_y=v_y, r=r, delta_f=delta,
+        name="rhythm",
+        t=t,
+        v_x=np.full(t.size, v_x),
+        v_y=v_y,
+        r=r,
+        delta_f=delta,
         delta_r=np.zeros(t.size),
-    )  # fmt: skip
+    )
     found, late = np.array(slips)[600:], slice(600, None)
     with_sway, without = (model.lagged_slip(drive)[late] for model in (sways, rests))
     size = np.abs(with_sway).max(axis=0)
