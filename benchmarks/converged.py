@@ -194,7 +194,8 @@ def prepare_solution(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> floa
     instance = tracker.instance
     instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
     start = time.perf_counter()
-    instance.prepare_from(instance.state["x"][0])
+    instance.start[:] = instance.state["x"][0]
+    instance._library.mpc_prepare_from(*instance.solve_arguments)
     return time.perf_counter() - start
 
 

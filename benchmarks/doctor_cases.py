@@ -12,17 +12,17 @@ import numpy as np
 
 from benchmarks.doctor_answers import Right
 from benchmarks.fault_cases import Case, Scale
-from identifier.doctor.readings import DEGREE
-from models.faults import (
+from benchmarks.faults import (
     Bank,
     Lagging,
     Late,
     Misaligned,
     SensorElsewhere,
-    SensorFault,
     ShiftedCenter,
     WrongNumber,
 )
+from identifier.doctor.readings import DEGREE
+from models.faults import SensorFault
 from models.vehicle import Vehicle
 
 

@@ -5,7 +5,7 @@ vehicles of `recorded_cars`. The recordings of ../shared/data are not part of th
 them this part is skipped.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from identifier.compare.course import (
     same_and_other,
     shares,
 )
-from identifier.compare.study import Comparison, Frozen, run_comparison
+from identifier.compare.study import Comparison, run_comparison
 from identifier.method import Method
 from identifier.methods import LIVE, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse, axle_rms
@@ -34,6 +34,7 @@ from identifier.run import identify
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
+Frozen = Mapping[str, Mapping[str, AxleRmse]]
 RUNS = {"hard": "slalom1_14_5ms", "mild": "experiment2_40kmh"}
 REAL_RUNS = ("ramp_steer02", "free_10_02_28", "free_10_12_05")
 SEEDS = 10

@@ -12,9 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from benchmarks.random_cars import LIKE, good_sensors
-from benchmarks.recorded_cars import DART
-from models.faults import (
+from benchmarks.faults import (
     AnotherCar,
     Bank,
     ClockJump,
@@ -26,13 +24,15 @@ from models.faults import (
     Mirrored,
     Misaligned,
     SensorElsewhere,
-    SensorFault,
     ShiftedCenter,
     SwappedAxles,
     Together,
     WrongNumber,
     WrongUnit,
 )
+from benchmarks.random_cars import LIKE, good_sensors
+from benchmarks.recorded_cars import DART
+from models.faults import SensorFault
 from models.recordings import Recording
 from models.sensors import Sensors
 from models.vehicle import Vehicle

@@ -9,19 +9,19 @@ import numpy as np
 
 from benchmarks.doctor_answers import Right
 from benchmarks.fault_cases import Case, Scale, StraightOnly, other_car
-from benchmarks.random_cars import good_sensors
-from identifier.doctor.suspects import DEGREES
-from models.faults import (
+from benchmarks.faults import (
     AnotherCar,
     ClockJump,
     Held,
     Jitter,
     Mirrored,
-    SensorFault,
     Together,
     WrongNumber,
     WrongUnit,
 )
+from benchmarks.random_cars import good_sensors
+from identifier.doctor.suspects import DEGREES
+from models.faults import SensorFault
 from models.recordings import Recording
 from models.vehicle import Vehicle
 

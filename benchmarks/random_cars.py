@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.faults import Fault, Passing, Together
 from codegen.arrays import Array
-from models.faults import Fault, Passing, SensorFault, Together
+from models.faults import SensorFault
 from models.maneuvers import RandomSteer
 from models.plant import Driver, Plant, PlantError, PlantRun
 from models.recordings import Recording

@@ -14,7 +14,6 @@ _SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Property:
     """A property of a design, its limit, and what to do.
-
     limit : what the value is held against; None where it is a statement only.
     margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
     advice : one line; empty where there is nothing to say.
@@ -33,7 +32,6 @@ class Property:
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate:
     """All properties of a design, and its limits by construction.
-
     properties : in the order of the table; none where nothing is proven of stability and errors.
     limits : enforced after every sample, for any measurement, by name and unit: plain data.
     """
@@ -58,7 +56,6 @@ class Certificate:
         return "\n".join([*lines, f"verdict: {self.verdict}"])
 
     def __getitem__(self, name: str) -> Property:
-        """Return the property of that name."""
         for entry in self.properties:
             if entry.name == name:
                 return entry
@@ -86,9 +83,7 @@ class Certificate:
 
 def at_most(value: float, *, good: float, bad: float | None) -> Status:
     """Pass up to `good`, warn up to `bad`, fail beyond (never, where `bad` is None).
-
-    value : to be judged; nan fails.
-    bad : largest value that only warns.
+    value : to be judged; nan fails.   bad : largest value that only warns.
     """
     if value <= good:
         return "pass"
@@ -97,9 +92,7 @@ def at_most(value: float, *, good: float, bad: float | None) -> Status:
 
 def at_least(value: float, *, good: float, bad: float | None) -> Status:
     """Pass down to `good`, warn down to `bad`, fail below (never, where `bad` is None).
-
-    value : to be judged; nan fails.
-    bad : smallest value that only warns.
+    value : to be judged; nan fails.   bad : smallest value that only warns.
     """
     if value >= good:
         return "pass"
@@ -109,15 +102,9 @@ def at_least(value: float, *, good: float, bad: float | None) -> Status:
 def statement(name: str, title: str, value: float, unit: str, advice: str = "") -> Property:
     """Return a property that is only stated: it has no limit and passes."""
     return Property(
-        name=name,
-        title=title,
-        value=value,
-        limit=None,
-        margin=None,
-        status="pass",
-        unit=unit,
+        name=name, title=title, value=value, limit=None, margin=None, status="pass", unit=unit,
         advice=advice,
-    )
+    )  # fmt: skip
 
 
 def _finite(value: float | None) -> float | None:

@@ -29,9 +29,7 @@ class Driving:
 
     The sensors may err by as much as the noise at every sample, in any direction: it is a largest
     error, not a standard deviation.
-
-    v_x : speed [m/s], give or take `SPEED_SPREAD`.
-    slip : largest slip angle of an axle [rad].
+    v_x : speed [m/s], give or take `SPEED_SPREAD`.   slip : largest slip angle of an axle [rad].
     friction : largest μ of the road [-]; an axle pushes with at most μ times its load.
     bandwidth : highest frequency of the steering [Hz].
     noise_v_x : largest error of the speed [m/s].
@@ -72,7 +70,6 @@ _PEAK_NOISE = {"v_x": 0.12, "v_y": 0.12, "r": 0.012, "delta": 0.002}
 
 def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Driving:
     """Return hard driving on a dry road: both axles slide, at 4 sqrt(g L) (20 m/s for a sedan).
-
     vehicle : the car; the slip is twice that at which its linear tire reaches the friction limit.
     bandwidth : highest frequency of steering that matters [Hz].
     """

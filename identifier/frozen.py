@@ -40,7 +40,6 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
-    """Return the car that `vehicle_numbers` describes."""
     table = Table(data, "", FrozenModelError, "vehicle.")
     return Vehicle(**table.record(Vehicle, skip=("chassis",)))
 
@@ -54,16 +53,12 @@ class _SteadyTires(Protocol):
 
     def force_at(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
-
         alpha : slip angles in the paper's sign [rad], (k,).
         """
 
 
 def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
-    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle.
-
-    refusal : class of the error to raise.
-    """
+    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle."""
     force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
         raise refusal(
@@ -87,7 +82,6 @@ def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
 
 def require_min_speed(speed: float) -> None:
     """Refuse a lowest speed [m/s] that is not positive, or that no car drives at.
-
     speed : below which forces read zero.
     """
     if not 0.0 < speed <= _LARGEST_MIN_SPEED:

@@ -14,7 +14,6 @@ def with_doubt(value: float, sd: float | None = None) -> str:
     """Return a value with its standard deviation, as in "0.886 ± 0.060", "127 ± 5".
 
     Of the larger of both three digits are given, of the standard deviation one or two.
-
     sd : in the unit of the value; None where it is not known.
     """
     if not math.isfinite(value):
@@ -36,7 +35,6 @@ def _places(size: float, digits: int) -> int:
 
 def printed_value(value: float, sd: float | None, unit: str) -> str:
     """Return a value with its standard deviation in the unit that is printed.
-
     unit : of both; "N/rad" is printed as kN/rad.
     """
     scale = printed_scale(unit)
@@ -44,10 +42,8 @@ def printed_value(value: float, sd: float | None, unit: str) -> str:
 
 
 def printed_scale(unit: str) -> float:
-    """Return what values in a unit of files are multiplied by to be printed."""
     return _PRINTED.get(unit, (1.0, unit))[0]
 
 
 def printed_unit(unit: str) -> str:
-    """Return the unit that is printed for a unit of files."""
     return _PRINTED.get(unit, (1.0, unit))[1]

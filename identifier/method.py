@@ -35,7 +35,6 @@ Model = TypeVar("Model", bound=TireModel)
 
 def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any) -> Model:
     """Return a stored model to begin with, of the kind and structure that a method learns.
-
     structure : what the method and the model must agree on, by attribute of the model.
     """
     if not fits(start, kind, **structure):
@@ -78,13 +77,11 @@ class Run(Protocol):
 
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
         """Yield state and outputs over parts of the recording.
-
         samples : rising indices; blocks without one are left out. None yields all.
         """
 
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time.
-
         t : time in the recording's own clock [s].
         """
 
@@ -164,7 +161,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car, as far as the identifier knows it.
         start : as of `setup`; its calibration is that of the band.
 
         Raises
@@ -187,12 +183,7 @@ class Method(ABC):
         return Certificate()
 
     def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of what a run of it taught: nothing, where it does not say more.
-
-        Parameters
-        ----------
-        history : of this method.
-        """
+        """Return what is proven of what a run of it taught: nothing, where it does not say more."""
         del history
         return Certificate()
 
@@ -221,12 +212,7 @@ class Method(ABC):
         return ()
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return the estimates at active bounds: none, where there are no bounds.
-
-        Parameters
-        ----------
-        state : carried values by port at one instant.
-        """
+        """Return the estimates at active bounds: none, where there are no bounds."""
         del vehicle, state
         return ()
 
@@ -248,27 +234,12 @@ class Method(ABC):
         return None
 
     def body_prior(self, vehicle: Vehicle) -> "Body | None":
-        """Return the prior of the roll of a car's body; None where v_y is not estimated.
-
-        Parameters
-        ----------
-        vehicle : the car, as far as the method knows it.
-        """
+        """Return the prior of the roll of a car's body; None where v_y is not estimated."""
         del vehicle
         return None
 
     def port(self, name: str) -> Port:
-        """Return what stands in an output or a carried value.
-
-        Parameters
-        ----------
-        name : of the port.
-
-        Raises
-        ------
-        KeyError
-            Where the method does not describe it.
-        """
+        """Return what stands in an output or a carried value."""
         for port in (*self.ports, HALF_BAND):
             if port.name == name:
                 return port
@@ -280,7 +251,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car, as far as the method knows it.
         start : model whose weights the run begins with; None begins with those of the method.
 
         Raises
@@ -291,10 +261,6 @@ class Method(ABC):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Return the model that carried values make: none, where a method does not say more.
-
-        Parameters
-        ----------
-        state : values of the carried ports at one instant.
 
         Raises
         ------
@@ -310,11 +276,6 @@ class Method(ABC):
         Parameters
         ----------
         start : None, or the model.
-
-        Raises
-        ------
-        ValueError
-            Where it is a model.
         """
         if start is not None:
             raise ValueError("what learns no tire cannot begin with a stored model")

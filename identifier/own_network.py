@@ -28,7 +28,7 @@ from identifier.frozen import (
 from identifier.method import Method
 from identifier.paper.network import SIGNALS, network_signals
 from identifier.setup import Setup
-from identifier.tire_model import TireModel, drift
+from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters
 from models.rules import LARGEST_FORCE
 from models.schema import Table, read_bytes
@@ -57,7 +57,6 @@ def read_network(content: bytes, inputs: Sequence[str] | None = None) -> ca.Func
     """Return a network as a function of scalar signals, with the result axle_force (2,) [N].
 
     The function's inputs bear the names of the signals that the network reads.
-
     content : the ONNX file. Its tensors are (columns,) or (batch, columns); a batch may be dynamic.
     inputs : the signal in each column, over all input tensors in turn. None takes the names of the
         tensors where each is one column with the name of a signal, else alpha_f, alpha_r for two
@@ -172,13 +171,11 @@ OVER = ("x", "u", "v_x")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class OnnxModel(TireModel):
+class OnnxModel(StaticModel):
     """Axle forces of a static network in the frame of the body, left positive.
 
     A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
     where F_y = +C α; ISO 8855 has the opposite sign: for a network of that, set `slip_sign` to -1.
-
-    vehicle : the car, whose l_f and l_r make slip angles.
     min_speed : below this speed [m/s] the forces read zero.
     inputs : what the network's columns are, see `read_network`; None goes by names and number.
     slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
@@ -224,12 +221,7 @@ class OnnxModel(TireModel):
         inputs: tuple[str, ...] | None = None,
         slip_sign: int = 1,
     ) -> "OnnxModel":
-        """Read a network file.
-
-        min_speed : below this speed [m/s] the forces read zero.
-        inputs : what the network's columns are; None goes by names and number.
-        slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
-        """
+        """Read a network file; arguments are those of the class."""
         try:
             return cls(
                 vehicle=vehicle,
@@ -259,7 +251,6 @@ class OnnxModel(TireModel):
         return tuple(read_network(self.content, self.inputs).name_in())
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
         del dt
         return Setup(
             scan=_scan(self.content, self.inputs, self.slip_sign),
@@ -270,21 +261,7 @@ class OnnxModel(TireModel):
             },
         )
 
-    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
-        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
-
-    def force_expression(
-        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
-    ) -> tuple[Any, Any]:
-        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
-
-        slip : empty.
-        """
-        del slip, least_lag
-        return self._static_force(x, delta, v_x), ca.MX(0, 1)
-
-    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+    def static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
         return self.step(x, ca.vertcat(delta, 0), v_x, ca.vertcat(*self.vehicle.bicycle))
 
     def to_dict(self) -> dict[str, Any]:
@@ -302,7 +279,6 @@ class OnnxModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":
-        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             return cls(
@@ -354,7 +330,6 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrozenMethod(Method):
     """A frozen model that takes part in a comparison of methods.
-
     dt : sampling interval of recordings [s]; the model has none of its own.
     """
 
@@ -372,7 +347,6 @@ class FrozenMethod(Method):
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
-
         vehicle : the car; the model keeps its own.
         start : None; there is nothing that a stored model could begin.
         """
@@ -382,9 +356,6 @@ class FrozenMethod(Method):
         return self.model.setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:
-        """Return the model itself.
-
-        vehicle : the car; the model keeps its own.
-        """
+        """Return the model itself.   vehicle : the car; the model keeps its own."""
         del vehicle, state
         return self.model

@@ -62,10 +62,6 @@ GAINS = Gains(
 def paper_design(
     law: str, seed: int, *, gains: Gains = GAINS, network: Network = NETWORK
 ) -> PaperIdentifier:
-    """Return the design of the study.
-
-    law : one of `LAWS`.
-    """
     return PaperIdentifier(gains=gains, network=network, seed=seed).with_law(law)
 
 
@@ -80,16 +76,13 @@ PAST_ONLINE, PAST, AFTER, ALL = MEASURES = (  # of frozen weights; the first is 
 
 def frozen_column(measure: str, t_freeze: float) -> str:
     """Return the column of a measure of frozen weights, "past_against_online_32".
-
-    measure : one of `MEASURES`.
-    t_freeze : time of the freeze [s].
+    measure : one of `MEASURES`.   t_freeze : time of the freeze [s].
     """
     return f"{measure}_{freeze_key(t_freeze)}"
 
 
 def columns(maneuver: str) -> list[str]:
     """Return the columns of a maneuver: "online", and every measure at every freeze.
-
     maneuver : "step_steer" or "slalom".
     """
     return [ONLINE, *(frozen_column(m, t) for t in FREEZES[maneuver] for m in MEASURES)]
@@ -98,7 +91,6 @@ def columns(maneuver: str) -> list[str]:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One law with one seed on one maneuver.
-
     replays : freeze time [s] to replay of the same recording; errors count from the onset on.
     errors : by column as `columns` names them: RMSE of both axles from the onset on [kN]; empty
         where the law diverged.
@@ -119,11 +111,6 @@ def drive_maneuvers() -> dict[str, Recording]:
 
 
 def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> Trial:
-    """Run one design.
-
-    maneuver : "step_steer" or "slalom".
-    design : from `paper_design`.
-    """
     history = identify(recording, sedan(), design)
     if history.diverged_at is not None:
         return Trial(history=history, replays={}, errors={})
@@ -150,7 +137,6 @@ def _measures(result: Replay) -> dict[str, AxleRmse | None]:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
     """All errors of the study and the recordings behind them.
-
     errors : by maneuver, then by law: the errors [kN] by column, for each seed.
     """
 
@@ -173,9 +159,7 @@ class Study:
 
     def typical(self, maneuver: str, law: str) -> Trial | None:
         """Return the trial of median error over all of the drive at the first freeze, if any.
-
-        maneuver : "step_steer" or "slalom".
-        law : one of `LAWS`.
+        maneuver : "step_steer" or "slalom".   law : one of `LAWS`.
         """
         column = frozen_column(ALL, FREEZES[maneuver][0])
         seeds = [(e[column], seed) for seed, e in enumerate(self.errors[maneuver][law]) if e]
@@ -201,9 +185,7 @@ STEPS = 1 + 2 * len(LAWS)  # of `run_study`: the drives, and each law on both ma
 
 def run_study(seeds: int, progress: Callable[[str], None]) -> Study:
     """Run every law with every seed on both maneuvers.
-
-    seeds : number of seeds, counted from 0.
-    progress : told what is being done, `STEPS` times.
+    seeds : number of seeds, counted from 0.   progress : told what is being done, `STEPS` times.
     """
     progress("driving step steer and slalom with the sedan at 20 m/s")
     recordings = drive_maneuvers()

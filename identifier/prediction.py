@@ -17,8 +17,6 @@ class Prediction:
 
     Parameters
     ----------
-    model : that predicted.
-    recording : what was predicted.
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over the samples that count, against the true force; None without truth.
     true_force : root mean square of the true force over the same samples, None without truth.
@@ -77,7 +75,6 @@ class Prediction:
 
 def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
     """Replay a recording with frozen weights and compare with its true forces, where it has any.
-
     model : the frozen model; samples below its minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
     """

@@ -38,7 +38,6 @@ class SampleLimits(NamedTuple):
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> "SampleLimits":
-        """Return the limits of a car, by its size and weight."""
         return cls(
             speed=_FROUDE * vehicle.froude_speed,
             yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),
@@ -57,12 +56,8 @@ class SampleLimits(NamedTuple):
         needs_v_y: bool = True,
     ) -> bool:
         """Return whether a sample holds numbers within them; NaN is not.
-
-        v_x : longitudinal speed [m/s].
-        v_y : lateral velocity [m/s].
-        r : yaw rate [rad/s].
-        delta_f : steering in front [rad].
-        delta_r : steering at the rear [rad].
+        v_x : longitudinal speed [m/s].   v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
+        delta_f : steering in front [rad].   delta_r : steering at the rear [rad].
         needs_v_y : False accepts any v_y, of which `possible` is what is left.
         """
         return (
@@ -75,29 +70,24 @@ class SampleLimits(NamedTuple):
 
     def possible(self, v_y: float) -> float:
         """Return a lateral velocity that a car may have [m/s], NaN in place of any other number.
-
         v_y : as it was measured [m/s].
         """
         return v_y if abs(v_y) <= self.speed else math.nan
 
 
 def judges_samples(carry: Mapping[str, Any]) -> bool:
-    """Return whether a step judges samples itself."""
     return GATE in carry
 
 
 def stale_samples(stale_time: float, dt: float) -> int:
     """Return how many refused samples in a row make forces stale, at least one.
-
-    stale_time : [s].
-    dt : sampling interval [s].
+    stale_time : [s].   dt : sampling interval [s].
     """
     return max(1, int(stale_time / dt + 0.5))
 
 
 class Rests(NamedTuple):
     """Samples with rests between segments, N of them.
-
     rows : of the recording that each is, at rests the one that follows, (N,).
     resting : whether it is a rest (N,).   at : which of them each sample is (n,).
     """
@@ -109,7 +99,6 @@ class Rests(NamedTuple):
 
 def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
     """Return n samples with rests before each segment but the first.
-
     breaks : samples with which segments begin, rising.
     """
     begins = np.repeat(np.asarray(breaks, dtype=np.intp), rest)

@@ -41,9 +41,7 @@ def axle_rms(
     force: Array, where: NDArray[np.bool_] | None = None, reference: Array | None = None
 ) -> AxleRmse:
     """Return the root mean square of axle forces, or of their errors; NaN of no samples.
-
-    force : (n, 2) [N].
-    where : samples that count (n,); None counts all.
+    force : (n, 2) [N].   where : samples that count (n,); None counts all.
     reference : forces that they are compared with (n, 2) [N]; None takes the forces themselves.
     """
     squares, count = np.zeros(2), 0
@@ -62,7 +60,6 @@ class Reproduction:
 
     The instant of the freeze belongs to neither side: there the frozen force is the online one. A
     side without a sample that counts has no error, None; nor has one against truth without truth.
-
     past_against_online : error for t < T_freeze against what was identified online, the measure of
         the paper's section IV-A; the linear part of both forces is the same and cancels.
     after_against_truth : error for t > T_freeze against the true force.
@@ -76,7 +73,6 @@ class Reproduction:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Replay:
     """One recording replayed with frozen weights.
-
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over all samples against the true force, None without truth.
     against_online : error over all samples, before and after a freeze, against the forces that were
@@ -94,7 +90,6 @@ class Replay:
 
 def freeze_key(t: float) -> str:
     """Return a freeze time as results, files and figures name it: "32", "1700000004.25".
-
     t : time in the recording's own clock [s]; ten milliseconds of a Unix time are kept apart.
     """
     return f"{t:.12g}"
@@ -104,7 +99,6 @@ def counted_samples(
     recording: Recording, min_speed: float, since: float | None = None
 ) -> NDArray[np.bool_]:
     """Return which samples count wherever a force or its error is summed up, (n,).
-
     min_speed : samples below this speed [m/s] do not count.
     since : nor do samples before this time [s]; None begins at the first.
     """
@@ -122,7 +116,6 @@ def counted_samples(
 
 def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
     """Return the share of the samples with more slip than the model knows; None if nobody can tell.
-
     recording : the drive; samples below the model's minimum speed do not count.
     """
     known = model.known_slip
@@ -142,7 +135,6 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
 
 def replay(model: TireModel, online: History, *, since: float | None = None) -> Replay:
     """Replay a recording with frozen weights and compare over all of it.
-
     model : the frozen model; samples below its minimum speed do not count.
     online : a run of the identifier over the recording, the run that the weights come from or
         another.
@@ -160,7 +152,6 @@ def replay(model: TireModel, online: History, *, since: float | None = None) -> 
 
 def reproduce(online: History, t_freeze: float, *, since: float | None = None) -> Replay:
     """Freeze the weights of a run, replay its own recording and compare both sides of the freeze.
-
     t_freeze : time of the freeze in the recording's own clock [s].
     since : samples before this time [s] do not count; None counts all.
     """
@@ -192,7 +183,6 @@ def _side(force: Array, reference: Array | None, where: NDArray[np.bool_]) -> Ax
 
 def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
     """Return the error of the forces identified online, None without truth or without such forces.
-
     history : an online run; samples below the design's minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
     """
@@ -205,7 +195,6 @@ def online_error(history: History, *, since: float | None = None) -> AxleRmse | 
 
 def force_rms(history: History, *, since: float | None = None) -> AxleRmse | None:
     """Return the size of the true forces, over the samples that `online_error` counts.
-
     since : samples before this time [s] do not count; None counts all.
     """
     truth = history.recording.axle_force

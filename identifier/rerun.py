@@ -29,7 +29,6 @@ class Found(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Rerun:
     """A run that is computed again, block by block, or a part of it.
-
     last : values carried after the last sample of the recording, by port.
     """
 
@@ -44,7 +43,6 @@ class Rerun:
     _found: dict[int, Found] = field(default_factory=dict, init=False)
 
     def __len__(self) -> int:
-        """Return the number of samples of the part."""
         return self.end - self.first
 
     def ports(self, kind: Kind) -> tuple[str, ...]:
@@ -58,7 +56,6 @@ class Rerun:
 
         A port of a block is computed when it is asked for, together with those that were asked for
         of blocks before. Of a run that is one block it is kept.
-
         samples : rising indices; blocks without one are left out. None yields all.
         """
         for k, whole in enumerate(self.parts):
@@ -76,7 +73,6 @@ class Rerun:
             yield Block(part, state, outputs, after)
 
     def _of_block(self, k: int, found: Found, kind: Kind, port: str) -> Array:
-        """Return a port of a block, and have all found that are wanted."""
         if port not in found.values[kind]:
             self._wanted.add(port)
             missing = self._wanted.difference(*found.values.values())
@@ -91,7 +87,6 @@ class Rerun:
 
     def state_at(self, index: int) -> dict[str, Array]:
         """Return the carried values in effect at a sample, or after the last.
-
         index : of the sample, counted from the first of the part; as many as there are is the end.
         """
         sample, after = self.first + index, int(index == len(self))
@@ -109,7 +104,6 @@ class Rerun:
 
 def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
     """Return whether one of the samples lies in a part.
-
     samples : rising indices; None are all.
     """
     if samples is None:
@@ -119,7 +113,6 @@ def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
 
 
 def _last_row(state: Mapping[str, Array], port: str) -> Array:
-    """Return what is carried on after a block."""
     last: Array = state[port][-1]
     return last
 
@@ -149,7 +142,6 @@ class _OnDemand(Mapping[str, Array]):
 
 class Recalled(_OnDemand):
     """By port, what a run records: computed again when it is asked for.
-
     kind : "state" or "outputs".
     """
 
@@ -169,5 +161,4 @@ class Recalled(_OnDemand):
         return found
 
     def of(self, first: int, end: int) -> "Recalled":
-        """Return the same of the samples from first to before end."""
         return Recalled(replace(self.run, first=first, end=end), self._kind)

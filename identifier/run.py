@@ -28,7 +28,6 @@ class DivergedError(TireidError, ArithmeticError):
 
 def state_index(recording: Recording, t: float) -> int:
     """Return which carried values are in effect at a time: those before that sample; n at the end.
-
     t : time in the recording's own clock [s].
     """
     if not isinstance(t, Real):
@@ -44,7 +43,6 @@ def state_index(recording: Recording, t: float) -> int:
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, repr=False, eq=False)
 class History:
     """An online run over n samples.
-
     recording : what it ran over, with the v_y that the method estimated where there was none.
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
@@ -100,7 +98,6 @@ class History:
 
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
         """Yield the run block by block: state and outputs over parts of the recording.
-
         samples : rising indices; blocks without one are left out. None yields all.
         """
         if isinstance(self.state, Recalled):
@@ -119,7 +116,6 @@ class History:
 
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time; from the end on, those after the last.
-
         t : time in the recording's own clock [s].
         """
         index = state_index(self.recording, t)
@@ -129,7 +125,6 @@ class History:
 
     def freeze(self, t: float | None = None) -> TireModel:
         """Return the model with the weights in effect at a time.
-
         t : time in the recording's own clock [s]; None is the end.
         """
         t = float(self.recording.t[-1]) if t is None else t
@@ -147,7 +142,6 @@ class History:
 
     def asked(self, recording: Recording, t: float | None = None) -> "History":
         """Return what the model frozen at a time says of another recording, which teaches nothing.
-
         t : time of the freeze in this recording's own clock [s]; None is the end.
         """
         if self.online:
@@ -220,7 +214,6 @@ def identify(
     progress: Callable[[float], None] | None = None,
 ) -> History:
     """Run a method over a recording, sample by sample.
-
     recording : signals, sampled at the design's interval; its forces are not looked at.
     design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
@@ -299,7 +292,6 @@ def learn(
     t: float | None = None,
 ) -> TireModel:
     """Return what a method has learnt, without a record of the way there: `identify` and freeze.
-
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
     recording = design.reads(recording.as_logged(), vehicle)
@@ -322,7 +314,6 @@ def learn(
 @dataclass(slots=True)
 class Counts:
     """What became of the samples.
-
     refused : that held a number which is not finite or beyond what any car reaches.
     """
 
@@ -333,7 +324,6 @@ class Counts:
 
 class OnlineIdentifier:
     """A method that takes sample by sample; attributes vehicle, method, counts, limits.
-
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.
     stale_time : time of refused samples after which forces read zero [s].
@@ -366,10 +356,8 @@ class OnlineIdentifier:
         """Take a sample; return the axle forces (2,) [N], with the weights before it.
 
         Where the sample is refused, those of the last one it took, and zero once it is `stale`.
-
         x : [v_y, r] (2,) [m/s, rad/s]; v_y NaN where there is none, if the method tells it itself.
-        u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
-        v_x : longitudinal speed [m/s].
+        u : [δ_f, δ_r] (2,), angles of the road wheels [rad].   v_x : longitudinal speed [m/s].
         a_y : of an accelerometer at the center of gravity, positive to the left [m/s²]; None, or a
             number that is not finite, where there is none. No sample is refused for it.
         """
@@ -439,7 +427,6 @@ class OnlineIdentifier:
 
     def restart(self, start: TireModel | None) -> None:
         """Begin again at the next sample; the counts go on.
-
         start : stored weights to begin with; None begins afresh.
         """
         self._start, self._stepper, self._diverged = start, None, False
@@ -473,7 +460,6 @@ class OnlineIdentifier:
         return self._stepper.state()
 
     def model(self) -> TireModel:
-        """Return the model with the weights in effect now."""
         if self._diverged:
             raise DivergedError(f"the law diverged within {self.counts.samples} samples")
         if self._stepper is None and self._start is not None:

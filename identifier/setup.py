@@ -19,9 +19,7 @@ COVARIANCE, FACTORS, NOT_NEGATIVE = "covariance", "factors of a covariance", "no
 
 class Port(NamedTuple):
     """An output or a carried value of a step: what stands in it.
-
-    name : of the port, in C, FMU and JSON.   unit : of its numbers, "U" the force unit.
-    words : what it is.   learnt : whether it holds its value while adaptation is off.
+    unit : of its numbers, "U" the force unit.
     rule : what its numbers must be to be taken over; empty: finite.
     """
 
@@ -43,18 +41,13 @@ HALF_BAND = Port(
 
 
 def force_unit_name(force_unit: float) -> str:
-    """Return the name of a unit of force.
-
-    force_unit : U [N].
-    """
+    """Return the name of a unit of force.   force_unit : U [N]."""
     return {1.0: "N", 1000.0: "kN"}.get(force_unit, f"{force_unit:g} N")
 
 
 def in_force_unit(ports: Iterable[Port], force_unit: float) -> tuple[Port, ...]:
     """Return ports with the name of the force unit in place of U.
-
-    ports : with units in which U stands for it.
-    force_unit : U [N].
+    ports : with units in which U stands for it.   force_unit : U [N].
     """
     name = force_unit_name(force_unit)
     return tuple(port._replace(unit=port.unit.replace("U", name)) for port in ports)
@@ -91,7 +84,6 @@ class Setup(NamedTuple):
 
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.
-
         x : [v_y, r] of the first sample (2,) [m/s, rad/s].
         """
         if self.observe is None:
@@ -109,7 +101,6 @@ class Setup(NamedTuple):
         """Yield what the compiled step records over a recording, block by block.
 
         Values are carried from block to block: the bits are those of one piece.
-
         recording : its signals are the input; its forces are not looked at.
         parts : of the recording, one after the other; None takes all of it in `blocks`.
         carry : values that are carried into the first part; None begins with the recording.
@@ -138,7 +129,6 @@ class Setup(NamedTuple):
 
     def output(self, recording: Recording, port: str) -> Array:
         """Return an output that is a column, over a recording, (n, size).
-
         recording : its signals are the input; its forces are not looked at.
         """
         told = large((len(recording), self.scan.step.numel_out(port)))
@@ -148,7 +138,6 @@ class Setup(NamedTuple):
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.
-
         n : samples that are taken.
         """
         following = self.begun(recording)
@@ -162,7 +151,6 @@ class Setup(NamedTuple):
         return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
     def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
-        """Return what the step is shown of a recording."""
         judges = judges_samples(self.carry)
         return shown(recording, self.scan.over, rest=self.rest, judges=judges, part=part)
 
@@ -188,7 +176,6 @@ class Block(NamedTuple):
 
 class Before(Mapping[str, Array]):
     """Carried values in effect at each sample, of those that have a row after the last.
-
     state : by port (k + 1, ...).
     """
 
@@ -208,7 +195,6 @@ class Before(Mapping[str, Array]):
 
 class Shown(NamedTuple):
     """What a step is shown of a part of a recording: samples, and rests between its segments.
-
     signals : by port of `over`, (N, ...).   samples : N, rests included.
     at : which of these each sample of the part is (n,); None where there is no rest.
     """
@@ -219,7 +205,6 @@ class Shown(NamedTuple):
 
     def place(self, k: int) -> int:
         """Return which of what is shown a sample of the part is.
-
         k : from 0 to n, that after the last.
         """
         if self.at is None:
@@ -228,7 +213,6 @@ class Shown(NamedTuple):
 
     def of_recording(self, values: Array) -> Array:
         """Return what was recorded at the samples of the part, without rests.
-
         values : of all that was shown, (N, ...) or (N + 1, ...) with that after the last.
         """
         if self.at is None:
@@ -238,7 +222,6 @@ class Shown(NamedTuple):
 
     def with_rests(self, values: Array) -> Array:
         """Return values of the part's samples with zeros at rests, (N, ...).
-
         values : (n, ...).
         """
         if self.at is None:
@@ -255,7 +238,6 @@ def shown(
 
     A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
     that no difference over the gap is ever taken for one over a sampling interval.
-
     over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
         there is none.
     judges : whether the step judges samples itself.

@@ -68,8 +68,7 @@ class Fact(NamedTuple):
 
 class Estimate(NamedTuple):
     """A number of one axle that a drive may have decided.
-
-    title, axle : what.   value, unit : how much.   sd : its standard deviation, None unknown.
+    sd : its standard deviation, None unknown.
     declared : value in the vehicle file or None.   identified : whether the drive decided it.
     """
 
@@ -91,7 +90,6 @@ class Estimate(NamedTuple):
         """Return the number with the share that is missed of a force in its standard deviation.
 
         The recursion knows of noise only; what its curves cannot say is in what they miss.
-
         share : of the force of its axle, rms [-].
         """
         if self.sd is None or self.title not in (STIFFNESS, GRIP):
@@ -101,7 +99,6 @@ class Estimate(NamedTuple):
 
 class Reached(NamedTuple):
     """A learnt number at its bound: of which axle (None: the car), what, how much, what that means.
-
     refuses : whether an answer that rests on it is not valid.
     """
 
@@ -165,7 +162,6 @@ class TireModel(ABC):
         Parameters
         ----------
         data : as from `to_dict`.
-        source : name of the file, for errors.
 
         Raises
         ------
@@ -210,10 +206,6 @@ class TireModel(ABC):
 
     def mounted_on(self, vehicle: Vehicle) -> "TireModel":
         """Return the tires on another car, their forces scaled by its static axle loads.
-
-        Parameters
-        ----------
-        vehicle : that carries them.
 
         Raises
         ------
@@ -293,11 +285,6 @@ class TireModel(ABC):
         axle : "front" or "rear", for a result of the shape of `alpha`; None gives both, (..., 2).
         v_x : speed [m/s]; None takes `curve_speed`. A curve of slip does not look at it, but where
             the car has downforce.
-
-        Raises
-        ------
-        ValueError
-            Where the axle has another name.
         """
         if axle is not None and axle not in AXLES:
             raise ValueError(f"axle must be front or rear, it is {axle!r}")
@@ -373,10 +360,6 @@ class TireModel(ABC):
     def slope_over(self, recording: Recording) -> Array:
         """Return the slope of the force curves over the slip of a drive [static loads/rad], (n, 2).
 
-        Parameters
-        ----------
-        recording : its signals are the input.
-
         Raises
         ------
         ValueError
@@ -430,13 +413,7 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        recording : its signals are the input.
         mean : over the windows: signals (n, ...) -> (m, ...).
-
-        Raises
-        ------
-        ValueError
-            Where the model cannot tell how sure it is.
         """
         del recording, mean
         raise ValueError(f"a {type(self).__name__} cannot tell how sure it is: it has no band")
@@ -445,10 +422,6 @@ class TireModel(ABC):
         """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
 
         Of the steady forces, without noise of the drive's sensors. None where unknown.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
         """
         del recording, level
         return None
@@ -473,7 +446,6 @@ class TireModel(ABC):
 
         Parameters
         ----------
-        recording : its signals are the input.
         level : share of samples that the band shall hold, above 0 and below 1.
         """
         del recording, level
@@ -544,12 +516,7 @@ class TireModel(ABC):
         return None
 
     def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated.
-
-        Parameters
-        ----------
-        recording : its signals are the input.
-        """
+        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated."""
         del recording
         return None
 
@@ -575,11 +542,6 @@ class TireModel(ABC):
         alpha, axle : as of `force`.
         rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
             one number: a force may be late. 0 is steady.
-
-        Raises
-        ------
-        ValueError
-            Where the axle has another name.
         """
         if axle is not None and axle not in AXLES:
             raise ValueError(f"axle must be front or rear, it is {axle!r}")
@@ -595,18 +557,7 @@ class TireModel(ABC):
         return (float(low), float(high)) if slip.ndim == 0 else (low, high)
 
     def samples(self, n: int, rng: np.random.Generator) -> "tuple[TireModel, ...]":
-        """Return models drawn from what is not known of the tires.
-
-        Parameters
-        ----------
-        n : how many.
-        rng : source of randomness.
-
-        Raises
-        ------
-        ValueError
-            Where the model cannot tell how sure it is.
-        """
+        """Return models drawn from what is not known of the tires."""
         del n, rng
         raise ValueError(
             f"a {type(self).__name__} cannot tell how sure it is: nothing to draw from"
@@ -666,12 +617,9 @@ class TireModel(ABC):
         delta, v_x, dt = ca.MX.sym("delta"), ca.MX.sym("v_x"), ca.MX.sym("dt")
         x_dot, force = self._motion(x, delta, v_x, 0.0)
         dynamics = ca.Function(
-            "car_dynamics",
-            [x, delta, v_x],
-            [x_dot, force],
-            ["x", "delta", "v_x"],
+            "car_dynamics", [x, delta, v_x], [x_dot, force], ["x", "delta", "v_x"],
             ["x_dot", "axle_force"],
-        )
+        )  # fmt: skip
         rate = ca.Function("rate", [x, delta, v_x, dt], [self._motion(x, delta, v_x, dt / 2)[0]])
         at = (delta, v_x, dt)
         k1 = rate(x, *at)
@@ -679,12 +627,9 @@ class TireModel(ABC):
         k3 = rate(x + dt / 2 * k2, *at)
         k4 = rate(x + dt * k3, *at)
         step = ca.Function(
-            "car_step",
-            [x, *at],
-            [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)],
-            ["x", "delta", "v_x", "dt"],
-            ["x_next"],
-        )
+            "car_step", [x, *at], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)],
+            ["x", "delta", "v_x", "dt"], ["x_next"],
+        )  # fmt: skip
         return _TireFunctions(self._force_curve(), dynamics.expand(), step.expand())
 
     def _force_curve(self) -> ca.Function:
@@ -733,10 +678,27 @@ class TireModel(ABC):
         return f"<{name}: stiffness {front} / {rear} kN/rad{known}>"
 
 
+class StaticModel(TireModel):
+    """A model whose forces follow the state at once: nothing lags."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+        """Return the axle forces (2,) [N] as a CasADi expression of x = [v_y, r], δ_f and v_x."""
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        return self.static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        del slip, least_lag
+        return self.static_force(x, delta, v_x), ca.MX(0, 1)
+
+
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
     """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
-
-    vehicle : its wheelbase is L.
     min_speed : below which they do [m/s].
     """
     return max(4.0 * vehicle.froude_speed, min_speed)
@@ -744,7 +706,6 @@ def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
 
 def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
     """Return x = [v_y, r] at which straight wheels meet the road at some slopes, (2,).
-
     slope : -(v_y ± l r)/v_x at the axles, (2,): the slip angle where it is small.
     v_x : longitudinal speed [m/s].
     """
@@ -764,10 +725,7 @@ MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported 
 
 
 def load_model(path: str | PathLike[str]) -> TireModel:
-    """Read a frozen model of any kind.
-
-    path : a file that the `save` of a frozen model wrote.
-    """
+    """Read a frozen model of any kind.   path : a file that the `save` of a frozen model wrote."""
     path = Path(path)
     table = _stored(path)
     _verdict_of(table)
@@ -787,7 +745,6 @@ def load_model(path: str | PathLike[str]) -> TireModel:
 
 def stored_verdict(path: str | PathLike[str]) -> bool | None:
     """Return whether a stored model was found valid when it was learnt; None where nobody judged.
-
     path : a file that the `save` of a frozen model wrote.
     """
     return _verdict_of(_stored(Path(path)))

@@ -49,7 +49,6 @@ def _matrix(a: Any, b: Any, c: Any, d: Any) -> Any:
 
 def bicycle(parameters: BicycleParameters, v_x: Any) -> _Bicycle:
     """Return the matrices of the bicycle at a speed.
-
     parameters : numbers or CasADi expressions, see `BicycleParameters`.
     v_x : longitudinal speed [m/s], not zero.
     """
@@ -69,14 +68,7 @@ def bicycle(parameters: BicycleParameters, v_x: Any) -> _Bicycle:
 
 
 def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:
-    """Return [α_f, α_r] = δ - (v_y ± l r)/v_x [rad], (2,), in the paper's sign, as used in (3).
-
-    l_f : distance from the center of gravity to the front axle [m].
-    l_r : distance from the center of gravity to the rear axle [m].
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r], lateral velocity [m/s] and yaw rate [rad/s].
-    u : [δ_f, δ_r], steering [rad].
-    """
+    """Return [α_f, α_r] = δ - (v_y ± l r)/v_x [rad], (2,), in the paper's sign, as used in (3)."""
     return ca.vertcat(u[0] - (x[0] + l_f * x[1]) / v_x, u[1] - (x[0] - l_r * x[1]) / v_x)
 
 
@@ -93,13 +85,8 @@ def measured_slip(
     """Return [α_f, α_r] = δ - atan2(v_y ± l r, v_x) [rad] of samples, (n, 2), the paper's sign.
 
     Without small angles; meaningless at standstill.
-
-    l_f : distance from the center of gravity to the front axle [m].
-    l_r : distance from the center of gravity to the rear axle [m].
-    v_x : longitudinal speed [m/s], (n,).
-    v_y : lateral velocity [m/s], (n,).
-    r : yaw rate [rad/s], (n,).
-    delta_f : steering in front [rad], (n,).
+    v_x : longitudinal speed [m/s], (n,).   v_y : lateral velocity [m/s], (n,).
+    r : yaw rate [rad/s], (n,).   delta_f : steering in front [rad], (n,).
     delta_r : at the rear [rad], (n,).
     """
     v_y, r = np.asarray(v_y), np.asarray(r)
@@ -110,10 +97,7 @@ def measured_slip(
 
 def linear_axle_force(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return the axle forces of the linear tire (3), (2,) [N].
-
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
     return ca.vertcat(parameters.C_f * alpha[0], parameters.C_r * alpha[1])

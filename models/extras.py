@@ -1,15 +1,11 @@
 """Libraries that only some things need, by the extra of tireid that installs them all."""
 
 EXTRAS = {
-    "parquet": ("pyarrow",),
-    "mat": ("h5py",),
-    "mdf": ("asammdf",),
-    "ros": ("rosbags",),
-    "can": ("cantools", "python-can"),
-    "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
+    "parquet": ("pyarrow",), "mat": ("h5py",), "mdf": ("asammdf",), "ros": ("rosbags",),
+    "can": ("cantools", "python-can"), "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
     "cluster": ("dask", "distributed"),
     "fleet": ("pyarrow", "dask", "distributed", "fsspec", "duckdb"),
-}
+}  # fmt: skip
 
 
 def needs(what: str, library: str, extra: str) -> str:

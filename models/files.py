@@ -16,7 +16,6 @@ from codegen.writing import naming
 
 def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[bytes]) -> None:
     """Write a file; whoever reads it meanwhile, or after a failure, sees the old one whole.
-
     path : the file; where it is a link, what it points to.
     content : text, written in UTF-8 with line ends as they are, or bytes, also one part
         after the other.
@@ -53,10 +52,7 @@ def resolved(path: str | PathLike[str]) -> Path:
 
 
 def digest(content: Any) -> str:
-    """Return twelve characters that stand for a content.
-
-    content : ready for JSON.
-    """
+    """Return twelve characters that stand for a content."""
     return digest_of_bytes([json.dumps(content, sort_keys=True).encode()])
 
 

@@ -27,7 +27,6 @@ class FrictionError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionChange:
     """From here on the friction is `scale`.
-
     scale : friction over the tire's own, after the change [-].
     at_time : when it starts [s]; give this or `at_place`.
     at_place : where it starts, coordinate X of the wheel [m].
@@ -57,7 +56,6 @@ class FrictionChange:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
     """A constant scale and the changes after it, all over time or all over the place.
-
     scale : friction over the tire's own before the first change [-].
     """
 
@@ -78,14 +76,10 @@ class Friction:
 
     @property
     def by_place(self) -> bool:
-        """Whether the changes are over the place."""
         return bool(self.changes) and self.changes[0].at_time is None
 
     def over_time(self, t: Array) -> Array:
-        """Scale over time (n,) [-], without the changes over the place.
-
-        t : times [s], (n,).
-        """
+        """Scale over time (n,) [-], without the changes over the place.   t : times [s], (n,)."""
         scale = np.full(np.shape(t), self.scale)
         if not self.by_place:
             for change, step in zip(self.changes, self._steps(), strict=True):
@@ -109,9 +103,7 @@ class Friction:
 
 def place_change(table: Any, place: Any) -> Any:
     """Return the sum of the changes over the place as a CasADi expression [-].
-
-    table : from `Friction.over_place`, (3, 4).
-    place : coordinate X of the wheel [m].
+    table : from `Friction.over_place`, (3, 4).   place : coordinate X of the wheel [m].
     """
     change = 0.0
     for k in range(MAX_PLACES):

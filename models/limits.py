@@ -16,11 +16,8 @@ class LimitError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputLimits:
     """How much may be asked for. `TIREID_LIMITS="samples=1e9 megabytes=4e4"` raises limits.
-
     megabytes : of a log, unpacked; it is read piece by piece: 10 h at 1 kHz of 20 columns fit.
-    samples : rows of a log, steps of a recording.
     path : samples of a path, rows of way-points.
-    block : megabytes of a part of a log that is read whole: a MATLAB variable, a compressed chunk.
     document : megabytes of a JSON, ONNX or tire file, or of way-points.
     values : numbers, texts, tables and lists in a JSON or TOML file.
     hidden : units of a network, whose code is compiled: 100 take ten seconds, 300 minutes.

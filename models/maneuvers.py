@@ -3,8 +3,9 @@
 Every maneuver is a frozen record with `.steering(t)`, commanded angles [δ_f, δ_r] [rad], δ > 0 to
 the left, and `.duration` [s]. Angles never jump: |dδ/dt| <= rate_limit, which the identifier needs
 (steering must be resolved at its sample time); a maneuver that cannot keep its limit is refused at
-birth. Steering starts at `onset`; a negative amplitude steers right first. `rear_ratio` is
-δ_r/δ_f, zero for a car that steers in front only.
+birth. Steering starts at `onset` [s]; a negative amplitude steers right first. `rear_ratio` is
+δ_r/δ_f, zero for a car that steers in front only; `rate_limit` [rad/s] is that of either axle, of a
+sine at least 2 pi frequency amplitude.
 """
 
 import math
@@ -22,30 +23,25 @@ class ManeuverError(TireidError, ValueError):
 
 
 class Maneuver(Protocol):
-    """What a plant asks of a maneuver."""
-
     @property
     def duration(self) -> float:
         """Length [s]."""
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2).   t : times [s], (n,)."""
 
 
 def _check(maneuver: Any, *, steepest: float) -> None:
     """Refuse numbers that are not physical and a steering rate above the limit."""
     name = type(maneuver).__name__
-    free = ("amplitude", "second_share", "onset", "rear_ratio", "seed", "dwell", "pause")
+    free = ("amplitude", "second_share", "onset", "rear_ratio", "seed", "pause")
     for field in fields(maneuver):
         value = getattr(maneuver, field.name)
         if not math.isfinite(value):
             raise ManeuverError(f"{name}: {field.name} must be finite, it is {value}")
         if field.name not in free and not value > 0.0:
             raise ManeuverError(f"{name}: {field.name} must be positive, it is {value}")
-        if field.name in ("onset", "seed", "dwell", "pause") and value < 0.0:
+        if field.name in ("onset", "seed", "pause") and value < 0.0:
             raise ManeuverError(f"{name}: {field.name} must not be negative, it is {value}")
     rate = steepest * max(1.0, abs(maneuver.rear_ratio))
     if rate > maneuver.rate_limit * (1.0 + 1e-12):
@@ -55,7 +51,6 @@ def _check(maneuver: Any, *, steepest: float) -> None:
 
 
 def _check_sine(maneuver: Any) -> None:
-    """Check a maneuver that is as steep as a sine of its frequency and amplitude."""
     _check(maneuver, steepest=2.0 * math.pi * maneuver.frequency * abs(maneuver.amplitude))
 
 
@@ -66,12 +61,7 @@ def _both(front: Any, rear_ratio: float) -> Array:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepSteer:
     """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
-
     amplitude : final angle [rad].
-    onset : start of the ramp [s].
-    rate_limit : largest steering rate of either axle [rad/s].
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -84,7 +74,6 @@ class StepSteer:
         _check(self, steepest=0.0)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         angle = np.clip(self._rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -101,14 +90,10 @@ class StepSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoStepSteer:
     """A step steer whose angle changes again: two ramps at `rate_limit`, each to a held angle.
-
     amplitude : angle held from the first ramp to the second [rad].
     second_share : angle held after the second ramp, over `amplitude` [-].
     onset : start of the first ramp [s].
     second_onset : start of the second ramp [s], not before the first has arrived.
-    rate_limit : largest steering rate of either axle [rad/s].
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -131,15 +116,11 @@ class TwoStepSteer:
     @property
     def _first(self) -> StepSteer:
         return StepSteer(
-            amplitude=self.amplitude,
-            onset=self.onset,
-            rate_limit=self.rate_limit,
-            duration=self.duration,
-            rear_ratio=self.rear_ratio,
-        )
+            amplitude=self.amplitude, onset=self.onset, rate_limit=self.rate_limit,
+            duration=self.duration, rear_ratio=self.rear_ratio,
+        )  # fmt: skip
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         change = (self.second_share - 1.0) * self.amplitude
         second = replace(self._first, amplitude=change, onset=self.second_onset)
         return self._first.steering(t) + second.steering(t)
@@ -148,13 +129,7 @@ class TwoStepSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slalom:
     """A sine from onset to the end.
-
-    amplitude : of the sine [rad].
-    frequency : of the sine [Hz].
-    onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    amplitude : of the sine [rad].   frequency : of the sine [Hz].
     """
 
     amplitude: float
@@ -168,7 +143,6 @@ class Slalom:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         phase = 2.0 * math.pi * self.frequency * np.maximum(t - self.onset, 0.0)
         return _both(self.amplitude * np.sin(phase), self.rear_ratio)
 
@@ -176,14 +150,8 @@ class Slalom:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoubleLaneChange:
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
-
-    amplitude : of both sines [rad].
-    frequency : of both sines [Hz].
+    amplitude : of both sines [rad].   frequency : of both sines [Hz].
     pause : time straight ahead between them [s].
-    onset : start of the first [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
     """
 
     amplitude: float
@@ -198,7 +166,6 @@ class DoubleLaneChange:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         there = np.clip((t - self.onset) * self.frequency, 0.0, 1.0) % 1.0
         second = self.onset + 1.0 / self.frequency + self.pause
         back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
@@ -207,48 +174,9 @@ class DoubleLaneChange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SineWithDwell:
-    """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
-
-    amplitude : of the sine [rad].
-    frequency : of the sine [Hz]; the test uses 0.7.
-    dwell : time at the second peak [s]; the test uses 0.5.
-    onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
-    """
-
-    amplitude: float
-    frequency: float
-    dwell: float
-    onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_sine(self)
-
-    def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
-        since = t - self.onset
-        peak = 0.75 / self.frequency
-        moving = np.minimum(since, peak) + np.maximum(since - peak - self.dwell, 0.0)
-        phase = np.clip(moving * self.frequency, 0.0, 1.0) % 1.0  # sin(2 pi) is not 0
-        return _both(self.amplitude * np.sin(2.0 * math.pi * phase), self.rear_ratio)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SlowlyIncreasingSteer:
     """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
-
-    amplitude : final angle [rad].
-    rate : slope of the ramp of the front axle [rad/s].
-    onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s]; `rate` must keep it.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    amplitude : final angle [rad].   rate : slope of the ramp of the front axle [rad/s].
     """
 
     amplitude: float
@@ -262,7 +190,6 @@ class SlowlyIncreasingSteer:
         _check(self, steepest=self.rate)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         angle = np.clip(self.rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -274,13 +201,7 @@ class RandomSteer:
     The angles are drawn from `numpy.random.default_rng(seed)`, uniform in +-amplitude and one every
     half period, so that the steepest path between two is that of a sine of `frequency`. The same
     seed is the same maneuver, at any sampling.
-
-    amplitude : largest angle [rad].
-    frequency : of the fastest swing [Hz].
-    onset : start [s].
-    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
-    duration : length [s].
-    rear_ratio : rear over front angle [-].
+    amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].
     """
 
     amplitude: float
@@ -295,7 +216,6 @@ class RandomSteer:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         rng = np.random.default_rng(self.seed)
         swings = 2 + math.ceil(2.0 * self.frequency * self.duration)
         angles = np.append(0.0, self.amplitude * rng.uniform(-1.0, 1.0, swings))
@@ -308,12 +228,9 @@ class RandomSteer:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledSteer:
     """Given angles at given times, joined by straight lines, as a planned maneuver is.
-
     times : of the angles [s], rising, (k,); straight ahead before the first.
     angles : of the front wheels [rad], (k,), the first zero.
-    rate_limit : largest steering rate of either axle [rad/s].
     duration : length [s]; after the last time the last angle is held.
-    rear_ratio : rear over front angle [-].
     """
 
     times: tuple[float, ...]
@@ -346,5 +263,4 @@ class SampledSteer:
             )
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         return _both(np.interp(t, self.times, self.angles), self.rear_ratio)

@@ -10,10 +10,6 @@ LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
 
 
 def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
-    """Refuse what is no single real number.
-
-    refusal : class of the error to raise.
-    """
     try:
         if not isinstance(value, str | bytes):
             float(value)
@@ -24,10 +20,7 @@ def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
 
 
 def require_positive(refusal: type[ValueError], /, **values: float) -> None:
-    """Refuse every value that is not a finite number above zero.
-
-    refusal : class of the error to raise.
-    """
+    """Refuse every value that is not a finite number above zero."""
     for name, value in values.items():
         require_number(refusal, name, value)
         if not (value > 0.0 and math.isfinite(value)):
@@ -40,10 +33,7 @@ def require_positive_fields(record: Any) -> None:
 
 
 def require_within(refusal: type[ValueError], low: float, high: float, /, **values: float) -> None:
-    """Refuse every value outside the closed interval from `low` to `high`.
-
-    refusal : class of the error to raise.
-    """
+    """Refuse every value outside the closed interval from `low` to `high`."""
     for name, value in values.items():
         require_number(refusal, name, value)
         if not low <= value <= high:

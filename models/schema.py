@@ -3,6 +3,9 @@
 A file is a regular file of limited size, also when unpacked; JSON and TOML are limited in depth and
 number of values; a table gives its values by name and type. Which numbers are possible is for the
 records that are made of them. A refusal is one line: file, place, rule, and the value, shortened.
+
+In functions:
+limit : field of `InputLimits` that says how many megabytes it may hold.
 """
 
 import gzip
@@ -34,8 +37,6 @@ LONGEST_NAME = 200  # characters
 
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:
     """Refuse more than a limit allows, and tell how to raise it.
-
-    refusal : class of the error to raise.
     limit : field of `InputLimits`.
     """
     most = getattr(limits(), limit)
@@ -48,9 +49,7 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
 
 def swells(size: float, packed: float) -> bool:
     """Return whether data unpack to what no log packs to.
-
-    size : unpacked, as memory holds it [bytes].
-    packed : as the file holds them [bytes].
+    size : unpacked, as memory holds it [bytes].   packed : as the file holds them [bytes].
     """
     return size > SWOLLEN_FROM and size > SWELLS * packed
 
@@ -63,10 +62,7 @@ def most_unpacked(packed: float) -> int:
 def require_dense(
     refusal: type[ValueError], where: str, size: float, packed: float, what: str
 ) -> None:
-    """Refuse data that swell as no log does.
-
-    refusal : class of the error to raise.
-    """
+    """Refuse data that swell as no log does."""
     if swells(size, packed):
         raise refusal(
             f"{where}: {what} must be a log, they swell to {size / max(packed, 1):.0f} times their "
@@ -75,11 +71,7 @@ def require_dense(
 
 
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
-    """Refuse what is no regular file, and files that are too large.
-
-    refusal : class of the error to raise.
-    limit : field of `InputLimits` that says how many megabytes it may hold.
-    """
+    """Refuse what is no regular file, and files that are too large."""
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
         kind = "a folder" if stat.S_ISDIR(about.st_mode) else "a device, pipe or socket"
@@ -88,12 +80,7 @@ def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
 
 
 def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
-    """Read a file.
-
-    path : a regular file: no device, pipe or folder, which may have no end.
-    refusal : class of the error to raise.
-    limit : field of `InputLimits` that says how many megabytes it may hold.
-    """
+    """Read a file.   path : a regular file: no device, pipe or folder, which may have no end."""
     require_file(path, refusal, limit=limit)
     most = int(min(1e6 * getattr(limits(), limit), 2.0**62))
     with path.open("rb") as file:
@@ -104,8 +91,6 @@ def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document"
 
 def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[bytes]:
     """Yield what a file holds piece by piece, unpacked where it is gzip by its first bytes.
-
-    refusal : class of the error to raise.
     limit : field of `InputLimits` that says how many megabytes there may be, unpacked.
     """
     require_file(path, refusal, limit=limit)
@@ -137,12 +122,7 @@ def _require_size(path: Path, refusal: type[ValueError], size: int, limit: str) 
 def read_text(
     path: Path, refusal: type[ValueError], *, limit: str = "document", encoding: str = "utf-8"
 ) -> str:
-    """Read a text file.
-
-    refusal : class of the error to raise.
-    limit : field of `InputLimits` that says how many megabytes it may hold.
-    encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
-    """
+    """Read a text file.   encoding : utf-8, or utf-8-sig where a byte order mark may begin it."""
     try:
         return read_bytes(path, refusal, limit=limit).decode(encoding)
     except UnicodeDecodeError as error:
@@ -150,10 +130,6 @@ def read_text(
 
 
 def read_json(path: Path, refusal: type[ValueError]) -> Any:
-    """Read a JSON file.
-
-    refusal : class of the error to raise.
-    """
     text = read_text(path, refusal)
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -213,9 +189,7 @@ def _require_small(path: Path, data: Any, refusal: type[ValueError]) -> None:
 
 class Table:
     """A table of a document; its values are asked for by name and type.
-
     where : begins every message, as "car.toml: "; may be empty.
-    refusal : class of the errors to raise.
     prefix : of the names of values in messages, as in "chassis.".
     """
 
@@ -229,14 +203,10 @@ class Table:
         return key in self.data
 
     def refuse(self, key: str, rule: str) -> NoReturn:
-        """Raise the error of a value.
-
-        rule : that it breaks, as in "must be a number".
-        """
+        """Raise the error of a value.   rule : that it breaks, as in "must be a number"."""
         raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
 
     def value(self, key: str) -> Any:
-        """Return a value that must be there, of any type."""
         if key not in self.data:
             self.refuse(key, "is missing")
         return self.data[key]
@@ -252,28 +222,22 @@ class Table:
         return float(self._as(float, key, self.value(key)))
 
     def whole(self, key: str) -> int:
-        """Return a whole number."""
         return int(self._as(int, key, self.value(key)))
 
     def text(self, key: str) -> str:
-        """Return a text."""
         return str(self._as(str, key, self.value(key)))
 
     def table(self, key: str) -> "Table":
-        """Return a table inside."""
         prefix = f"{self._prefix}{key}."
         return Table(self.value(key), self._where, self._refusal, prefix)
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Return a list of texts."""
         return tuple(self._as(tuple[str, ...], key, self.value(key)))
 
     def wholes(self, key: str) -> tuple[int, ...]:
-        """Return a list of whole numbers."""
         return tuple(self._as(tuple[int, ...], key, self.value(key)))
 
     def tables(self, key: str) -> list["Table"]:
-        """Return a list of tables."""
         found = self.value(key)
         if not isinstance(found, list):
             self.refuse(key, f"must be a list, it is {shown(found)}")
@@ -302,7 +266,6 @@ class Table:
 
     def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
         """Return the arguments of a dataclass, each of the type that its field declares.
-
         cls : the dataclass; its fields are the keys that may be there.
         """
         known = self.only_fields(cls, skip=skip)
@@ -341,10 +304,7 @@ class Table:
 
 
 def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
-    """Refuse what cannot be the name of a car in files, figures and reports.
-
-    refusal : class of the error to raise.
-    """
+    """Refuse what cannot be the name of a car in files, figures and reports."""
     if not isinstance(name, str) or len(name) > LONGEST_NAME:
         raise refusal(
             f"{key} must be a text of at most {LONGEST_NAME} characters, not {shown(name)}"

@@ -32,7 +32,6 @@ class SensorError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensor:
     """One channel; the signal is delayed, then biased, then noisy, then rounded.
-
     noise : standard deviation of white Gaussian noise, in the unit of the signal.
     delay : the signal comes this much later [s], by interpolation; before, its first value holds.
     resolution : step of the quantization, in the unit of the signal; 0 for none.
@@ -53,9 +52,7 @@ class Sensor:
 
     def measure(self, t: Array, signal: Array, rng: np.random.Generator) -> Array:
         """Return what the sensor makes of a signal (n,).
-
-        t : time [s], (n,).
-        signal : the exact signal, (n,).
+        t : time [s], (n,).   signal : the exact signal, (n,).
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
         measured = np.interp(t - self.delay, t, signal) if self.delay > 0.0 else signal
@@ -68,9 +65,7 @@ class Sensor:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensors:
     """The sensors of a car; a channel left out is exact.
-
-    v_x, v_y : speed over ground [m/s].
-    r : yaw rate [rad/s].
+    v_x, v_y : speed over ground [m/s].   r : yaw rate [rad/s].
     delta : steering angle [rad], of each axle that steers.
     """
 
@@ -81,7 +76,6 @@ class Sensors:
 
     def apply(self, recording: Recording, rng: np.random.Generator) -> Recording:
         """Return the recording as these sensors would have taken it; its force truth stays exact.
-
         rng : source of the noise; the same generator state gives the same noise.
         """
         t = recording.t
@@ -98,9 +92,7 @@ class Sensors:
 
 def is_shown(channel: str, value: float) -> bool:
     """Return whether a channel shows a number.
-
-    channel : one of `LARGEST_SHOWN`.
-    value : in its SI unit.
+    channel : one of `LARGEST_SHOWN`.   value : in its SI unit.
     """
     return abs(value) <= LARGEST_SHOWN[channel]
 
@@ -112,7 +104,6 @@ def white_noise(signal: Array) -> float:
     """Return the standard deviation of the white part of a signal, by its second differences.
 
     Their median is taken: steps and outliers are not noise.
-
     signal : samples (n,).
     """
     bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]

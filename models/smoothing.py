@@ -17,7 +17,6 @@ def window(half: int) -> Array:
 
 def smoothed(signal: Array, half: int) -> Array:
     """Return a signal under a window without phase, mirrored about its ends (n,).
-
     signal : samples (n,).
     """
     padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
@@ -28,9 +27,7 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
     """Return what comes out of a low pass of first order that began at rest on the first value.
 
     It is exact for straight lines between samples.
-
-    signal : u, what goes in (n,).
-    lag : time constant T of the low pass [s].
+    signal : u, what goes in (n,).   lag : time constant T of the low pass [s].
     dt : sampling interval [s].
     """
     keep = math.exp(-dt / lag)
@@ -48,9 +45,7 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
 
 def without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:
     """Return what went into a low pass, u = y + T ẏ, of y smoothed by a window without phase.
-
-    signal : y, what came out (n,).
-    lag : time constant T of the low pass [s].
+    signal : y, what came out (n,).   lag : time constant T of the low pass [s].
     dt : sampling interval [s].
     half : samples on each side of the window that takes noise off first; 0 for none.
     """

@@ -7,7 +7,7 @@ F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the 
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -33,10 +33,19 @@ class VehicleError(TireidError, ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
 
 
+# What the numbers of a chassis lie within, in their units.
+_RANGES: Mapping[tuple[float, float], tuple[str, ...]] = {
+    (1e-3, 30.0): ("track_front", "track_rear", "cg_height"),
+    (1e-9, 1e12): ("roll_stiffness", "roll_damping", "roll_inertia"),
+    (1e-4, 100.0): ("relaxation_length_front", "relaxation_length_rear", "steering_lag"),
+    (0.0, 1.0): ("roll_stiffness_front_share", "drive_front_share", "brake_front_share"),
+    (-1.0, 1.0): ("roll_camber_front", "roll_camber_rear"),
+}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chassis:
     """Parameters of the double-track plant which the linear bicycle does not have.
-
     track_front, track_rear : distance between the wheels of an axle [m].
     cg_height : height of the center of gravity above the road [m].
     roll_center_height_front, roll_center_height_rear : height of the roll center of the axle above
@@ -76,64 +85,14 @@ class Chassis:
     tire: Path | None = None
 
     def __post_init__(self) -> None:
-        require_positive(
-            VehicleError,
-            track_front=self.track_front,
-            track_rear=self.track_rear,
-            cg_height=self.cg_height,
-            roll_stiffness=self.roll_stiffness,
-            roll_damping=self.roll_damping,
-            roll_inertia=self.roll_inertia,
-            relaxation_length_front=self.relaxation_length_front,
-            relaxation_length_rear=self.relaxation_length_rear,
-            steering_lag=self.steering_lag,
-        )
-        require_within(
-            VehicleError,
-            1e-3,
-            30.0,
-            track_front=self.track_front,
-            track_rear=self.track_rear,
-            cg_height=self.cg_height,
-        )
-        require_within(
-            VehicleError,
-            1e-9,
-            1e12,
-            roll_stiffness=self.roll_stiffness,
-            roll_damping=self.roll_damping,
-            roll_inertia=self.roll_inertia,
-        )
-        require_within(
-            VehicleError,
-            1e-4,
-            100.0,
-            relaxation_length_front=self.relaxation_length_front,
-            relaxation_length_rear=self.relaxation_length_rear,
-            steering_lag=self.steering_lag,
-        )
-        require_within(
-            VehicleError,
-            0.0,
-            1.0,
-            roll_stiffness_front_share=self.roll_stiffness_front_share,
-            drive_front_share=self.drive_front_share,
-            brake_front_share=self.brake_front_share,
-        )
-        require_within(
-            VehicleError,
-            -1.0,
-            1.0,
-            roll_camber_front=self.roll_camber_front,
-            roll_camber_rear=self.roll_camber_rear,
-        )
-        require_within(
-            VehicleError,
-            0.0,
-            self.cg_height,
-            roll_center_height_front=self.roll_center_height_front,
-            roll_center_height_rear=self.roll_center_height_rear,
-        )
+        for (low, high), names in _RANGES.items():
+            values = {name: getattr(self, name) for name in names}
+            if low > 0.0:
+                require_positive(VehicleError, **values)
+            require_within(VehicleError, low, high, **values)
+        centers = ("roll_center_height_front", "roll_center_height_rear")
+        values = {name: getattr(self, name) for name in centers}
+        require_within(VehicleError, 0.0, self.cg_height, **values)
 
 
 # A dataclass of a vehicle as the text of a TOML file, with exact numbers.
@@ -141,7 +100,6 @@ class Chassis:
 
 def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
     """Return the TOML text of a dataclass and of the one dataclass inside it.
-
     record : the dataclass to write; fields that are None are left out.
     """
     lines = [
@@ -210,7 +168,6 @@ def load_ratio(downforce: Any, v_x: Any) -> Any:
     """Return λ = 1 + κ v_x^2, the load over the static one [-], as a CasADi expression.
 
     `Vehicle.load_ratio` is the same of numbers.
-
     downforce : κ of both axles (2,), or of one, as `Vehicle.downforce` has it [s^2/m^2].
     v_x : longitudinal speed [m/s].
     """
@@ -219,20 +176,13 @@ def load_ratio(downforce: Any, v_x: Any) -> Any:
 
 
 __all__ = [
-    "GRAVITY",
-    "BicycleParameters",
-    "Chassis",
-    "Vehicle",
-    "VehicleError",
-    "estimate",
-    "sedan",
+    "GRAVITY", "BicycleParameters", "Chassis", "Vehicle", "VehicleError", "estimate", "sedan",
     "vehicle_template",
-]
+]  # fmt: skip
 
 
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
     """Return yaw inertia and cornering stiffnesses of a car of that size, by `RULES`.
-
     mass : total mass [kg].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     """
@@ -267,7 +217,6 @@ class Vehicle:
 
     Parameters
     ----------
-    name : what reports and figures call the car.
     mass : total mass [kg].
     yaw_inertia : moment of inertia about the vertical axis [kg m^2].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
@@ -313,14 +262,10 @@ class Vehicle:
             if name not in RULES:
                 raise VehicleError(f"estimated must be of {', '.join(RULES)}, not {shown(name)}")
         require_positive(
-            VehicleError,
-            mass=self.mass,
-            yaw_inertia=self.yaw_inertia,
-            l_f=self.l_f,
-            l_r=self.l_r,
+            VehicleError, mass=self.mass, yaw_inertia=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
             cornering_stiffness_front=self.cornering_stiffness_front,
             cornering_stiffness_rear=self.cornering_stiffness_rear,
-        )
+        )  # fmt: skip
         self._require_plausible()
         if self.chassis is not None:
             tipping = self.weight * self.roll_arm
@@ -365,12 +310,7 @@ class Vehicle:
             require_within(VehicleError, 0.0, highest.get(name, 1.0), **{name: value})
 
     def lengthwise(self, name: str) -> float | None:
-        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, None as neither.
-
-        Parameters
-        ----------
-        name : of the number.
-        """
+        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, or None."""
         told: float | None = getattr(self, name)
         if told is None and self.chassis is not None:
             told = getattr(self.chassis, name)
@@ -406,10 +346,7 @@ class Vehicle:
     @property
     def axle_loads(self) -> tuple[float, float]:
         """Static vertical load of the front and the rear axle [N]."""
-        return (
-            self.weight * self.l_r / self.wheelbase,
-            self.weight * self.l_f / self.wheelbase,
-        )
+        return (self.weight * self.l_r / self.wheelbase, self.weight * self.l_f / self.wheelbase)
 
     @property
     def downforce(self) -> tuple[float, float]:
@@ -453,13 +390,7 @@ class Vehicle:
 
     @property
     def roll_arm(self) -> float:
-        """Height of the center of gravity above the roll axis [m].
-
-        Raises
-        ------
-        VehicleError
-            When the vehicle has no chassis.
-        """
+        """Height of the center of gravity above the roll axis [m]."""
         chassis = self.require_chassis()
         front, rear = chassis.roll_center_height_front, chassis.roll_center_height_rear
         return chassis.cg_height - (self.l_r * front + self.l_f * rear) / self.wheelbase
@@ -468,22 +399,12 @@ class Vehicle:
     def bicycle(self) -> BicycleParameters:
         """The six numbers of the linear bicycle in the paper's letters."""
         return BicycleParameters(
-            m=self.mass,
-            I_z=self.yaw_inertia,
-            l_f=self.l_f,
-            l_r=self.l_r,
-            C_f=self.cornering_stiffness_front,
-            C_r=self.cornering_stiffness_rear,
-        )
+            m=self.mass, I_z=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
+            C_f=self.cornering_stiffness_front, C_r=self.cornering_stiffness_rear,
+        )  # fmt: skip
 
     def require_chassis(self) -> Chassis:
-        """Return the chassis to who cannot do without.
-
-        Raises
-        ------
-        VehicleError
-            When the vehicle has none.
-        """
+        """Return the chassis to who cannot do without."""
         if self.chassis is None:
             raise VehicleError(
                 f"vehicle '{self.name}' has no [chassis] table, which a simulated car needs: "
@@ -493,12 +414,7 @@ class Vehicle:
         return self.chassis
 
     def origin(self, name: str) -> str:
-        """Return where a value comes from: "declared", or "estimated" where left out.
-
-        Parameters
-        ----------
-        name : of the value.
-        """
+        """Return where a value comes from: "declared", or "estimated" where left out."""
         return "estimated" if name in self.estimated else "declared"
 
     @property

@@ -63,13 +63,11 @@ class Car(Protocol):
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
         """Return the car rolling straight ahead.
-
         v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
         """
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.
-
         command : angle asked of the front road wheels [rad].   v_ref : wanted speed [m/s].
         """
 
@@ -79,7 +77,6 @@ _HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 
 class DoubleTrackCar:
     """A car of `models.plant` on a road.
-
     vehicle : the car; it needs a chassis.
     tire : of all four wheels; None reads the file named by the chassis.
     friction : of the road; None is what the tire was measured on.
@@ -107,11 +104,9 @@ class DoubleTrackCar:
         self.speed_gain = driver.gain
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
-        """Return the car rolling straight ahead."""
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
-        """Return the car one period later."""
         return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
     def _state(self, plant: PlantState) -> CarState:

@@ -59,7 +59,6 @@ def state_size(structure: TireStructure) -> int:
 
 
 def stage_ports(structure: TireStructure) -> Ports:
-    """Return fresh symbols."""
     sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights, 2, 2, 1)
     pairs = zip(Ports._fields, sizes, strict=True)
     return Ports(*(ca.SX.sym(name, size) for name, size in pairs))

@@ -1,7 +1,6 @@
 """The optimal control problem of the tracker: horizon, cost, limits. Numbers, but for the horizon.
 
 Minimize Σ_k ½ y_k' Q y_k + ½ R u_k² + ½ y_N' Q_N y_N + ½ Σ Z s² over u_0 … u_{N-1}, with x_{k+1}
-from codegen.arrays import Array
 from one Runge-Kutta step of dt and x_0 given, so that
   |u_k| <= steering_rate,  |δ_k| <= steering                 hard, k = 1 … N
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
@@ -42,7 +41,6 @@ class Cost:
     0.5; the slalom, the circle and the handling course tuned nothing of them. With none on the yaw
     rate and a quarter on the input, plans became jerky and runs beyond the grip failed; with 8 on
     e_y some did at the grip. With 1 the car stays 1.3 times as far from the path.
-
     e_y : deviation from the path, at 0.1 m.
     e_psi : heading against that of the path, at 0.05 rad.
     course : direction of travel against the path, e_psi + v_y/v_x, at 0.05 rad.
@@ -88,7 +86,6 @@ class Cost:
 
 def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
     """Return y (7,), SI.
-
     x : [e_y, e_psi, v_y, r, δ, ...], SX.   kappa : curvature of the path [1/m].
     v_x : longitudinal speed [m/s].   s_dot : speed along the path [m/s].
     """
@@ -100,7 +97,6 @@ def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:
 
 def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
     """Return H = C' diag(q) C (n_x, n_x) and h = C' diag(q) y (n_x,), C = ∂y/∂x.
-
     y : errors (7,), SX.   x : state (n_x,), SX symbol.   q : weights (7,).
     """
     C = ca.jacobian(y, x)
@@ -111,10 +107,8 @@ def gauss_newton(y: Any, x: Any, q: Any) -> tuple[Any, Any]:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """Bounds, symmetric, all positive.
-
     steering : angle of the front road wheels [rad], kept exactly.
-    steering_rate : [rad/s], kept exactly.
-    e_y : deviation from the path [m], soft.
+    steering_rate : [rad/s], kept exactly.   e_y : deviation from the path [m], soft.
     slip : kinematic slip angle in front and at the rear [rad], soft. A tire whose curves are flat
         before that has its own, see `mpc.tires.tire`.
     soft_e_y : Z of ½ Z s² where the deviation is s beyond its bound [1/m²].
@@ -132,24 +126,16 @@ class Limits:
 
     def __post_init__(self) -> None:
         require_positive(
-            ValueError,
-            steering=self.steering,
-            steering_rate=self.steering_rate,
-            e_y=self.e_y,
-            soft_e_y=self.soft_e_y,
-            soft_slip=self.soft_slip,
-        )
+            ValueError, steering=self.steering, steering_rate=self.steering_rate, e_y=self.e_y,
+            soft_e_y=self.soft_e_y, soft_slip=self.soft_slip,
+        )  # fmt: skip
         if len(self.slip) != 2 or not all(0.0 < value < np.inf for value in self.slip):
             raise ValueError(f"slip must be two positive numbers, it is {self.slip}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """The problem; only the horizon is compiled.
-
-    horizon : number of stages N.
-    dt : length of a stage [s].
-    """
+    """The problem; only the horizon is compiled.   dt : length of a stage [s]."""
 
     horizon: int = 40
     dt: float = 0.05
@@ -169,7 +155,6 @@ class Guards:
     Without a new plan the old one steers for `hold_time`; then feedback to the path, within the
     hard limits: optimal at each speed for Σ (e_y/`fall_back_e_y`)² + (a/`fall_back_acceleration`)²,
     see `mpc.realtime.fall_back`.
-
     e_y : |e_y| beyond which the car is off the path [m].
     e_psi : |e_psi| beyond which it is [rad].
     v_y : |v_y| beyond which the tire is not known [m/s].

@@ -9,14 +9,6 @@ from identifier.baselines.slip_filter import SlipFilter, joint_ekf, linear_kf
 from identifier.baselines.washout import Washout
 
 __all__ = [
-    "CurveEkf",
-    "CurveModel",
-    "HorizonEstimator",
-    "LaggedEkf",
-    "LinearBaseline",
-    "SlipFilter",
-    "Washout",
-    "joint_ekf",
-    "linear_kf",
-    "magic_formula_ekf",
-]
+    "CurveEkf", "CurveModel", "HorizonEstimator", "LaggedEkf", "LinearBaseline", "SlipFilter",
+    "Washout", "joint_ekf", "linear_kf", "magic_formula_ekf",
+]  # fmt: skip

@@ -64,7 +64,6 @@ def _filtered_tire(textbook: bool) -> FilteredTire:
     """Return what makes the forces of a curve by θ = [curve, ln σ/σ₀, δ₀ and b over spreads].
 
     Prior: friction [-], then those of `_OWN_PRIOR` where it is not the textbook's.
-
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
     n = len(KINDS)
@@ -83,11 +82,7 @@ def _filtered_tire(textbook: bool) -> FilteredTire:
 
     own, prior = (0, 0) if textbook else (OWN, len(_OWN_PRIOR))
     return FilteredTire(
-        slip=slip,
-        force=force,
-        lag=None if textbook else lag,
-        unknowns=n + own,
-        prior=1 + prior,
+        slip=slip, force=force, lag=None if textbook else lag, unknowns=n + own, prior=1 + prior
     )
 
 
@@ -102,9 +97,7 @@ class CurveEkf(Method):
     """Tire parameters that walk at random, slowly, in the coordinates of `decoded`.
 
     With them the lag of the tire and the zeros of both sensors, which the default learns too.
-
-    walk : of every parameter [1/√s].
-    v_y_noise : standard deviation of measured v_y [m/s].
+    walk : of every parameter [1/√s].   v_y_noise : standard deviation of measured v_y [m/s].
     r_noise : standard deviation of the measured yaw rate [rad/s].
     v_y_disturbance : what the curve misses, as random change of v_y [m/s/√s].
     r_disturbance : what the curve misses, as random change of the yaw rate [rad/s/√s].
@@ -117,9 +110,7 @@ class CurveEkf(Method):
     stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
     shape_spread : standard deviation of the Magic Formula's shape at first, as its logit [-].
     friction_spread : standard deviation of the logarithm of friction at first [-].
-    outlier : standard deviations from which an innovation teaches no more.
-    dt : sampling interval [s].
-    learning_speed : below this speed [m/s] learning rests.
+    dt : sampling interval [s].   learning_speed : below this speed [m/s] learning rests.
     min_speed : below this speed [m/s] forces read zero.
     """
 
@@ -154,7 +145,6 @@ class CurveEkf(Method):
         Disturbances stand for what the curve misses, for a natural time at once: 8 % of g without
         lag and offsets, half of it with them. The parameters may walk by one percent in a second.
         Both were chosen on 32 random cars of our plant, from a compact to 1:10.
-
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -238,7 +228,6 @@ class CurveEkf(Method):
 
     def model(self, vehicle: Vehicle, theta: Array) -> CurveModel:
         """Return the curve, its lag and its offsets that unknowns make.
-
         theta : unknowns, (n,).
         """
         n, loads = len(KINDS), ca.DM(vehicle.axle_loads)
@@ -274,8 +263,6 @@ class CurveEkf(Method):
 
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
     """Return the method for a car.
-
-    vehicle : the car; its stiffness B C D is the prior.
-    dt : sampling interval [s].
+    vehicle : the car; its stiffness B C D is the prior.   dt : sampling interval [s].
     """
     return CurveEkf.for_vehicle(vehicle, dt=dt, textbook=textbook)

@@ -57,30 +57,20 @@ class Curve(NamedTuple):
 
 def _small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - (v_y ± l r)/v_x of (3), (2,) [rad].
-
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     return slip_angles(p.l_f, p.l_r, v_x, x, u)
 
 
 def _wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return slip angles α = δ - atan((v_y ± l r)/v_x) (2,) [rad].
-
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     return u + ca.atan(_small_slip(p, v_x, x, u) - u)
 
 
 def linear(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
-    """Return F = C α of (3), (2,) [N].
-
-    q : C [N/rad] (2, 1).
-    alpha : slip angles (2,) [rad].
-    """
+    """Return F = C α of (3), (2,) [N].   q : C [N/rad] (2, 1).   alpha : slip angles (2,) [rad]."""
     del loads, u
     return q[:, 0] * alpha
 
@@ -89,10 +79,7 @@ def magic_formula(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """Return F = D sin(C atan(B α)) cos δ, the Magic Formula without E, (2,) [N].
 
     Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49) with E = 0.
-
-    q : B [1/rad], C [-], D [N] (2, 3).
-    alpha : slip angles (2,) [rad].
-    u : [δ_f, δ_r] (2,).
+    q : B [1/rad], C [-], D [N] (2, 3).   alpha : slip angles (2,) [rad].   u : [δ_f, δ_r] (2,).
     """
     del loads
     B, C, D = q[:, 0], q[:, 1], q[:, 2]
@@ -104,10 +91,7 @@ def dugoff(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
 
     F = C tan α f(λ), λ = μ F_z/(2 C |tan α|), f = λ (2 - λ) for λ < 1, else 1.
     Source: Dugoff, Fancher and Segel, SAE 700377 (1970).
-
-    q : C [N/rad], μ [-] (2, 2).
-    loads : F_z (2,) [N].
-    alpha : slip angles (2,) [rad].
+    q : C [N/rad], μ [-] (2, 2).   loads : F_z (2,) [N].   alpha : slip angles (2,) [rad].
     u : [δ_f, δ_r] (2,).
     """
     C, mu = q[:, 0], q[:, 1]
@@ -125,10 +109,8 @@ CURVES: Mapping[str, Curve] = {
 
 def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: Any, u: Any) -> Any:
     """Return the slip angles of a curve, the offsets of the sensors taken off, (2,) [rad].
-
     offset : zero of the front steering δ₀ [rad], which is added, and bias b of v_y [m/s], (2,).
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] as the sensors read them (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] as the sensors read them (2,).
     u : [δ_f, δ_r] (2,).
     """
     return curve.slip(p, v_x, x - ca.vertcat(offset[1], 0), u + ca.vertcat(offset[0], 0))
@@ -142,9 +124,7 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
 
     Carried: `LaggedSlip` where it lags, else nothing. Constant: parameters of the curve (2, n),
     offset (2,) = δ₀ [rad] and b [m/s], and where it lags lag (2,) = σ [m].
-
     name : one of `CURVES`.
-    lagged : whether the slip lags.
     """
     s, last = sample_ports(), lag_symbols()
     q = ca.SX.sym("parameters", 2, len(CURVES[name].parameters))
@@ -171,11 +151,6 @@ def _build_curve(name: str, *, lagged: bool) -> ca.Function:
 
 @cache
 def _curve_scan(name: str, *, lagged: bool) -> Scan:
-    """Return the compiled loop of `_build_curve`.
-
-    name : one of `CURVES`.
-    lagged : whether the slip lags.
-    """
     return Scan(_build_curve(name, lagged=lagged), carry=LAG_PORTS if lagged else (), over=OVER)
 
 
@@ -187,9 +162,7 @@ def unlagged() -> dict[str, Array]:
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class CurveModel(TireModel):
     """Axle forces of a curve with parameters that no longer change.
-
-    curve : one of `CURVES`.
-    parameters : of the curve, front and rear (2, n), SI.
+    curve : one of `CURVES`.   parameters : of the curve, front and rear (2, n), SI.
     min_speed : below this speed [m/s] the forces read zero.
     relaxation_length : σ by which the slip lags (2,) [m]; 0 is no lag.
     offset : zero of the front steering δ₀ [rad] and bias b of v_y [m/s], (2,).
@@ -227,7 +200,6 @@ class CurveModel(TireModel):
                 )
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
         return Setup(
             scan=_curve_scan(self.curve, lagged=self.lagged),
             carry=unlagged() if self.lagged else {},
@@ -246,7 +218,6 @@ class CurveModel(TireModel):
         return bool((self.relaxation_length > 0.0).any())
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return the lines of `summary`."""
         lag = Fact("relaxation length", self.relaxation_length, "m")
         return (*TireModel.facts(self), *((lag,) if self.lagged else ()))
 
@@ -259,7 +230,6 @@ class CurveModel(TireModel):
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip, (2,) or none [rad/s].
-
         x : [v_y, r] (2,), as the sensors read them while learning.
         """
         p, u = self.vehicle.bicycle, ca.vertcat(delta, 0)
@@ -290,7 +260,6 @@ class CurveModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "CurveModel":
-        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             curve = table.text("curve")

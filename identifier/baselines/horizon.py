@@ -26,14 +26,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CurveModel
-from identifier.baselines.slip_filter import (
-    LIMITS,
-    PORTS,
-    TIRES,
-    Numbers,
-    SlipFilter,
-    joint_ekf,
-)
+from identifier.baselines.slip_filter import LIMITS, PORTS, TIRES, Numbers, SlipFilter, joint_ekf
 from identifier.baselines.without_v_y import (
     MOST_SLIDING,
     OVER,
@@ -76,11 +69,7 @@ class Sampled(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """What the forward pass leaves of a sample: filtered z and P, and what the way back needs.
-
-    ahead, ahead_P : before its measurement.   pull : Hᵀ S⁻¹ times the innovation.
-    keep : I - K H.   F : of the step that led to it.
-    """
+    """What the forward pass leaves of a sample: filtered z and P, and what the way back needs."""
 
     z: Any
     P: Any
@@ -214,8 +203,6 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     window first, window (7, N + 1), running. Below the learning speed, and after an estimate that
     slides by more than `MOST_SLIDING`, the window is empty, and x begins anew in a steady turn;
     θ and its covariance are kept.
-
-    samples : N of the window.
     """
     stage, constants = build_stage(), ("vehicle", "sampling", "numbers")
     rows = {"trajectory": (Z, samples + 1), "window": (len(Sampled._fields), samples + 1)}
@@ -279,10 +266,10 @@ def _scan(samples: int, iterations: int) -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HorizonEstimator(Method):
     """Lateral velocity and two numbers per tire by moving-horizon estimation; v_y is not read.
-
     window : how long what was measured is looked at again [s].
     """
 
+    ports = _OWN_PORTS
     needs_v_y = False  # it tells one
     needs_a_y = True
 
@@ -309,7 +296,6 @@ class HorizonEstimator(Method):
 
     @property
     def samples(self) -> int:
-        """N of the window."""
         return round(self.window / self.dt)
 
     @classmethod
@@ -325,17 +311,10 @@ class HorizonEstimator(Method):
         joint = joint_ekf(vehicle, dt=dt)
         return cls(
             filter=replace(
-                joint,
-                a_y_noise=1.3 * joint.a_y_noise,
-                r_disturbance=0.36 * joint.r_disturbance,
+                joint, a_y_noise=1.3 * joint.a_y_noise, r_disturbance=0.36 * joint.r_disturbance
             ),
             window=window,
         )
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return _OWN_PORTS
 
     @property
     def remark(self) -> str:
@@ -361,5 +340,4 @@ class HorizonEstimator(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters."""
         return self.filter.frozen(vehicle, state)

@@ -56,7 +56,6 @@ class FilteredTire(NamedTuple):
 
     @property
     def carry(self) -> tuple[str, ...]:
-        """Names of what its filter carries."""
         return CARRY if self.lag is None else (*CARRY, *LAG_PORTS)
 
 
@@ -70,8 +69,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     [m/s/√s], [rad/s/√s]), walk of θ [1/√s], limit of |θ|, learning_speed [m/s], prior: whatever
     the tire needs. Below that speed θ and its covariance are kept, and x and α' begin anew from
     the measurement.
-
-    tire : forces by θ.
     """
     s = sample_ports()
     lags = 0 if tire.lag is None else 2
@@ -137,9 +134,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
 def midpoint(estimate: Any, rate: Any, dt: Any) -> Any:
     """Return what moves of an estimate a step later, by the linearly implicit midpoint rule.
-
-    estimate : symbols; what moves comes first.
-    rate : of what moves (n,).
+    estimate : symbols; what moves comes first.   rate : of what moves (n,).
     dt : sampling interval [s].
     """
     n = rate.numel()
@@ -151,12 +146,8 @@ def correct(
     estimate: Any, P: Any, R: Any, x: Any, outlier: Any, *, follow: bool
 ) -> tuple[Any, Any]:
     """Return estimate and covariance after the measurement of the first two states.
-
-    estimate : before, (n,).
-    P : its covariance (n, n).
-    R : covariance of the measurement (2, 2).
-    x : the measurement (2,).
-    outlier : standard deviations from which an innovation counts no more for the other states.
+    estimate : before, (n,).   P : its covariance (n, n).
+    R : covariance of the measurement (2, 2).   x : the measurement (2,).
     follow : whether it counts for the first two all the same.
     """
     S = P[:2, :2] + R

@@ -31,7 +31,7 @@ from identifier.baselines.ports import (
 )
 from identifier.baselines.without_v_y import OVER, corrected, given_ports
 from identifier.method import Method
-from identifier.setup import Port, Setup
+from identifier.setup import Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
@@ -64,9 +64,7 @@ class Numbers(NamedTuple):
 
 def _curve_parameters(theta: Any, loads: Any) -> Any:
     """Return B [1/rad], C [-] and D [N] of both axles, (2, 3).
-
-    theta : ln C and ln μ of both axles (4,).
-    loads : static, (2,) [N].
+    theta : ln C and ln μ of both axles (4,).   loads : static, (2,) [N].
     """
     stiffness, friction = ca.exp(theta[:2]), ca.exp(theta[2:])
     shape = ca.DM.ones(2) * TYPICAL_SHAPE
@@ -143,19 +141,19 @@ def _scan() -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaggedEkf(Method):
     """Stiffness and friction of each axle behind a fixed lag, with a_y heard where there is one.
-
     v_y_noise, r_noise : standard deviations of what is measured [m/s], [rad/s].
     v_y_disturbance, r_disturbance : what the tires miss, as random change [m/s/√s], [rad/s/√s].
     relaxation_length : of both axles [m].
-    a_y_noise : standard deviation of the accelerometer [m/s²].
-    walk : of ln C and ln μ [1/√s].
+    a_y_noise : standard deviation of the accelerometer [m/s²].   walk : of ln C and ln μ [1/√s].
     stiffness_spread, friction_spread : standard deviations of ln C and ln μ at first [-].
     steering_spread : standard deviation of the zero of the front steering at first [rad].
     a_y_spread : standard deviation of the bias of a_y at first [m/s²].
-    dt : sampling interval [s].
-    learning_speed : below this speed [m/s] learning rests.
+    dt : sampling interval [s].   learning_speed : below this speed [m/s] learning rests.
     min_speed : below this speed [m/s] forces read zero.
     """
+
+    ports = (*PORTS, *LAG_DESCRIBED)
+    remark = "two numbers an axle, one relaxation length for all cars of a size"
 
     v_y_noise: float
     r_noise: float
@@ -195,16 +193,6 @@ class LaggedEkf(Method):
             min_speed=vehicle.lowest_speed,
         )
 
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return (*PORTS, *LAG_DESCRIBED)
-
-    @property
-    def remark(self) -> str:
-        """Say what it is given."""
-        return "two numbers an axle, one relaxation length for all cars of a size"
-
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""
         if start is not None:
@@ -231,7 +219,6 @@ class LaggedEkf(Method):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the Magic Formula with the carried parameters, the lag and the steering's zero.
-
         state : estimate (10,).
         """
         z = state["estimate"].ravel()

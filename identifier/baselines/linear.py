@@ -11,27 +11,24 @@ from identifier.baselines.curves import CurveModel
 from identifier.method import Method
 from identifier.setup import Setup
 from identifier.tire_model import TireModel
-from models.rules import require_positive
+from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearBaseline(Method):
     """F = C α of (3) with the stiffness that the vehicle states.
-
-    dt : sampling interval [s].
-    min_speed : below this speed [m/s] forces read zero.
+    dt : sampling interval [s].   min_speed : below this speed [m/s] forces read zero.
     """
 
     dt: float = 0.01
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(ValueError, dt=self.dt, min_speed=self.min_speed)
+        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
-        """Return the method for a car."""
         return cls(dt=dt, min_speed=vehicle.lowest_speed)
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
@@ -40,7 +37,6 @@ class LinearBaseline(Method):
         return self.frozen(vehicle, {}).setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the linear tire itself."""
         del state
         stiffness = [[vehicle.cornering_stiffness_front], [vehicle.cornering_stiffness_rear]]
         return CurveModel(

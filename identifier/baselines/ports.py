@@ -35,7 +35,6 @@ class Sample(NamedTuple):
 
     @property
     def moving(self) -> Any:
-        """Whether the car moves."""
         return self.v_x >= self.sampling[1]
 
     @property
@@ -45,7 +44,6 @@ class Sample(NamedTuple):
 
 
 def sample_ports() -> Sample:
-    """Return fresh symbols."""
     vehicle = ca.SX.sym("vehicle", 6)
     return Sample(
         x=ca.SX.sym("x", 2),
@@ -58,28 +56,20 @@ def sample_ports() -> Sample:
 
 
 def axle_loads(p: BicycleParameters, gravity: float) -> Any:
-    """Return the static axle loads F_z (2,) [N].
-
-    gravity : g [m/s²].
-    """
+    """Return the static axle loads F_z (2,) [N].   gravity : g [m/s²]."""
     return p.m * gravity / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
 
 
 def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
     """Return n, the axle forces of a steady turn (2,) [N].
-
-    v_x : longitudinal speed [m/s].
-    x : [v_y, r] (2,).
+    v_x : longitudinal speed [m/s].   x : [v_y, r] (2,).
     """
     return p.m * v_x * x[1] / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
 
 
 def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
     """Return dx/dt of (1)-(2), (2,).
-
-    v_x : longitudinal speed [m/s].
-    x : [v_y, r] (2,).
-    F : axle forces (2,) [N].
+    v_x : longitudinal speed [m/s].   x : [v_y, r] (2,).   F : axle forces (2,) [N].
     """
     return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)
 
@@ -102,15 +92,12 @@ SHORTEST = 1e-9  # m: keeps v_x T_s/σ finite without a lag, where e^(-v_x T_s/�
 
 
 def lag_symbols() -> LaggedSlip:
-    """Return fresh symbols."""
     return LaggedSlip(ca.SX.sym("slip", 2), ca.SX.sym("alpha", 2), ca.SX.sym("begun"))
 
 
 def lagged_slip(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
     """Return α' after a step (2,) [rad]; the first sample begins without lag.
-
-    alpha : slip angles now (2,) [rad].
-    way : v_x T_s, what the tire has rolled [m].
+    alpha : slip angles now (2,) [rad].   way : v_x T_s, what the tire has rolled [m].
     sigma : relaxation lengths (2,) [m], not negative.
     """
     e = ca.exp(-way / ca.fmax(sigma, SHORTEST))

@@ -88,13 +88,7 @@ def _tire(curve: str, force: Any, unknowns: int) -> FilteredTire:
         del known, theta
         return CURVES[curve].slip(p, v_x, x, u)
 
-    return FilteredTire(
-        slip=slip,
-        force=force,
-        lag=None,
-        unknowns=unknowns,
-        prior=1,
-    )
+    return FilteredTire(slip=slip, force=force, lag=None, unknowns=unknowns, prior=1)
 
 
 TIRES: Mapping[str, FilteredTire] = {
@@ -109,8 +103,6 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     Carried: estimate (n,) = [v_y, r, θ], its covariance P, before (3,), running. Below the learning
     speed, and after an estimate that slides by more than `MOST_SLIDING`, x begins anew in a steady
     turn; θ and its covariance are kept.
-
-    tire : forces by θ.
     """
     heard, n = given_ports(), 2 + tire.unknowns
     s, estimate, P = heard.sample, ca.SX.sym("estimate", n), ca.SX.sym("P", n, n)
@@ -170,7 +162,6 @@ def _scan(tire: str) -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipFilter(Method):
     """Lateral velocity by a Kalman filter that hears r and a_y; a recording's v_y is not read.
-
     tire : "linear", that of the vehicle file, or "dugoff", which is learnt.
     r_noise : standard deviation of the measured yaw rate [rad/s].
     a_y_noise : standard deviation of the measured a_y [m/s²].
@@ -181,12 +172,11 @@ class SlipFilter(Method):
     friction : what friction is held for at first [-]; as all that follow, not of the linear tire.
     stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
     friction_spread : standard deviation of the logarithm of friction at first [-].
-    outlier : standard deviations from which an innovation counts no more.
-    dt : sampling interval [s].
-    learning_speed : below this speed [m/s] the filter rests.
+    dt : sampling interval [s].   learning_speed : below this speed [m/s] the filter rests.
     min_speed : below this speed [m/s] forces and v_y read zero.
     """
 
+    ports = PORTS
     estimates = "lateral velocity"
     needs_v_y = False  # it tells one
     needs_a_y = True
@@ -218,7 +208,6 @@ class SlipFilter(Method):
 
         So that the joint filter errs least, and 95 % of its errors lie within two standard
         deviations there; the linear one has the same, and does not know that stiffnesses are wrong.
-
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -236,13 +225,7 @@ class SlipFilter(Method):
 
     @property
     def learns(self) -> bool:
-        """Whether there is a tire to learn."""
         return TIRES[self.tire].unknowns > 0
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return PORTS
 
     @property
     def remark(self) -> str:
@@ -277,7 +260,6 @@ class SlipFilter(Method):
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve of Dugoff with the carried parameters."""
         if not self.learns:
             Method.frozen(self, vehicle, state)
         theta = state["estimate"].ravel()[2:].reshape(2, 2)
@@ -295,7 +277,6 @@ class SlipFilter(Method):
 
 def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the linear filter of v_y and r on the stiffnesses of the vehicle file.
-
     dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="linear", dt=dt)
@@ -303,8 +284,6 @@ def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
 
 def joint_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
     """Return the naive joint filter of v_y, r and a tire of Dugoff per axle.
-
-    vehicle : the car; its stiffness is the prior.
-    dt : sampling interval [s].
+    vehicle : the car; its stiffness is the prior.   dt : sampling interval [s].
     """
     return SlipFilter.for_vehicle(vehicle, tire="dugoff", dt=dt)

@@ -14,16 +14,11 @@ import numpy as np
 
 from codegen import Scan
 from identifier.baselines.curves import CURVES
-from identifier.baselines.without_v_y import (
-    OVER,
-    V_Y,
-    given_ports,
-    steady_v_y,
-)
+from identifier.baselines.without_v_y import OVER, V_Y, given_ports, steady_v_y
 from identifier.method import Method
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
-from models.rules import require_positive
+from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
 CARRY = ("washed", "rate", "running")
@@ -76,12 +71,12 @@ def _scan() -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Washout(Method):
     """Lateral velocity by integration, with what is slow taken from the linear tires.
-
-    cutoff : ω, below which the linear model counts [1/s].
-    dt : sampling interval [s].
+    cutoff : ω, below which the linear model counts [1/s].   dt : sampling interval [s].
     min_speed : below this speed [m/s] forces and v_y read zero.
     """
 
+    ports = PORTS
+    remark = "by integration, and below its cutoff on the vehicle's linear tires"
     estimates = "lateral velocity"
     needs_v_y = False  # it tells one
     needs_a_y = True
@@ -91,7 +86,7 @@ class Washout(Method):
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(ValueError, cutoff=self.cutoff, dt=self.dt, min_speed=self.min_speed)
+        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
@@ -101,16 +96,6 @@ class Washout(Method):
         one errs less there by a tenth at most, and is the linear model alone.
         """
         return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return PORTS
-
-    @property
-    def remark(self) -> str:
-        """Say what it stands on."""
-        return "by integration, and below its cutoff on the vehicle's linear tires"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""

@@ -24,7 +24,6 @@ MOST_SLIDING = 0.7  # |v_y|/v_x beyond which an estimate is none
 
 class _Heard(NamedTuple):
     """A sample without v_y: the ports of it, and a_y [m/s²], 0 where there is none.
-
     hears : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
     """
 
@@ -46,7 +45,6 @@ class _Heard(NamedTuple):
 
 
 def given_ports() -> _Heard:
-    """Return fresh symbols."""
     a_y = ca.SX.sym("a_y")
     hears = ca.fabs(a_y) < _MOST_FELT  # NaN is not
     return _Heard(sample_ports(), ca.if_else(hears, a_y, 0), hears, a_y)
@@ -54,10 +52,7 @@ def given_ports() -> _Heard:
 
 def steady_v_y(p: BicycleParameters, v_x: Any, r: Any, u: Any) -> Any:
     """Return v_y of a steady turn on the linear rear tire [m/s].
-
-    v_x : longitudinal speed [m/s].
-    r : yaw rate [rad/s].
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s].   r : yaw rate [rad/s].   u : [δ_f, δ_r] (2,).
     """
     F_r = turning_force(p, v_x, ca.vertcat(0, r))[1]
     return p.l_r * r + v_x * (u[1] - F_r / p.C_r)
@@ -67,12 +62,8 @@ def axle_force(
     tire: FilteredTire, p: BicycleParameters, known: Any, estimate: Any, v_x: Any, u: Any
 ) -> Any:
     """Return the axle forces of an estimate, (2,) [N].
-
-    tire : forces by θ, without lag.
-    known : whatever else the tire reads.
-    estimate : [v_y, r, θ].
-    v_x : longitudinal speed [m/s], not zero.
-    u : [δ_f, δ_r] (2,).
+    tire : forces by θ, without lag.   estimate : [v_y, r, θ].
+    v_x : longitudinal speed [m/s], not zero.   u : [δ_f, δ_r] (2,).
     """
     x, theta = estimate[:2], estimate[2:]
     return tire.force(p, known, theta, tire.slip(p, known, theta, v_x, x, u), u)
@@ -82,10 +73,7 @@ def predicted(
     tire: FilteredTire, p: BicycleParameters, known: Any, estimate: Any, v_x: Any, u: Any, dt: Any
 ) -> Any:
     """Return the estimate a step later, θ as it is.
-
-    estimate : [v_y, r, θ], symbols.
-    v_x, u : means over the step.
-    dt : sampling interval [s].
+    estimate : [v_y, r, θ], symbols.   dt : sampling interval [s].
     """
     F = axle_force(tire, p, known, estimate, v_x, u)
     rate = motion_rate(p, v_x, estimate[:2], F)
@@ -102,7 +90,6 @@ def expected(
 
 class _Corrected(NamedTuple):
     """What a measurement makes of an estimate.
-
     move : of the estimate (n,).   P : covariance after (n, n).   keep : I - K H (n, n).
     pull : Hᵀ S⁻¹ times the innovation (n,).
     """
@@ -115,12 +102,9 @@ class _Corrected(NamedTuple):
 
 def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> _Corrected:
     """Return what a measurement of two numbers makes of an estimate, in Joseph's form.
-
     P : covariance before (n, n).
     H : what the numbers are of the estimate (2, n); a row of zeros hears nothing.
-    R : covariance of the numbers (2, 2).
-    innovation : (2,).
-    outlier : standard deviations from which it counts no more.
+    R : covariance of the numbers (2, 2).   innovation : (2,).
     """
     S = H @ P @ H.T + R
     S_inverse = ca.inv_minor(S)

@@ -37,7 +37,6 @@ INFINITE = AxleRmse(front=np.inf, rear=np.inf)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
     """What methods are compared on.
-
     min_speed : samples below this speed [m/s] do not count, for any method.
     """
 
@@ -69,7 +68,6 @@ class Course:
 
     @property
     def measure(self) -> str:
-        """What errors are, in words."""
         by = ", means over 0.3 s by the motion" if self.by_motion else ""
         return f"RMSE of the axle force{by}"
 
@@ -82,23 +80,21 @@ class Course:
 
     def error(self, recording: Recording, force: Array) -> AxleRmse:
         """Return the RMSE of forces over the samples that count; infinite where not finite.
-
         force : (n, 2) [N].
         """
         if self.by_motion:
-            return self._error_by_motion(recording, force)
+            vehicle, windows = self.vehicle, self._windows(recording)
+            loads = np.array(vehicle.axle_loads)
+            with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
+                missed = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
+                front, rear = loads * clean_rms(missed, noise_variance(recording, vehicle, windows))
+            return (
+                AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
+            )
         assert recording.axle_force is not None
         counted = counted_samples(recording, self.min_speed)
         found = axle_rms(force, counted, recording.axle_force)
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
-
-    def _error_by_motion(self, recording: Recording, force: Array) -> AxleRmse:
-        vehicle, windows = self.vehicle, self._windows(recording)
-        loads = np.array(vehicle.axle_loads)
-        with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
-            missed = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
-            front, rear = loads * clean_rms(missed, noise_variance(recording, vehicle, windows))
-        return AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
         """Return by recording the error of a frozen model."""
@@ -106,7 +102,6 @@ class Course:
 
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].
-
         error : over it [N].
         """
         (recording,) = (rec for rec in self.recordings if rec.name == name)
@@ -116,7 +111,6 @@ class Course:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
     """One method on a course.
-
     online : by recording, error of what was identified online [N].
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
@@ -141,17 +135,10 @@ class Shares(NamedTuple):
     other: float | None
 
 
-def _shown_to(method: Method, recording: Recording) -> Recording:
-    """Return what a comparison shows a method: no lateral velocity, where it tells one."""
-    return recording if method.needs_v_y else replace(recording, v_y=None)
-
-
 def cross_replay(
     method: Method, course: Course, seen: Callable[[History], None] | None = None
 ) -> Trial:
     """Learn on each recording afresh, freeze at its end and replay on all.
-
-    seen : called with each run.
 
     A method that tells lateral velocity learns without that of the recording; the frozen tires of
     all are asked at the same slip.
@@ -159,7 +146,9 @@ def cross_replay(
     online, frozen, diverged_at, freezes = {}, {}, {}, True
     told: dict[str, SideSlip] = {}
     for recording in course.recordings:
-        history = identify(_shown_to(method, recording), course.vehicle, method)
+        history = identify(
+            recording if method.needs_v_y else replace(recording, v_y=None), course.vehicle, method
+        )
         end = float(recording.t[-1])
         if seen is not None:
             seen(history)
@@ -176,10 +165,7 @@ def cross_replay(
         except ValueError:  # the last update left weights that are not finite
             diverged_at[recording.name] = end
     return Trial(
-        online=online,
-        frozen=frozen if freezes else None,
-        diverged_at=diverged_at,
-        side_slip=told,
+        online=online, frozen=frozen if freezes else None, diverged_at=diverged_at, side_slip=told
     )
 
 
@@ -189,7 +175,6 @@ SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SideSlip:
     """What a method told of lateral velocity over a recording, and how far it was off.
-
     v_y : told at each sample (n,) [m/s].
     v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.
     rms : of the error of side slip, from the first sample at a speed that counts [deg], infinite
@@ -205,7 +190,6 @@ class SideSlip:
 
 def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSlip | None:
     """Return what a run told of lateral velocity; None of a method that reads it.
-
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """
@@ -245,7 +229,6 @@ def frozen_shares(
     frozen: Mapping[str, Mapping[str, AxleRmse]], course: Course
 ) -> tuple[float | None, float | None]:
     """Return the mean errors of frozen models where they learnt and elsewhere [%].
-
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on, other = same_and_other(frozen)
@@ -259,7 +242,6 @@ def same_and_other(
     frozen: Mapping[str, Mapping[str, AxleRmse]],
 ) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
     """Return name and error of replays of the drive that was learnt, and of every other drive.
-
     frozen : by recording learnt on and recording replayed [N].
     """
     learnt_on: list[tuple[str, AxleRmse]] = []
@@ -290,7 +272,6 @@ def step_times(
     Setting up is left out. Times are those of this thread on its processor, so that waiting for a
     busy machine does not count, and the methods take turns. A short recording is run forward and
     backward in time until it is long enough, of a long one the first 100 000 samples count.
-
     repeats : turns; the shortest counts.
     """
     runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}

@@ -7,19 +7,14 @@ from functools import partial
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
 from identifier.method import Method
 from identifier.methods import REFERENCE, make_method
-from identifier.reproducibility import AxleRmse
 from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
-
-Frozen = Mapping[str, Mapping[str, AxleRmse]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
     """Methods side by side.
-
-    trials : by method, its errors with the numbers that follow from the vehicle.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them, a method
         that learns from whole logs never.
     """
@@ -32,7 +27,6 @@ class Comparison:
 
     @property
     def names(self) -> list[str]:
-        """Names of the recordings."""
         return [recording.name for recording in self.course.recordings]
 
     def shares(self, method: str) -> Shares:
@@ -65,7 +59,6 @@ def run_comparison(
     seen: Callable[[str, History], None] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
-
     recordings : with true forces, or judged by the motion.
     others : further methods by name.   seen : called with each method's name and run.
     """
@@ -88,17 +81,12 @@ def run_comparison(
     )
 
 
-def _frozen_share(found: Shares) -> float | None:
-    """Return the frozen error on other recordings, or where learnt if there is only one [%]."""
-    return found.in_sample if found.other is None else found.other
-
-
 def ranking(comparison: Comparison) -> list[str]:
     """Return the methods, smallest frozen error elsewhere first; those that cannot freeze last."""
 
     def key(name: str) -> tuple[bool, float]:
         found = comparison.shares(name)
-        error = _frozen_share(found)
+        error = found.in_sample if found.other is None else found.other
         return (error is None, found.online if error is None else error)
 
     return sorted(comparison.trials, key=key)

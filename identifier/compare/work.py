@@ -23,7 +23,6 @@ def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
 
     Fresh processes rather than threads: the compiled loops release Python's lock, but what is
     around them does not, and CasADi's graphs must not be built by two threads at once.
-
     workers : number of processes; the functions and their arguments must be picklable.
     chunk : number of items that a process takes at once.
     """
@@ -39,8 +38,6 @@ def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
 
 def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
     """Return a pool of new processes that end with this one, however it ends.
-
-    workers : number of processes.
     prepare : what each does first; a function of a module.
     """
     return ProcessPoolExecutor(
@@ -60,7 +57,6 @@ begin_process(prepare)
 
 def begin_process(prepare: Callable[[], None] | None) -> None:
     """Let this process, one of a pool, end with the one that made it.
-
     prepare : what it does first; None for nothing.
     """
     threading.Thread(target=_end_with_parent, daemon=True).start()

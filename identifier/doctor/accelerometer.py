@@ -35,7 +35,6 @@ class Line(NamedTuple):
     deviations: Array
 
     def of(self, parameter: str) -> tuple[float, float]:
-        """Return the value of a suspect, and its deviation."""
         k = OF_A_Y.index(parameter)
         value = float(self.numbers[k])
         return 1.0 / value - 1.0 if parameter == "a_y.factor" else value, float(self.deviations[k])
@@ -60,7 +59,6 @@ class Accelerometer:
 
     def line(self, p: Array, wide: Mapping[str, float]) -> Line:
         """Return how well a_y follows from the motion without the sensors' faults p.
-
         wide : standard deviations, by `OF_A_Y`, of what may be wrong with it.
         """
         sd = np.array([wide.get(name, one) for name, one in zip(OF_A_Y, self.usual, strict=True)])
@@ -124,7 +122,6 @@ def _motion(one: Drive, p: Array) -> tuple[Array, Array, Array]:
 
 def descended(cost: Callable[[float], float], width: float) -> tuple[float, float, float]:
     """Return where a function of one number is least, its curvature there, and its value.
-
     width : of the parabola that bounds it from below; it begins at 0.
     """
     x, h, here = 0.0, 0.1 * width, cost(0.0)

@@ -189,7 +189,6 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> Axle
 
 
 def _curve_leaves(force: Array, slip: Array, told: float) -> float:
-    """Return the logarithm of the share of a force that no curve of its slip explains."""
     disbelief = _DISBELIEF * np.log(STIFFNESS / told) ** 2
     force = force - force.mean()
     size = float(force @ force) + 1e-12

@@ -41,7 +41,6 @@ class Diagnosis:
 
     Parameters
     ----------
-    name : of the recording.
     findings : those that matter most first.
     unobservable : what this log cannot tell, and why, a line each.
     """
@@ -100,7 +99,6 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     Parameters
     ----------
     recording : as it was read; its axle forces are not used.
-    vehicle : as it was declared.
     """
     world = world_axes(recording)
     if world is not None:  # nothing that follows would be of this car

@@ -91,7 +91,6 @@ class Examination(NamedTuple):
 
 class Candidate(NamedTuple):
     """A suspect that was fitted beside what is there: its value, deviation and gain of J.
-
     shown : how much it brings over the value zero; of what is no state of the estimate, `gain`.
     felt : of the gain what the accelerometer says; negative where it speaks against it.
     """
@@ -121,10 +120,7 @@ class _Taken(NamedTuple):
 @dataclass(slots=True, kw_only=True)
 class Search:
     """The search for what is wrong with some segments of a drive.
-
-    problem : of them, with slopes over all parameters.
-    accelerometer : None where there is none.
-    wide, mean : standard deviations and means of what was taken in, by parameter.
+    problem : of them, with slopes over all parameters.   accelerometer : None where there is none.
     """
 
     problem: Problem
@@ -135,7 +131,6 @@ class Search:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The car as it was told."""
         return self.problem.vehicle
 
     def priors(self, wide: _Widths) -> Priors:
@@ -154,17 +149,14 @@ class Search:
         return replace(priors, mean=mean, typed=())
 
     def nominal(self) -> Posterior:
-        """Return the estimate before anything is searched."""
         problem = self.problem.under(self.priors(self.wide))
         found = [descend(problem, start, enough=RULES.enough) for start in starts(problem)]
         return min(found, key=lambda one: one.cost)
 
     def least(self, one: Suspect) -> float:
-        """Return the least size of a suspect that matters, of its parameter."""
         return one.scaled(one.least, self.vehicle)
 
     def widened(self, one: Suspect) -> dict[str, float]:
-        """Return what is believed wide with one more."""
         return {**self.wide, one.parameter: one.scaled(one.wide, self.vehicle)}
 
     def line(self, p: Array, wide: _Widths) -> Line | None:
@@ -303,7 +295,6 @@ class Search:
         return telling and possible and abs(one.value) < most and one.felt > -RULES.against
 
     def deviation(self, one: Candidate) -> float:
-        """Return the deviation of a value, with the least that matters in it."""
         return math.hypot(one.deviation, self.least(one.suspect))
 
     def run(self) -> Posterior:
@@ -383,7 +374,6 @@ class Search:
         """Return the share of the force missed on each half by the model of the other half, (2,).
 
         The model of a half is one Gauss-Newton step from that of the whole.
-
         parts : which residuals are of each half, (m,) each.
         zero : a suspect that is held at zero.
         """
@@ -434,10 +424,6 @@ class Search:
     def finding(
         self, one: Candidate, likely: tuple[float, float], alike: Sequence[Candidate], *, sure: bool
     ) -> Finding:
-        """Return a candidate as a finding.
-
-        likely : that it is this, and that it is this or one of those that are alike.
-        """
         suspect, vehicle, deviation = one.suspect, self.vehicle, self.deviation(one)
         size = suspect.size(one.value)
         text = suspect.words(size, deviation, vehicle)
@@ -475,7 +461,6 @@ def _all_move(priors: Priors) -> Priors:
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
-
     recording : as it was logged, of one drive or of several joined; of a long one lively segments
         are looked at.
     vehicle : as it was told; its cornering stiffnesses are not looked at.

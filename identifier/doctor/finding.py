@@ -19,14 +19,12 @@ class Finding:
     size : of the fault in SI, NaN where it has none: an offset, a delay [s], a factor over the
         right value [-].
     deviation : standard deviation of the size, NaN where nobody knows it.
-    unit : of both, "" for a pure number.
-    confidence : that it is this, from 0 to 1.
+    unit : of both, "" for a pure number.   confidence : that it is this, from 0 to 1.
     group : confidence that it is this or one of those that cannot be told from it; 0 where there
         are none.
     text : one line for people: what, how much, and what else it may be.
     repair : what takes it out, None where nothing can.
     sure : whether the repair may be applied without being asked.
-    note : whether it is a number of the car that the drive says otherwise, which is no alarm.
 
     Notes
     -----

@@ -57,7 +57,6 @@ def segments_of(
     recording: Recording, vehicle: Vehicle, *, longest: float, pieces: int
 ) -> tuple[Recording, ...]:
     """Return the recording, or of a long one the liveliest segment of each of its parts.
-
     longest : that is looked at as a whole [s]; the segments have it together.
     """
     n, dt = len(recording), recording.dt
@@ -89,7 +88,6 @@ def _unbroken(recording: Recording, part: slice) -> list[slice]:
 
 
 def _taken(recording: Recording, places: list[slice]) -> tuple[Recording, ...]:
-    """Return pieces of a recording, itself where it is all of it."""
     if places == [slice(0, len(recording))]:
         return (recording,)
     return tuple(recording.taken(place) for place in places)

@@ -50,12 +50,10 @@ _ALONE, _UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one tha
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
     """One thing that may be wrong with a log, or with what is told of its car.
-
     code : for machines: "unit", "sign", "sideslip", or one of `FREE`.
     channels : concerned; none where it is the car.
     unit : in which they are logged, "" where that is right.
     factors : by field of a `Reading`, what takes it out.
-    sideslip : whether v_y is the sideslip angle.
     arm : how far ahead of the center of gravity v_y is measured [m].
     price : that it must earn beside that of every change, where it is less usual.
     """
@@ -82,7 +80,6 @@ class Change:
         return self.code not in ("unit", "sideslip") or not motion.hidden >= {*self.channels}
 
     def on(self, reading: Reading) -> Reading:
-        """Return a reading with this change."""
         factors = {name: getattr(reading, name) * factor for name, factor in self.factors}
         sideslip, arm = reading.sideslip or self.sideslip, reading.arm + self.arm
         return reading._replace(**factors, sideslip=sideslip, arm=arm)
@@ -118,11 +115,7 @@ CHANGES = (
     _unit("deg", DEGREE, "r", "delta_f"),
     *(
         Change(
-            code="sideslip",
-            channels=("v_y",),
-            unit=unit,
-            factors=(("v_y", one),),
-            sideslip=True,
+            code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True,
             price=price,
         )
         for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, _UNUSUAL))
@@ -130,14 +123,13 @@ CHANGES = (
     _unit("deg", DEGREE, "delta_f"),
     *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),
     _sign("v_x", "v_y"),
-)
+)  # fmt: skip
 _ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Explanation:
     """A reading of a log, the changes that make it, and what it leaves.
-
     left : what it leaves unexplained, as `unexplained` returns it.
     """
 
@@ -161,8 +153,6 @@ class _Explanation:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Read:
     """How a log is best read, and what else it could be.
-
-    other : the next best that means something else.
     without : the same with the velocity sensor where it should be, if elsewhere it makes a reading
         the best that nothing gross is in; None else.
     """
@@ -179,7 +169,6 @@ class Read:
 
 def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...]], bool]) -> Read:
     """Return how a log is best read as the motion of a car.
-
     possible : whether the log breaks no law with some changes; of the best readings those that do
         are left out, unless all do.
     """
@@ -225,7 +214,6 @@ def _means_else(one: _Explanation, best: _Explanation) -> bool:
 def _longer(
     one: _Explanation, changes: Sequence[Change], motion: Motion, vehicle: Vehicle
 ) -> list[_Explanation]:
-    """Return an explanation with each change that it does not have yet."""
     taken = frozenset[str]().union(*(change.fields for change in one.changes))
     free = [change for change in changes if not change.fields & taken]
     if "delta ratio" not in taken:
@@ -300,7 +288,6 @@ def _arms(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
 
 
 def _refined(factor: float, left: Callable[[float], float]) -> float:
-    """Return a factor nearer to the least, in its logarithm."""
     step = math.log(STEERING[1] / STEERING[0])
     finer = _least(lambda by: left(factor * math.exp(by)), -step, step, FINEST)
     return factor * math.exp(finer)

@@ -51,7 +51,6 @@ def channels(recording: Recording) -> Mapping[str, Array]:
 
 
 def sample_findings(recording: Recording) -> list[Finding]:
-    """Return what is wrong with the samples of a log."""
     pieces = driven_pieces(recording)
     listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
     first: dict[tuple[str, str], Finding] = {}
@@ -78,7 +77,6 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:
-    """Return what is wrong with the samples of one segment."""
     signals = channels(recording)
     found = list(_copies(signals))
     named = {one.channel for one in found} | set(_still(signals))
@@ -118,17 +116,11 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
             f"{there[0].duration:.3g} s: frozen; cut the log there"
         )
         yield Finding(
-            code="frozen",
-            channel=name,
-            size=length,
-            unit="s",
-            confidence=CERTAIN,
-            text=text,
+            code="frozen", channel=name, size=length, unit="s", confidence=CERTAIN, text=text
         )
 
 
 def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
-    """Channels that are another channel, or computed from it."""
     moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
     names = list(moving)
     for k, one in enumerate(names):
@@ -150,7 +142,6 @@ def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
 
 
 def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Iterator[Finding]:
-    """What is wrong with one channel that moves."""
     dt = recording.dt
     noise = _noise(signal)
     quantum = _quantum(signal)

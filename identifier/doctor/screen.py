@@ -12,13 +12,7 @@ import numpy as np
 
 from identifier.doctor.consistency import Motion
 from identifier.doctor.finding import Finding
-from identifier.doctor.pieces import (
-    SLOWEST,
-    driven_pieces,
-    driven_windows,
-    looked_at,
-    usual_speed,
-)
+from identifier.doctor.pieces import SLOWEST, driven_pieces, driven_windows, looked_at, usual_speed
 from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
@@ -42,12 +36,9 @@ SLOW = 1.0  # s between samples, from which a clock is in ms
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
     """What is grossly wrong.
-
-    findings : the most certain first.
     repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
-    unobservable : what gross faults this log cannot tell, a line each.
     without : the same if the velocity sensor is where it should be, where that alone makes gross
         findings of it: to be asked where no size tells that it is elsewhere; None else.
     """
@@ -156,7 +147,6 @@ def before_sizes(findings: Iterable[Finding]) -> Repair:
 
 def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Finding]:
     """Return findings, none of them sure where one that they stand on is not.
-
     earlier : all of them; those without a repair say nothing that is taken out.
     """
     firm = all(one.sure for one in earlier if one.repair is not None)
@@ -222,7 +212,6 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
 
 
 def _reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
-    """Return a change of the best reading as findings, of units one for each channel."""
     if change.code != "unit" or len(change.channels) == 1:
         return [_reading_finding(change, found, vehicle)]
     parts = [
@@ -243,7 +232,6 @@ def _one_steering(gross: list[Finding]) -> list[Finding]:
 
 
 def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
-    """Return a change of the best reading as a finding."""
     confidence = found.confidence
     if len(found.best.gross) > _SEVERAL:
         confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
@@ -301,7 +289,6 @@ def steering_finding(
     factor: float, confidence: float, doubt: str = "", deviation: float = math.nan
 ) -> Finding:
     """Return what a steering angle is that must be multiplied by a factor.
-
     doubt : what else it may be, in words.
     deviation : of the factor over the factor, NaN where nobody knows it.
     """
@@ -342,10 +329,7 @@ def steering_finding(
 
 
 def words(changes: tuple[Change, ...]) -> str:
-    """Return changes in words.
-
-    changes : of a reading; none is a log that is right.
-    """
+    """Return changes in words.   changes : of a reading; none is a log that is right."""
     said = []
     for change in changes:
         names = " and ".join(change.channels)

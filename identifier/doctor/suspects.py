@@ -64,7 +64,6 @@ class Suspect(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its code and channel, in words."""
         return f"{self.code.replace('_', ' ')} {self.channel}".strip()
 
     @property
@@ -76,11 +75,9 @@ class Suspect(NamedTuple):
         return ("downforce_f", "downforce_r") if pair else (self.parameter,)
 
     def scaled(self, value: float, vehicle: Vehicle) -> float:
-        """Return `wide` or `least` of a car."""
         return float(value * (vehicle.wheelbase / SEDAN) ** _POWERS[self.grows])
 
     def size(self, value: float) -> float:
-        """Return the size of a finding of a value of its parameter."""
         match self.code:
             case "factor" if self.channel != "a_y":
                 return 1.0 / (1.0 + value)
@@ -129,7 +126,6 @@ class Suspect(NamedTuple):
         return True
 
     def words(self, size: float, deviation: float, vehicle: Vehicle) -> str:
-        """Return it in words."""
         text = self.text
         if self.code == "center_of_gravity":
             swapped = abs(vehicle.l_f - vehicle.l_r - size) < 1.5 * abs(deviation)
@@ -143,10 +139,7 @@ class Suspect(NamedTuple):
 WORDS = {  # of a channel, and the parameter of its factor
     "v_x": ("v_x", "v_x_factor"),
     "v_y": ("v_y", ""),  # to shrink it shrinks its noise, which looks like a better model
-    "r": (
-        "the yaw rate",
-        "",
-    ),  # of gyroscopes within a percent, and like that of v_x
+    "r": ("the yaw rate", ""),  # of gyroscopes within a percent, and like that of v_x
     "delta_f": ("the steering angle", "steering_gain"),
     "a_y": ("the lateral acceleration", "a_y.factor"),
 }

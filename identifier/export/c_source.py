@@ -42,11 +42,7 @@ from identifier.refused import GATE, NOWHERE, STALE_TIME
 C = Path(__file__).parent / "c"
 PREFIX = "tireid"  # of the C as it lies there
 MOST_UNSUMMED = 150  # numbers that equations tell; more they sum up while these are at hand
-LIBRARY: Mapping[str, str] = {
-    "tireid.h": "include",
-    "tireid_equations.h": "src",
-    "tireid.c": "src",
-}
+LIBRARY: Mapping[str, str] = {"tireid.h": "include", "tireid_equations.h": "src", "tireid.c": "src"}
 PROGRAMS: Mapping[str, str] = {"main.c": "examples", "test_tireid.c": "tests"}
 # Of the library as one file, headers first.
 ORDER = (
@@ -57,7 +53,6 @@ ORDER = (
 
 def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> dict[str, str]:
     """Return the C files of the library by their path in the package.
-
     single : whether float is the default precision.
     """
     if not specialized.carry:

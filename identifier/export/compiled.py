@@ -54,17 +54,12 @@ class ShippedRun(NamedTuple):
 
 class CompiledPackage:
     """One instance of the shipped C; attributes name, single, dt, inputs.
-
     manifest : content of <name>.json.
     single : whether to compute in float; None takes the package's default.
     """
 
     def __init__(
-        self,
-        manifest: Mapping[str, Any],
-        files: Mapping[str, str],
-        *,
-        single: bool | None = None,
+        self, manifest: Mapping[str, Any], files: Mapping[str, str], *, single: bool | None = None
     ) -> None:
         table = Table(manifest, "", PackageFileError)
         self.name = table.text("name")
@@ -89,7 +84,6 @@ class CompiledPackage:
     @classmethod
     def of(cls, package: Package, *, single: bool | None = None) -> "CompiledPackage":
         """Return an instance of a package that was just built.
-
         single : whether to compute in float; None takes the package's default.
         """
         manifest = json.loads(package.files[f"{package.specialized.name}.json"])
@@ -98,7 +92,6 @@ class CompiledPackage:
     @classmethod
     def from_folder(cls, folder: Path, *, single: bool | None = None) -> "CompiledPackage":
         """Return an instance of a package that was exported.
-
         folder : what `tireid export` wrote.
         single : whether to compute in float; None takes the package's default.
         """
@@ -114,7 +107,6 @@ class CompiledPackage:
         raise PackageFileError(f"{folder}: no package, a JSON file of format {FORMAT!r} is missing")
 
     def _source(self, files: Mapping[str, str]) -> str:
-        """Return the package as one file, with what Python asks of it."""
         texts = [files[path.format(self.name)] for path in ORDER]
         (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: self.name}).values()
         return one_file([*texts, glue], defines={f"{self.name.upper()}_SINGLE": int(self.single)})
@@ -156,12 +148,8 @@ class CompiledPackage:
         a_y: float = math.nan,
     ) -> tuple[Status, Array]:
         """Take one sample; return its status and the axle forces (2,) [N].
-
-        v_x : longitudinal speed [m/s].
-        v_y : lateral velocity [m/s].
-        r : yaw rate [rad/s].
-        delta_f : steering in front [rad].
-        delta_r : steering at the rear [rad].
+        v_x : longitudinal speed [m/s].   v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
+        delta_f : steering in front [rad].   delta_r : steering at the rear [rad].
         a_y : of an accelerometer [m/s²], NaN where there is none; not read where it is no input.
         """
         sample = [v_x, v_y, r, delta_f, delta_r, a_y]
@@ -187,7 +175,6 @@ class CompiledPackage:
 
     def run_samples(self, samples: Array) -> ShippedRun:
         """Run samples, from the state that the instance is in.
-
         samples : (n, k): v_x, v_y, r, delta_f, delta_r and, where it is one of `inputs`, a_y, SI.
         """
         rows = np.ascontiguousarray(samples, dtype=np.float64)
@@ -218,10 +205,7 @@ class CompiledPackage:
         return sum(int(np.prod(shape)) for shape in self._weights.values())
 
     def set_weights(self, weights: Mapping[str, Array]) -> None:
-        """Go on with other weights.
-
-        weights : by name, in the shapes of `weights`.
-        """
+        """Go on with other weights.   weights : by name, in the shapes of `weights`."""
         shapes = {name: np.shape(value) for name, value in weights.items()}
         if shapes != self._weights:
             raise ValueError(f"weights must have the shapes {self._weights}, not {shapes}")
@@ -232,10 +216,6 @@ class CompiledPackage:
             raise ValueError("weights must be finite, and covariances and errors not negative")
 
     def set_adaptation(self, adapts: bool) -> None:
-        """Learn, or hold what is learnt.
-
-        adapts : False freezes.
-        """
         if not self._weights:
             raise ValueError(f"{self.name} estimates a signal: there is nothing to freeze")
         self._call("instance_adapt")(self._instance, int(adapts))

@@ -66,7 +66,6 @@ def build_binary(
     target: Target, name: str, model: Mapping[str, bytes], around: Mapping[str, bytes]
 ) -> bytes:
     """Compile sources to a shared library and return its content.
-
     model : content by name of C files and headers that need no other: compiled once for both
         versions of FMI, since the equations take longest.
     """
@@ -81,7 +80,6 @@ def build_binary(
 
 @lru_cache(maxsize=4)
 def _objects(target: Target, model: Files) -> Files:
-    """Return object files of the C files."""
     with _folder_of(dict(model)) as folder:
         sources = _c_files(dict(model))
         _compile(target, ["-c", *sources], folder)
@@ -120,9 +118,7 @@ TOKEN = "token.h"
 
 def token_header(token: str, version: int) -> str:
     """Return token.h, which tells this FMU from every other one.
-
-    token : GUID of FMI 2.0, instantiation token of FMI 3.0.
-    version : of FMI, 2 or 3.
+    token : GUID of FMI 2.0, instantiation token of FMI 3.0.   version : of FMI, 2 or 3.
     """
     standard = f"#ifndef MODEL_FMI\n#define MODEL_FMI {version} /* of the standard */\n#endif\n"
     return header(TOKEN, "Generated.", [f'#define MODEL_TOKEN "{token}"\n', standard])
@@ -141,13 +137,9 @@ def model_files(specialized: SpecializedStep) -> dict[str, str]:
 
 # What a unit is made of in SI, as attributes of BaseUnit; a radian counts as one of its own.
 UNITS: Mapping[str, Mapping[str, int]] = {
-    "s": {"s": 1},
-    "m/s": {"m": 1, "s": -1},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "m/s^2": {"m": 1, "s": -2},
-    "N": {"kg": 1, "m": 1, "s": -2},
-}
+    "s": {"s": 1}, "m/s": {"m": 1, "s": -1}, "rad": {"rad": 1}, "rad/s": {"rad": 1, "s": -1},
+    "m/s^2": {"m": 1, "s": -2}, "N": {"kg": 1, "m": 1, "s": -2},
+}  # fmt: skip
 INPUT_REFERENCES = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
 DEGREES = 57.29577951308232  # of a radian: display units of angles
 
@@ -157,7 +149,6 @@ Causality = Literal["input", "output", "parameter", "local"]
 
 class Variable(NamedTuple):
     """One variable of modelDescription.xml.
-
     reference : value reference.   start : as text, empty where it is calculated.
     """
 
@@ -216,15 +207,12 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
         ),
         _constant(11, "sample_time", "s", specialized.dt, "sampling interval, inside and fixed"),
         _constant(
-            12,
-            "min_speed",
-            "m/s",
-            specialized.min_speed,
+            12, "min_speed", "m/s", specialized.min_speed,
             "below it forces are zero, learning rests",
         ),
         *_side_slip(specialized),
         *_band(specialized),
-    )
+    )  # fmt: skip
 
 
 def _side_slip(specialized: SpecializedStep) -> Iterator[Variable]:
@@ -267,7 +255,6 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 def element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
     """Return an element; attributes that are empty strings are left out.
-
     attributes : by name; True and False become true and false.
     """
     words = {name: _text(value) for name, value in attributes.items() if value != ""}
@@ -292,10 +279,6 @@ TOOL = "tireid"
 
 
 def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
-    """Return modelDescription.xml of FMI 2.0.
-
-    sources : names of the C files.
-    """
     table = variables(specialized)
     unknowns = [
         element("Unknown", {"index": i})
@@ -319,7 +302,6 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
 
 
 def description_3(specialized: SpecializedStep, token: str) -> str:
-    """Return modelDescription.xml of FMI 3.0."""
     table = variables(specialized)
     outputs = [variable for variable in table if variable.causality == "output"]
     time = element(
@@ -352,10 +334,7 @@ def _description(
     listed: Iterable[Element],
     structure: Iterable[Element],
 ) -> str:
-    """Return modelDescription.xml.
-
-    said : version, what it calls the token, the token.
-    """
+    """Return modelDescription.xml."""
     version, key, token = said
     table = variables(specialized)
     about = {
@@ -380,10 +359,7 @@ def _description(
 
 
 def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
-    """Return sources/buildDescription.xml of FMI 3.0.
-
-    sources : names of the C files.
-    """
+    """Return sources/buildDescription.xml of FMI 3.0."""
     files = (element("SourceFile", {"name": name}) for name in sources)
     build = element(
         "fmiBuildDescription",
@@ -466,9 +442,7 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     and F_yr_half_band where it tells the band. Samples are taken at multiples of the step's
     interval after the start, whatever the communication step; a step from t to t + h takes those in
     [t, t + h).
-
-    specialized : the step; its name is the model identifier.
-    version : of FMI, 2 or 3.
+    specialized : the step; its name is the model identifier.   version : of FMI, 2 or 3.
     """
     if version not in OF_VERSION:
         raise ValueError(f"version must be 2 or 3, it is {version}")
@@ -492,10 +466,7 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
 
 
 def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
-    """Return the text files of an FMU by their path inside it.
-
-    version : of FMI, 2 or 3.
-    """
+    """Return the text files of an FMU by their path inside it.   version : of FMI, 2 or 3."""
     shared = model_files(specialized)
     blank = _text_with(specialized, shared, version, "")
     content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))

@@ -26,7 +26,6 @@ class Member(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers."""
         return self.shape[0] * self.shape[1]
 
     @property
@@ -35,7 +34,6 @@ class Member(NamedTuple):
         return f"{'weights' if self.learnt else 'signals'}.{self.signal.name}"
 
     def declaration(self, real: str) -> str:
-        """Return what declares it, with a comment."""
         sizes = "".join(f"[{size}]" for size in self.dimensions)
         unit, description = self.signal.unit, self.signal.description
         code, words = f"    {real} {self.signal.name}{sizes};", f"/* {description} [{unit}] */"
@@ -43,17 +41,12 @@ class Member(NamedTuple):
         return line if len(line) <= 100 else f"    {words}\n{code}\n"
 
     def element(self, entry: int) -> str:
-        """Return the C index of an entry.
-
-        entry : counted by columns, as CasADi does.
-        """
         row, column = entry % self.shape[0], entry // self.shape[0]
         pair = zip((row, column), self.shape, strict=True)
         return "".join(f"[{index}]" for index, size in pair if size > 1)
 
 
 def carried_members(specialized: SpecializedStep) -> list[Member]:
-    """Return the carried ports in their order."""
     return [
         Member(signal, specialized.function.size_in(signal.name), signal.name in specialized.learnt)
         for signal in specialized.state
@@ -61,7 +54,6 @@ def carried_members(specialized: SpecializedStep) -> list[Member]:
 
 
 def output_members(specialized: SpecializedStep) -> list[Member]:
-    """Return the outputs in their order."""
     return [
         Member(signal, specialized.function.size_out(signal.name), False)
         for signal in specialized.outputs
@@ -69,10 +61,6 @@ def output_members(specialized: SpecializedStep) -> list[Member]:
 
 
 def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
-    """Return the C expression of an entry of an input of the step.
-
-    port : number of the input.
-    """
     name = specialized.function.name_in(port)
     if name in SAMPLED:
         return f"in->{READS[name][entry]}"
@@ -82,10 +70,6 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
 
 
 def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
-    """Return the C lvalue of an entry of an output of the step.
-
-    port : number of the output.
-    """
     state = carried_members(specialized)
     if port < len(state):
         part = "learnt" if state[port].learnt else "next"
@@ -95,11 +79,7 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
 
 
 def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
-    """Return a nested initializer by rows.
-
-    value : the numbers (of any shape).
-    dimensions : of the C array.
-    """
+    """Return a nested initializer by rows.   value : the numbers (of any shape)."""
     if not dimensions:
         return literal(float(value.ravel()[0]), prefix)
     rows: Iterator[Array] = iter(value.reshape(dimensions[0], -1))
@@ -123,7 +103,6 @@ class Rule(NamedTuple):
 
 def rules(members: Sequence[Member]) -> list[Rule]:
     """Return what numbers of the weights must keep to be taken over.
-
     members : of the weights, in the order in which they lie in memory.
     """
     found, first = list[Rule](), 0

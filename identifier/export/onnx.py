@@ -46,7 +46,6 @@ class MissingOnnxError(TireidError, ImportError):
 
 
 def onnx_package() -> Any:
-    """Return the package onnx, which is an extra."""
     try:
         import onnx
     except ImportError as error:
@@ -57,7 +56,6 @@ def onnx_package() -> Any:
 @dataclass(slots=True)
 class Graph:
     """Nodes and constants of a graph that is being written.
-
     single : whether numbers are float32; else they are float64.
     """
 
@@ -66,20 +64,14 @@ class Graph:
     constants: list[Any] = field(default_factory=list)
 
     def constant(self, name: str, value: ArrayLike) -> str:
-        """Store a matrix and return its name.
-
-        value : its numbers (of any shape).
-        """
+        """Store a matrix and return its name.   value : its numbers (of any shape)."""
         number = np.float32 if self.single else np.float64
         array = np.ascontiguousarray(np.asarray(value), dtype=number)
         self.constants.append(onnx_package().numpy_helper.from_array(array, name))
         return name
 
     def apply(self, operator: str, inputs: Sequence[str], result: str, **attributes: Any) -> str:
-        """Add a node and return the name of its result.
-
-        operator : of ONNX, such as "MatMul".
-        """
+        """Add a node and return the name of its result.   operator : of ONNX, such as "MatMul"."""
         node = onnx_package().helper.make_node(
             operator, list(inputs), [result], name=result, **attributes
         )
@@ -95,7 +87,6 @@ class Graph:
         metadata: dict[str, str],
     ) -> bytes:
         """Return the finished, checked model as the content of its file.
-
         outputs : what it gives; results of nodes have their names.
         """
         onnx = onnx_package()
@@ -141,7 +132,6 @@ OUTPUTS = (
 
 def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
     """Return a frozen network as ONNX: v_x, v_y, r, delta_f, delta_r to F_yf, F_yr, (batch, 1).
-
     single : whether numbers are float32; else they are float64.
     """
     graph = Graph(single)
@@ -214,9 +204,7 @@ def axle_graph(model: AxleModel, *, single: bool = False, add_band: AddBand | No
     """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
 
     Of a car with downforce those of the static loads.
-
     single : whether numbers are float32; else they are float64.
-    add_band : adds half the width of their bands, at the speed of the drive that taught the model.
     """
     graph = Graph(single)
     scales = graph.constant("inverse_scales", 1.0 / np.array(model.ladder)[None])
@@ -261,7 +249,6 @@ class _Nodes:
         return self.node("Mul", row, row)
 
     def variance(self, h: str, P: Array) -> str:
-        """Return h P h' of rows h."""
         by = root(P)
         product = self.node("MatMul", h, self.number(by))
         return self.node("MatMul", self.square(product), self.number(np.ones((by.shape[1], 1))))
@@ -299,7 +286,6 @@ def _band_of_fit(source: FittedModel, graph: Graph, axle: int, units: str, force
 
 def _band_of_axle(model: AxleModel, graph: Graph, axle: int, units: str, force: str) -> None:
     """Add half the width of the band of an axle; the formula of `identifier.axle.band`.
-
     axle : 0 in front, 1 at the rear.
     units, force : names of t (batch, n) and of the force [N] (batch, 1).
     """
@@ -358,12 +344,9 @@ class NoOnnxError(TireidError, ValueError):
 
 def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
-
     model : the whole model for a network, the static force curves for an axle model and, in hidden
         units, for a fit, the network itself for one that came from an ONNX file.
     single : whether numbers are float32; else they are float64.
-    with_band : whether half the width of the band is told, too, which axle models and
-        fits have.
     """
     if model.kind not in GRAPHS:
         raise NoOnnxError(
@@ -380,7 +363,6 @@ def export_onnx(
     model: TireModel, path: Path, *, single: bool = False, with_band: bool = False
 ) -> None:
     """Write a frozen model as an ONNX file.
-
     single : whether numbers are float32; else they are float64.
     """
     write_atomically(path, onnx_bytes(model, single=single, with_band=with_band))

@@ -43,7 +43,6 @@ FLAGS = ("-ffp-contract=off", "-fno-math-errno")  # of the library
 
 def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]:
     """Return everything that a package is made of, ready for JSON.
-
     single : whether float is the default precision.
     """
     method = specialized.method
@@ -90,7 +89,6 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
     """Return what texts say about a package: title, method, versions, hash, names and numbers.
-
     content : what `ingredients` returned.
     """
     return {
@@ -159,7 +157,6 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
 
     Where v_y is told it is measured at the end alone; a_y is that of the motion, with a gap.
-
     n : number of samples.
     """
     k = np.arange(n, dtype=np.float64)
@@ -172,9 +169,7 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     a_y = np.gradient(v_y, specialized.dt) + v_x * r
     a_y[5 * n // 8 : 6 * n // 8] = np.nan
     measured = v_y if not specialized.tells_v_y else np.where(k < 7 * n // 8, np.nan, v_y)
-    return np.column_stack(
-        [v_x, measured, r, delta_f, delta_r, *[a_y] * specialized.reads_a_y],
-    )
+    return np.column_stack([v_x, measured, r, delta_f, delta_r, *[a_y] * specialized.reads_a_y])
 
 
 def _triangle(phase: Array) -> Array:
@@ -188,7 +183,6 @@ def run_in_virtual_machine(
     """Return the outputs (n, k) of a specialized step, one beside the other, and its state then.
 
     Samples that are refused count as time, as `identifier.refused` says.
-
     samples : (n, k) in the order of the inputs.
     """
     limits, method = specialized.limits, specialized.method
@@ -249,14 +243,12 @@ class _InPlace:
 
 
 def vectors(specialized: SpecializedStep) -> Vectors:
-    """Return the self-test of a package."""
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
     return Vectors(samples, outputs[:, :2])
 
 
 def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
-    """Return the vectors as a C header."""
     double, single = tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     names = ", ".join(port.name for port in specialized.inputs)
@@ -298,7 +290,6 @@ def build_package(
     with_band: bool = False,
 ) -> Package:
     """Return the package of a method for a car; the same input gives the same bytes.
-
     start : weights to begin with; None begins with those of the method.
     single : whether float is the default precision.
     with_a_y : whether a_y is an input of a method that goes without it as well.
@@ -328,10 +319,6 @@ def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
 
 
 def readme(package: Package, about_figures: str) -> str:
-    """Return the README of a package.
-
-    about_figures : flash, RAM, stack and instructions, as Markdown.
-    """
     specialized = package.specialized
     state = carried_members(specialized)
     carry_table = "".join(

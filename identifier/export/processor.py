@@ -15,7 +15,6 @@ REPLAYED = Path(__file__).parent / "target" / "replayed.h"
 
 def recording_program(name: str, files: Mapping[str, str], samples: Array) -> Program:
     """Return a recording that is replayed through a package.
-
     samples : (n, k) in the order of the inputs, SI.
     """
     rows = np.ascontiguousarray(samples, dtype="<f8").tobytes()
@@ -23,10 +22,7 @@ def recording_program(name: str, files: Mapping[str, str], samples: Array) -> Pr
 
 
 def measure(package: Package, progress: Callable[[float], None] | None = None) -> list[Cost]:
-    """Return what a package costs on every processor, float and double; empty without the tools.
-
-    progress : called with the share that is done.
-    """
+    """Return what a package costs on every processor, float and double; empty without the tools."""
     if missing_tools():
         return []
     samples = synthetic_samples(package.specialized)
@@ -41,7 +37,6 @@ def measure(package: Package, progress: Callable[[float], None] | None = None) -
 
 
 def figures_text(costs: Sequence[Cost]) -> str:
-    """Return the costs as Markdown."""
     return cost_table(
         costs,
         "the samples of the self-test. Each instance has a state of its\nown; parameters may be "

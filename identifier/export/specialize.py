@@ -50,9 +50,6 @@ SAMPLED = ("x", "u", "v_x", "a_y")
 
 class SpecializedStep(NamedTuple):
     """A step without constants, where it starts, and what its ports mean.
-
-    name : C identifier, prefix of everything that is exported.
-    method, vehicle : what it was made from.
     function : SX function of the carried ports, then x (2,), u (2,), v_x, and a_y where it is an
         input; returns `p_next` of each carried port `p`, then the outputs, axle_force (2,) [N]
         first.
@@ -60,14 +57,12 @@ class SpecializedStep(NamedTuple):
     carry : value of each carried port at the start, in the port's matrix shape.
     learnt : carried ports that hold their values while adaptation is off; empty: it cannot be.
     inputs : the scalars v_x, v_y, r, delta_f, delta_r, and a_y where it is one.
-    outputs : axle_force and what else the step tells.
-    state : units of the carried ports.
-    dt : sampling interval [s].   min_speed : [m/s], below it forces read zero.
+    state : units of the carried ports.   dt : sampling interval [s].
+    min_speed : [m/s], below it forces read zero.
     rests_first : whether a run begins with one step at v_x = 0 of its first sample, in which the
         observer takes the measurement.
     believed : carried port whose first five entries are the inputs that the step went on with,
         older ones where a sample was not believed; None where the method has no such port.
-    limits : of inputs and forces.
     band : numbers of the calibration of its band, None where there is none.
     """
 
@@ -95,7 +90,6 @@ class SpecializedStep(NamedTuple):
 
     @property
     def reads_a_y(self) -> bool:
-        """Whether a_y is an input."""
         return ACCELERATION in self.inputs
 
     @property
@@ -124,9 +118,7 @@ def specialize(
     with_band: bool = False,
 ) -> SpecializedStep:
     """Return the step of a method for a car, ready to be exported.
-
     start : weights to begin with; None begins with those of the method.
-    name : C identifier.
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.
     """

@@ -38,10 +38,7 @@ class MagicCurve(NamedTuple):
 
 
 def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> MagicCurve:
-    """Return the Magic Formula nearest to the curve of an axle; refuse one beyond `MOST_MISSED`.
-
-    drawn : models whose spread is the standard deviation, by one linear step each.
-    """
+    """Return the Magic Formula nearest to the curve of an axle; refuse one beyond `MOST_MISSED`."""
     i, known = AXLES.index(axle), model.known_slip
     reach = REACH if known is None else max(LEAST_REACH, float(known[i]))
     beyond = np.linspace(reach, max(WIDEST, 1.5 * reach), 60)

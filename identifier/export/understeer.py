@@ -22,7 +22,6 @@ SLIPS = np.linspace(0.0, 0.6, 301)  # rad
 
 class Understeer(NamedTuple):
     """The gradient at speeds v_x [m/s] (n,) and lateral accelerations a_y [m/s²] (k,).
-
     gradient, sd : K [rad/(m/s²)], (n, k); NaN where an axle is past what is known of it.
     """
 
@@ -69,7 +68,6 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
 
 def _gradients(model: TireModel, force: Array, v_x: Array, a_y: Array) -> Array:
     """Return K [rad/(m/s²)], (n, k): infinite where the front axle is at its end, else minus it.
-
     force : at `SLIPS` under static loads, (s, 2) [N].
     """
     masses = np.array(model.vehicle.axle_loads) / GRAVITY

@@ -38,9 +38,7 @@ from models.vehicle import GRAVITY, Vehicle
 
 class _Variant(NamedTuple):
     """A law of the paper as it is compared: its law, and where its gains come from.
-
-    title : what a reader is told.   law : one of `LAWS`.
-    gains_of : the law that they are found for.   scaled : whether η/λ stands in place of η.
+    law : one of `LAWS`.
     """
 
     title: str
@@ -49,10 +47,6 @@ class _Variant(NamedTuple):
     scaled: bool = False
 
     def gains(self, found: Gains) -> Gains:
-        """Return the gains.
-
-        found : for the law `gains_of`.
-        """
         return found.scaled_by_forgetting() if self.scaled else found
 
 
@@ -74,8 +68,6 @@ class PaperIdentifier(Method):
 
     Parameters
     ----------
-    gains : gains of observer, filter and laws.
-    network : structure of the network.
     law : the driving error, "integral" (the paper's), "instantaneous" (the conventional one) or
         "pi_lead" (which needs the gain `lead`).
     input_source : where the network reads the state, "measured" or "estimated" (the paper's).
@@ -83,7 +75,6 @@ class PaperIdentifier(Method):
     dt : sampling interval T_s [s].
     force_unit : the unit U of forces inside the identifier [N]; gains are meant in it.
     min_speed : below this speed [m/s] learning rests and forces read zero.
-    seed : seed of the initial weights.
     driving : the conditions that it was designed for and is judged at; None takes those of the
         car, `identifier.driving.natural_driving`.
 
@@ -153,12 +144,6 @@ class PaperIdentifier(Method):
         law : one of `VARIANTS`.
         network : structure; None takes `natural_network`.
         dt : sampling interval [s].
-        seed : seed of the initial weights.
-
-        Raises
-        ------
-        ValueError
-            Where the law is unknown.
         """
         if law not in VARIANTS:
             raise ValueError(f"law must be one of {list(VARIANTS)}, not {law!r}")
@@ -237,14 +222,11 @@ class PaperIdentifier(Method):
             "gains": asdict(self.gains),
             "network": asdict(self.network),
             "design": {
-                "input_source": self.input_source,
-                "integrator": self.integrator,
-                "dt_s": self.dt,
-                "force_unit_N": self.force_unit,
-                "min_speed_m_s": self.min_speed,
+                "input_source": self.input_source, "integrator": self.integrator, "dt_s": self.dt,
+                "force_unit_N": self.force_unit, "min_speed_m_s": self.min_speed,
             },
             "seed": self.seed,
-        }
+        }  # fmt: skip
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> NetworkModel:
         """Return the model with the carried weights.
@@ -273,11 +255,7 @@ def _observed(vehicle: Vehicle, force_unit: float, x: Array) -> dict[str, Array]
 
 
 def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
-    """Return ξ = K⁻¹ x of (7), (2,) [N s].
-
-    x : [v_y, r] (2,).
-    vehicle : the car, which gives K.
-    """
+    """Return ξ = K⁻¹ x of (7), (2,) [N s].   x : [v_y, r] (2,)."""
     impulse: Array = _K_inv(vehicle.bicycle) @ x
     return impulse
 
@@ -292,7 +270,6 @@ def _natural_force_unit(mass: float) -> float:
 
     The gains are well scaled where forces are of order one: 1 kN for a passenger car, 1 N for a
     1:10 model.
-
     mass : mass of the car [kg].
     """
     return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
@@ -316,13 +293,10 @@ def design_for(
     seed: int = 0,
 ) -> PaperIdentifier:
     """Return a design whose learning loop has the wanted phase margin at the worst regressor.
-
     driving : how hard it is driven; it is stored with the design.
     law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
-    network : structure; None takes `natural_network`.
-    phase_margin : of the sampled loop [deg].
-    input_source : "measured" or "estimated".
-    integrator : "euler" or "rk4".
+    network : structure; None takes `natural_network`.   phase_margin : of the sampled loop [deg].
+    input_source : "measured" or "estimated".   integrator : "euler" or "rk4".
     dt : sampling interval [s].
     """
     network = network or natural_network(vehicle)
@@ -365,10 +339,8 @@ def _placeholder() -> Gains:
 
 def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
     """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
-
     design : of the paper's leakage, as `design_for` finds it.
-    known : where it runs, `PaperIdentifier.operation`.
-    keeping : one of `KEEPINGS`.
+    known : where it runs, `PaperIdentifier.operation`.   keeping : one of `KEEPINGS`.
     """
     if keeping not in KEEPINGS:
         raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")
@@ -390,34 +362,23 @@ def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> Pap
 COMMENTS = {
     "law": "integral | instantaneous | pi_lead",
     "input_source": "the state that the network reads: measured | estimated",
-    "integrator": "euler | rk4",
-    "dt": "s",
-    "force_unit": "N, the unit U of forces in the gains",
-    "min_speed": "m/s, below it learning rests",
-    "seed": "of the initial weights",
-    "A_d": "1/s, by rows, Hurwitz",
-    "forgetting": "1/s, lambda",
-    "eta_W": "1/s^4 (instantaneous: 1/s^3)",
-    "eta_V": "1/(U^2 s^4) (instantaneous: 1/(U^2 s^3))",
-    "rho_W": "1/(U s^2)",
-    "rho_V": "1/(U s^2)",
-    "W_max": "U, projection of W (inf: none)",
+    "integrator": "euler | rk4", "dt": "s", "force_unit": "N, the unit U of forces in the gains",
+    "min_speed": "m/s, below it learning rests", "seed": "of the initial weights",
+    "A_d": "1/s, by rows, Hurwitz", "forgetting": "1/s, lambda",
+    "eta_W": "1/s^4 (instantaneous: 1/s^3)", "eta_V": "1/(U^2 s^4) (instantaneous: 1/(U^2 s^3))",
+    "rho_W": "1/(U s^2)", "rho_V": "1/(U s^2)", "W_max": "U, projection of W (inf: none)",
     "V_max": "projection of V (inf: none)",
     "W_free": "U, dead zone of the leakage of W (0: all of W leaks, the paper's)",
     "V_free": "dead zone of the leakage of V (0: all of V leaks, the paper's)",
-    "lead": "s, tau of pi_lead",
-    "hidden": "units",
-    "inputs": "what the network reads",
-    "scale": "divisors of the inputs, SI",
-    "v_x": "m/s, give or take 5 %",
-    "slip": "rad, largest slip angle of an axle",
-    "friction": "largest of the road",
+    "lead": "s, tau of pi_lead", "hidden": "units", "inputs": "what the network reads",
+    "scale": "divisors of the inputs, SI", "v_x": "m/s, give or take 5 %",
+    "slip": "rad, largest slip angle of an axle", "friction": "largest of the road",
     "bandwidth": "Hz, highest frequency of the steering",
     "noise_v_x": "m/s, largest error of the sensor",
     "noise_v_y": "m/s, largest error of the sensor",
     "noise_r": "rad/s, largest error of the sensor",
     "noise_delta": "rad, largest error of the sensor",
-}
+}  # fmt: skip
 
 
 class DesignFileError(TireidError, ValueError):
@@ -426,7 +387,6 @@ class DesignFileError(TireidError, ValueError):
 
 def read_design(path: Path) -> PaperIdentifier:
     """Read a design.
-
     path : TOML with the keys of `PaperIdentifier`, and tables [gains], [network] and, where the
         conditions of driving are declared, [driving].
     """

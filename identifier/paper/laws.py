@@ -11,6 +11,10 @@ ball; it is done after the step.
 
 ξ̃ = ξ - ξ̂ [U s], z = ∫ exp(-λ (t - τ)) ξ̃ dτ [U s²], σ = tanh(V̂ x̄), U the force unit.
 The paper never defines ξ̃. Only with ξ - ξ̂, so that dξ̃/dt = A_d ξ̃ + f - f̂, do (11)-(12) descend.
+
+In functions:
+A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
+xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).   dt : step [s].
 """
 
 from collections.abc import Callable, Mapping
@@ -28,11 +32,7 @@ _Direction = Callable[[Any, Any], Any]
 
 
 def _static_direction(A_d: Any, drive: Any) -> Any:
-    """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
-
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    drive : the error that drives the laws (2,).
-    """
+    """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,)."""
     return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
 
 
@@ -41,9 +41,6 @@ def lyapunov_direction(A_d: Any, drive: Any) -> Any:
 
     P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
     2x2 matrix in closed form.
-
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    drive : the error that drives the laws (2,).
     """
     trace = A_d[0, 0] + A_d[1, 1]
     determinant = A_d[0, 0] * A_d[1, 1] - A_d[0, 1] * A_d[1, 0]
@@ -61,22 +58,12 @@ class DrivingError(NamedTuple):
     xi_tilde: Any
 
     def drive(self, z: Any, xi_tilde: Any) -> Any:
-        """Return the driving error.
-
-        z : filtered error.
-        """
         return self.z * z + self.xi_tilde * xi_tilde
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Law:
-    """A law: the error z z + (xi + lead τ) ξ̃ drives (11)-(12) along a direction.
-
-    z : share of the filtered error.
-    xi : share of the error.
-    lead : share of the lead time τ of the gains in what multiplies the error.
-    direction : of the descent, from A_d and the driving error.
-    """
+    """A law: the error z z + (xi + lead τ) ξ̃ drives (11)-(12) along a direction."""
 
     name: str
     z: float = 0.0
@@ -91,7 +78,6 @@ class Law:
 
     def error(self, lead: Any = 0.0) -> DrivingError:
         """Return the coefficients of the driving error.
-
         lead : lead time τ of the gains [s], a number or a symbol.
         """
         return DrivingError(self.z, self.xi + self.lead * lead)
@@ -112,34 +98,26 @@ LAWS: Mapping[str, Law] = {
 
 
 def unbounded(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: the leakage alone bounds them.
-
-    radius : ignored.
-    """
+    """Return the weights as they are: the leakage alone bounds them."""
     del radius
     return weights
 
 
 def ball(weights: Any, radius: Any) -> Any:
     """Return the weights, projected on the ball |weights|_F <= radius.
-
     radius : Frobenius norm that is kept, positive.
     """
     return weights * ca.fmin(1, radius / ca.fmax(ca.norm_fro(weights), 1e-300))
 
 
 def whole(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: all of them leak, as in (11)-(12).
-
-    radius : ignored.
-    """
+    """Return the weights as they are: all of them leak, as in (11)-(12)."""
     del radius
     return weights
 
 
 def beyond_ball(weights: Any, radius: Any) -> Any:
     """Return what of the weights lies beyond the ball: zero within it, and continuous.
-
     radius : Frobenius norm within which nothing leaks, not negative.
     """
     return weights - ball(weights, radius)
@@ -171,19 +149,11 @@ def weight_rates(
     V_free: Any = 0.0,
 ) -> _WeightRates:
     """Return (11)-(12), each a descent along the static gradient with a leakage.
-
     drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
-    xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.
-    W : weights (2, n_h).
-    V : weights (n_h, n_in).
-    x_bar : network input (n_in,).
-    sigma : hidden layer tanh(V x̄) (n_h,).
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    eta_W : learning rate η1.
-    eta_V : learning rate η2.
-    rho_W : leakage ρ1.
-    rho_V : leakage ρ2.
-    direction : of the descent, from A_d and the driving error.
+    xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.   W : weights (2, n_h).
+    V : weights (n_h, n_in).   x_bar : network input (n_in,).
+    sigma : hidden layer tanh(V x̄) (n_h,).   eta_W : learning rate η1.   eta_V : learning rate η2.
+    rho_W : leakage ρ1.   rho_V : leakage ρ2.
     leaking : what of the weights leaks, from them and the radius: `whole` or `beyond_ball`.
     W_free : radius of the dead zone of W, which `whole` does not read [U].
     V_free : radius of the dead zone of V, which `whole` does not read [-].
@@ -206,34 +176,21 @@ _InputSource = Callable[[Any, Any], Any]
 
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
-
-    A_d : Hurwitz matrix (2, 2) [1/s].
-    A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
-    B_xi : B_ξ of (7) (2, 2) [U/rad].
-    xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).
-    u : steering (2,) [rad].
-    f_hat : network output (2,) [U].
+    A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].   B_xi : B_ξ of (7) (2, 2) [U/rad].
+    u : steering (2,) [rad].   f_hat : network output (2,) [U].
     """
     return A_d @ xi_hat + (A_xi @ xi + B_xi @ u - A_d @ xi) + f_hat  # (8)
 
 
 def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
     """Return dz/dt of (10), (2,) [U s].
-
-    forgetting : λ [1/s].
-    z : filtered error (2,) [U s²].
-    xi_tilde : error (2,) [U s].
+    forgetting : λ [1/s].   z : filtered error (2,) [U s²].   xi_tilde : error (2,) [U s].
     """
     return -forgetting * z + xi_tilde  # (10)
 
 
 def measured(xi: Any, xi_hat: Any) -> Any:
-    """Read the network's input from the measured state, which opens the loop through x̂.
-
-    xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).
-    """
+    """Read the network's input from the measured state, which opens the loop through x̂."""
     del xi_hat
     return xi
 
@@ -242,9 +199,6 @@ def estimated(xi: Any, xi_hat: Any) -> Any:
     """Read the network's input from the estimated state, as (8) prints it.
 
     It closes a loop: A_d must then be fast against the slope of the tire.
-
-    xi : measured axle impulse (2,).
-    xi_hat : estimated axle impulse (2,).
     """
     del xi
     return xi_hat
@@ -264,7 +218,6 @@ def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
 
 
 def free(state: list[Any]) -> list[Any]:
-    """Return the state as it is: nothing bounds it."""
     return state
 
 
@@ -272,9 +225,6 @@ def euler(
     derivative: Derivative, state: list[Any], dt: Any, project: Projection = free
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
-
-    derivative : time derivative of each part of the state.
-    dt : step [s].
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
     """
     del project
@@ -286,9 +236,6 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
 
     The inner stages are projected: else a high gain leaves the bounds within the step, and the
     slopes there carry it beyond them.
-
-    derivative : time derivative of each part of the state.
-    dt : step [s].
     """
     k1 = derivative(state)
     k2 = derivative(project(_ahead(state, k1, dt / 2)))
@@ -315,7 +262,6 @@ class NotHurwitzError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
     """Gains of the observer (8), the filter (10) and the laws (11)-(12).
-
     A_d : Hurwitz matrix of the prescribed error dynamics (2x2), by rows [1/s].
     forgetting : λ of (9)-(10) [1/s].
     eta_W : learning rate of W: η1 [1/s⁴], or [1/s³] for the instantaneous law.
@@ -384,8 +330,5 @@ class Gains:
 
 
 def diagonal(a: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return A_d = -a I by rows.
-
-    a : rate of the error dynamics [1/s].
-    """
+    """Return A_d = -a I by rows.   a : rate of the error dynamics [1/s]."""
     return ((-a, 0.0), (0.0, -a))

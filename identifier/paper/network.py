@@ -25,7 +25,7 @@ from identifier.frozen import (
 )
 from identifier.method import OTHER_STRUCTURE, resumed
 from identifier.setup import Setup
-from identifier.tire_model import TireModel, drift
+from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
 from models.rules import require_positive, require_within
 from models.schema import Table, require_few
@@ -53,7 +53,6 @@ class Weights(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Network:
     """Structure of the network: size, inputs and their scales.
-
     hidden : number of hidden units n_h.
     inputs : signals of x̄, chosen among `SIGNALS`, each at most once.
     scale : divisor of each input in its own unit (m/s, rad/s, rad); None takes those of `SIGNALS`.
@@ -85,7 +84,6 @@ class Network:
 
     def initial_weights(self, rng: np.random.Generator) -> Weights:
         """Return W = 0, which starts at the linear tire, and random V.
-
         rng : generator of V, drawn from a normal distribution of standard deviation 1.
         """
         return Weights(
@@ -94,7 +92,6 @@ class Network:
 
     def normalized_input(self, signals: Mapping[str, Any]) -> Any:
         """Return x̄ (n_in,), without unit.
-
         signals : the CasADi expression of every signal of `inputs`, SI.
         """
         assert self.scale is not None
@@ -106,8 +103,6 @@ def natural_network(
     vehicle: Vehicle, *, hidden: int = 10, inputs: tuple[str, ...] = Network().inputs
 ) -> Network:
     """Return a network whose input scales fit the size of the car.
-
-    vehicle : its wheelbase sets the scales of speeds and yaw rate.
     hidden : number of hidden units.
     """
     ratio = np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
@@ -118,19 +113,14 @@ def natural_network(
 
 def hidden_layer(V: Any, x_bar: Any) -> Any:
     """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
-
-    V : weights (n_h, n_in).
-    x_bar : scaled input (n_in,).
+    V : weights (n_h, n_in).   x_bar : scaled input (n_in,).
     """
     return tanh(V @ x_bar)
 
 
 def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> dict[str, Any]:
     """Return every signal that a network may read, by name, SI.
-
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
     return {
@@ -190,21 +180,14 @@ def _build_replay(network: Network) -> ca.Function:
 
 
 @cache
-def _frozen(network: Network) -> ca.Function:
-    return build_frozen(network)
-
-
-@cache
 def _replay_scan(network: Network) -> Scan:
     return Scan(_build_replay(network), carry=(), over=("x", "u", "v_x"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
-class NetworkModel(TireModel):
+class NetworkModel(StaticModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
-
-    weights : W (2, n_h) in the force unit and V (n_h, n_in).
-    force_unit : U [N].
+    weights : W (2, n_h) in the force unit and V (n_h, n_in).   force_unit : U [N].
     min_speed : below this speed [m/s] the forces read zero.
     """
 
@@ -234,7 +217,6 @@ class NetworkModel(TireModel):
         require_within(ValueError, 0.0, _LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
         del dt
         return Setup(
             scan=_replay_scan(self.network),
@@ -248,21 +230,7 @@ class NetworkModel(TireModel):
             },
         )
 
-    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
-        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
-
-    def force_expression(
-        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
-    ) -> tuple[Any, Any]:
-        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
-
-        slip : empty.
-        """
-        del slip, least_lag
-        return self._static_force(x, delta, v_x), ca.MX(0, 1)
-
-    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+    def static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
         W, V = self.weights
         vehicle, unit = self.vehicle.bicycle, self.force_unit
         u = ca.vertcat(delta, 0)
@@ -284,7 +252,6 @@ class NetworkModel(TireModel):
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":
-        """Return the model that `to_dict` describes."""
         try:
             table = Table(data, "", FrozenModelError)
             return cls(
@@ -302,9 +269,7 @@ def first_weights(
     network: Network, start: TireModel | None, *, seed: int, force_unit: float
 ) -> Weights:
     """Return the weights that learning begins with.
-
-    start : stored weights to begin with; None draws them.
-    force_unit : U of what learns [N].
+    start : stored weights to begin with; None draws them.   force_unit : U of what learns [N].
     """
     if start is None:
         return network.initial_weights(np.random.default_rng(seed))

@@ -45,25 +45,14 @@ PORTS = (
 OVER = ("x", "u", "v_x")
 LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
 GAINS = (
-    "eta_W",
-    "eta_V",
-    "rho_W",
-    "rho_V",
-    "forgetting",
-    "W_max",
-    "V_max",
-    "lead",
-    "W_free",
-    "V_free",
-)
+    "eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead", "W_free", "V_free",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Structure:
     """What the step is built from; all numbers stay inputs of it.
-
     input_source : where the network reads the state.
-    rests : whether the leakage has a dead zone.
     """
 
     network: Network
@@ -79,9 +68,7 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 
     A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is told:
     one of 1000 m/s would carry the weights beyond any number.
-
-    v_x : longitudinal speed, at least the minimum speed [m/s].
-    x : [v_y, r] (2,).
+    v_x : longitudinal speed, at least the minimum speed [m/s].   x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     """
     most = 2 * v_x  # tan 63°

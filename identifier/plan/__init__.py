@@ -7,15 +7,6 @@ from identifier.plan.search import Pass, PlanError, Space
 from identifier.plan.tires import STEERING_LAG, PlausibleTires
 
 __all__ = [
-    "STEERING_LAG",
-    "Pass",
-    "Plan",
-    "PlanError",
-    "PlausibleTires",
-    "Rehearsal",
-    "Rival",
-    "Space",
-    "hold_of",
-    "make_plan",
-    "rehearse",
-]
+    "STEERING_LAG", "Pass", "Plan", "PlanError", "PlausibleTires", "Rehearsal", "Rival", "Space",
+    "hold_of", "make_plan", "rehearse",
+]  # fmt: skip

@@ -25,9 +25,7 @@ _MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 
 def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array:
     """Return the covariance of weights and own after a maneuver, (m, k, 2, q, q).
-
-    tires : k pairs of axles; their covariance is that before.
-    v_x : speed [m/s].
+    tires : k pairs of axles; their covariance is that before.   v_x : speed [m/s].
     """
     ladder, numbers = np.array(tires.method.ladder), tires.method.regression
     dt, n = EVERY * time_step(tires), ladder.size
@@ -63,7 +61,6 @@ class Doubt(NamedTuple):
 
 def asked(tires: PlausibleTires, v_x: float) -> Doubt:
     """Return where the curves are asked: evenly up to where the first one is flat.
-
     v_x : speed [m/s].
     """
     ladder = np.array(tires.method.ladder)
@@ -75,7 +72,6 @@ def asked(tires: PlausibleTires, v_x: float) -> Doubt:
 
 def deviation(doubt: Doubt, P: Array) -> Array:
     """Return the standard deviation of the force at the slips asked [static loads], (..., 2, s).
-
     P : covariances (..., 2, q, q).
     """
     n = doubt.units.shape[-1]
@@ -86,7 +82,6 @@ def deviation(doubt: Doubt, P: Array) -> Array:
 
 def expected_error(tires: PlausibleTires, doubt: Doubt, P: Array) -> Array:
     """Return the expected root mean square error of the forces over the grip [-], (...,).
-
     P : covariances (..., 2, q, q).
     """
     relative = deviation(doubt, P) / tires.grip[0][:, None]

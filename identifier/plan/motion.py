@@ -34,7 +34,6 @@ class Hold(NamedTuple):
 
     def steering(self, reference: tuple[Any, Any, Any], now: tuple[Any, Any, Any]) -> Any:
         """Return what is added to the planned angle [rad].
-
         reference, now : X, Y [m] and heading [rad], as planned and as they are.
         """
         (X, Y, psi), (X_now, Y_now, psi_now) = reference, now
@@ -59,10 +58,7 @@ class Guide(NamedTuple):
 
 
 def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
-    """Return how the course is held by the first tires.
-
-    v_x : speed [m/s].
-    """
+    """Return how the course is held by the first tires.   v_x : speed [m/s]."""
     car, omega = tires.vehicle, HOLD / tires.vehicle.froude_time
     c_f, c_r = (tires.W[0] / np.array(tires.method.ladder)).sum(axis=1)
     per_yaw_rate = car.wheelbase / v_x + v_x / GRAVITY * (1.0 / c_f - 1.0 / c_r)  # 1/G [s]
@@ -72,7 +68,6 @@ def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
 
 class Motion(NamedTuple):
     """What cars do, at n times: lanes (n, m, k), axles (n, 2, m, k).
-
     slip : lagged x [rad].   force : φ [static axle loads].   slope : dφ/dx [1/rad].
     of_compliance, of_share : ∂x/∂s [rad per m/load] and ∂x/∂k [rad].
     v_y : [m/s].   r : [rad/s].   X, Y : center of gravity [m].   psi : heading [rad].
@@ -116,10 +111,8 @@ def simulate(
     guide: Guide | None = None,
 ) -> Motion:
     """Return the motion of all tires under all steerings.
-
     planned : angles asked of the front wheels at steps of `time_step` [rad], (n, m).
-    v_x : speed [m/s].
-    guide : what is planned follows it; None plans the angles as they are.
+    v_x : speed [m/s].   guide : what is planned follows it; None plans the angles as they are.
     """
     car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)
     n, m, k = *planned.shape, len(tires.W)
@@ -192,9 +185,6 @@ def simulate(
 
 
 def steps_of(tires: PlausibleTires, duration: float) -> Array:
-    """Return the times of a simulation [s], (n,).
-
-    duration : [s].
-    """
+    """Return the times of a simulation [s], (n,).   duration : [s]."""
     dt = time_step(tires)
     return dt * np.arange(math.ceil(duration / dt) + 1, dtype=np.float64)

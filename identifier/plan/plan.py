@@ -45,7 +45,6 @@ _LONGER = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0])  # times, of a sla
 
 class Rival(NamedTuple):
     """A maneuver of the same length, on an open field.
-
     error : expected after it [-].   length, width : of the field that the likely car takes [m].
     catches_up : after what time it is as good as the plan [s]; inf where not in ten times its time.
     """
@@ -152,7 +151,6 @@ def make_plan(
     progress: Callable[[float], None] | None = None,
 ) -> Plan:
     """Return the passes that teach most.
-
     tires : that the car may have, under static loads; the plan's are those under the loads of its
         speed.
     time : of all passes together [s].
@@ -219,9 +217,7 @@ Steering = Callable[[float], Maneuver]  # of an amplitude [rad]
 
 def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
     """Return the hardest of maneuvers that keeps the share of the grip, with the likely tires.
-
     space : speed and share; its sides are not looked at.
-    of : the maneuver by its amplitude.
     """
     sizes = _AMPLITUDES * Search(tires=tires, space=space, duration=1.0, guided=False).largest_angle
     every = [of(float(size)) for size in sizes]
@@ -234,34 +230,24 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
 
 def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None) -> Steering:
     """Return slaloms by their amplitude.
-
-    duration : [s].
-    frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
+    duration : [s].   frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
     """
     f = SLALOM / vehicle.froude_time if frequency is None else frequency
     return lambda amplitude: Slalom(
-        amplitude=amplitude,
-        frequency=f,
-        onset=0.0,
-        rate_limit=2.1 * math.pi * f * amplitude,
+        amplitude=amplitude, frequency=f, onset=0.0, rate_limit=2.1 * math.pi * f * amplitude,
         duration=duration,
-    )
+    )  # fmt: skip
 
 
 def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
     """Return random steerings by their amplitude, swings half as fast again as those of a slalom.
-
     duration : [s].
     """
     f = 1.5 * SLALOM / vehicle.froude_time
     return lambda amplitude: RandomSteer(
-        amplitude=amplitude,
-        frequency=f,
-        seed=seed,
-        onset=0.0,
-        rate_limit=2.1 * math.pi * f * amplitude,
-        duration=duration,
-    )
+        amplitude=amplitude, frequency=f, seed=seed, onset=0.0,
+        rate_limit=2.1 * math.pi * f * amplitude, duration=duration,
+    )  # fmt: skip
 
 
 def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> tuple[Rival, ...]:
@@ -280,7 +266,6 @@ def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> t
 def _rated(
     tires: PlausibleTires, space: Space, maneuvers: Sequence[Maneuver], time: float
 ) -> Rival:
-    """Return the median of maneuvers."""
     t = steps_of(tires, time)
     delta = np.column_stack([one.steering(t)[:, 0] for one in maneuvers])
     motion = free_motion(tires, delta, space.speed)
@@ -294,7 +279,6 @@ def _rated(
 
 def free_motion(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
     """Return the motion on an open field, from the origin along X.
-
     delta : angles of the front wheels at steps of the simulation [rad], (n, m).
     v_x : speed [m/s].
     """
@@ -304,7 +288,6 @@ def free_motion(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
 
 def extent(X: Array, Y: Array) -> tuple[float, float]:
     """Return length and width [m] of the least rectangle, however turned, around a way.
-
     X, Y : of the way [m], (n,).
     """
     angles = np.linspace(0.0, math.pi, 361)[:-1]

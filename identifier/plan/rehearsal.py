@@ -25,8 +25,6 @@ def rehearse(
 
     speed : [m/s].
 
-    Returns
-    -------
     The recording, from `LEAD` seconds before the maneuver on, with true forces; X, Y [m] and
     heading [rad] of each of its samples (n, 3).
     """

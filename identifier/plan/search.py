@@ -50,9 +50,7 @@ class PlanError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Space:
     """Where, how fast and how hard it is driven.
-
-    length, width : of the area [m], the longer side first.
-    speed : that is held [m/s].
+    length, width : of the area [m], the longer side first.   speed : that is held [m/s].
     share : of the grip that the likely tires take at most, at both axles [-].
     margin : between any part of the car and the edge of the area [m].
     rate_limit : largest steering rate of the front wheels [rad/s].
@@ -88,7 +86,6 @@ class Body(NamedTuple):
 
 
 def body_of(tires: PlausibleTires) -> Body:
-    """Return the size of the body of a car."""
     car = tires.vehicle
     over = OVERHANG * car.wheelbase
     side = _HALF_WIDTH * car.wheelbase
@@ -100,7 +97,6 @@ def body_of(tires: PlausibleTires) -> Body:
 
 def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> Array:
     """Return the least distance of a body on its way to the edge of the area [m], (...).
-
     X, Y, psi : center of gravity [m] and heading [rad] over time, (n, ...).
     """
     c, s = np.cos(psi), np.sin(psi)
@@ -131,10 +127,7 @@ class Steerings(NamedTuple):
     entry: Entry
 
     def delta(self, t: Array) -> Array:
-        """Return the angles of the front wheels over time [rad], (n, m).
-
-        t : [s], (n,).
-        """
+        """Return the angles of the front wheels over time [rad], (n, m).   t : [s], (n,)."""
         lines = []
         for times, angles in zip(self.times, self.angles, strict=True):
             k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, times.size - 2)
@@ -160,7 +153,6 @@ class Pass(NamedTuple):
 
     def course(self, t: Array) -> Array:
         """Return X, Y [m] and heading [rad] of the likely tires, (n, 3).
-
         t : since the entry [s], (n,).
         """
         lines = (one[:, 0, 0] for one in (self.motion.X, self.motion.Y, self.motion.psi))
@@ -170,7 +162,6 @@ class Pass(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
     """A pass of a given duration that is looked for.
-
     duration : of the pass [s].
     guided : along the middle of the area; else the way is free, as where a car can turn inside.
     """
@@ -201,7 +192,6 @@ class Search:
 
     def steerings(self, numbers: Array) -> Steerings:
         """Return the steerings that numbers between -1 and 1 stand for; rates are kept.
-
         numbers : N - 1 angles, ratio of durations, place and heading of the entry, (m, N + 2).
         """
         N, space = self.swings, self.space
@@ -287,10 +277,6 @@ class Search:
     def best(
         self, rng: np.random.Generator, progress: Callable[[float], None] | None = None
     ) -> Pass:
-        """Return the pass that teaches most.
-
-        progress : called with the share of the generations.
-        """
         least: list[float] = []  # cost, after each generation
 
         def costs(numbers: Array) -> Array:
@@ -327,7 +313,6 @@ class Search:
         return self.as_pass(np.array([found.x]))
 
     def as_pass(self, numbers: Array) -> Pass:
-        """Return the pass that numbers stand for."""
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
         P = covariance_after(self.tires, motion, self.space.speed)
@@ -343,5 +328,4 @@ class Search:
 
 
 def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:
-    """Return the tires when a pass was driven."""
     return replace(tires, covariance=one.covariance)

@@ -30,7 +30,6 @@ FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it 
 
 def _steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
     """Return the time constant from the angle asked for to that of the front wheels [s].
-
     told : of the steering that drives it; None takes that of its chassis, or else 0.04.
     """
     if told is not None:
@@ -41,7 +40,6 @@ def _steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlausibleTires:
     """k cars, the first of which is taken for the truth until more is known.
-
     W : weights [static axle loads], (k, 2, n).
     steering_lag : of the front wheels behind what is asked of them [s], (k,).
     own : compliance [m per load], sway share [-], offset (2, 3), of all.
@@ -62,7 +60,6 @@ class PlausibleTires:
         cls, vehicle: Vehicle, friction: float, *, steering_lag: float | None = None
     ) -> Self:
         """Return the tires that a car may have that was never identified.
-
         friction : believed of tires and road [-].
         """
         method = AxleIdentifier.for_vehicle(vehicle)
@@ -75,14 +72,11 @@ class PlausibleTires:
             front = rear = neutral
         low, high = 1.0 - SPREAD, 1.0 + SPREAD
         cases = (
-            (front, rear, friction, 1.0),
-            (low * front, low * rear, friction, low),
-            (high * front, high * rear, friction, high),
-            (neutral, neutral, low * friction, high),
-            (front, rear, high * friction, low),
-            (low * front, high * rear, friction, high),
+            (front, rear, friction, 1.0), (low * front, low * rear, friction, low),
+            (high * front, high * rear, friction, high), (neutral, neutral, low * friction, high),
+            (front, rear, high * friction, low), (low * front, high * rear, friction, high),
             (low * front, low * rear, low * friction, 1.0),
-        )
+        )  # fmt: skip
         W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu, _ in cases]
         lag = _steering_lag_of(vehicle, steering_lag) * np.array([late for *_, late in cases])
         P = prior.covariance(vehicle, ladder)
@@ -122,7 +116,6 @@ class PlausibleTires:
 
     def slip_at(self, share: float) -> Array:
         """Return the least slip at which the curves reach a share of their grip [rad], (k, 2).
-
         share : of the largest force, at most 1.
         """
         reached = self._curves >= share * self.grip
@@ -141,7 +134,6 @@ class PlausibleTires:
 
         Weights, and what is not known of them, are those of the static loads times λ; of a car
         without downforce they stay as they are.
-
         v_x : speed [m/s].
         """
         load, n = self.vehicle.load_ratio(v_x), len(self.method.ladder)
@@ -157,7 +149,6 @@ class PlausibleTires:
 
     def after(self, covariance: Array) -> Self:
         """Return the same tires when more is known of them.
-
         covariance : of weights and own, (2, n + 3, n + 3).
         """
         return replace(self, covariance=covariance)

@@ -8,14 +8,6 @@ from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.operation import Operation
 
 __all__ = [
-    "INSTANTANEOUS",
-    "INTEGRAL",
-    "Certificate",
-    "DesignError",
-    "DrivingError",
-    "GainDesign",
-    "Operation",
-    "Property",
-    "certify",
-    "design_gains",
-]
+    "INSTANTANEOUS", "INTEGRAL", "Certificate", "DesignError", "DrivingError", "GainDesign",
+    "Operation", "Property", "certify", "design_gains",
+]  # fmt: skip

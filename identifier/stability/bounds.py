@@ -21,12 +21,7 @@ from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.lyapunov import (
-    lyapunov,
-    peak_gain,
-    require_hurwitz,
-    sampled_peak_gain,
-)
+from identifier.stability.lyapunov import lyapunov, peak_gain, require_hurwitz, sampled_peak_gain
 from models.rules import require_positive
 
 
@@ -41,11 +36,8 @@ def small_gain(
     direction: Array | None = None,
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    eta_W : learning rate of (11).
-    n_h : hidden units; |s|² <= n_h.
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
+    eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
     dt : step of explicit Euler [s]; None for continuous time.
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
@@ -69,11 +61,8 @@ def steady_capacity(
 
     In steady state learning balances leakage, η_W |s|² |A_d⁻¹| (c_z/λ + c_ξ) |ξ̃| = ρ_W |ξ̃| |f_hat|:
     a residual above it leaves an error however long one learns. It shrinks with |s|²/n_h.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    eta_W : learning rate of (11).
-    rho_W : leakage gain of (11) [1/(U s²)].
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
+    eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
     require_positive(ValueError, forgetting=forgetting, rho_W=rho_W)
@@ -84,7 +73,6 @@ def steady_capacity(
 
 def transient_peak(A_d: ArrayLike) -> float:
     """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     matrix = require_hurwitz(A_d)

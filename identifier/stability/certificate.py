@@ -16,16 +16,12 @@ from identifier.stability.checks import (
     margin_checks,
     weight_check,
 )
-from identifier.stability.loop import (
-    Loop,
-    direction_matrix,
-)
+from identifier.stability.loop import Loop, direction_matrix
 from identifier.stability.operation import Operation, proven_bounds, worst_loop
 
 
 def certify(gains: Gains, law: Law, operation: Operation) -> Certificate:
     """Return every property of the design.
-
     gains : of (8) to (12).
     law : of `identifier.paper.laws.LAWS`; the PI-lead law takes its τ from the gains.
     """
@@ -49,10 +45,7 @@ def judged_loop(
     """Return the |W_hat| that margins are judged at, the worst loop there, and its margins.
 
     It is the proven bound, or where the margins do not hold up to it `W_large`.
-
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
-    kept : |W_hat| that is proven [U].
+    gains : of (8) to (12).   direction : (2, 2) D [s].   kept : |W_hat| that is proven [U].
     """
     loop = worst_loop(gains, law, operation, direction, kept)
     margins = margin_checks(loop, operation)

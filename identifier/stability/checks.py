@@ -28,7 +28,6 @@ _CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, 
 
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
-
     gains : of (8) to (12).
     """
     A_d = gains.matrix
@@ -118,9 +117,7 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
 
     Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
     the weights at which the margins were judged.
-
-    gains : of (8) to (12).
-    kept : |W_hat| that is proven [U].
+    gains : of (8) to (12).   kept : |W_hat| that is proven [U].
     judged : |W_hat| at which the margins were judged [U].
     """
     limit = math.inf
@@ -145,7 +142,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
 
 def _state_space_poles(A_d: Array) -> ComplexArray:
     """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
-
     A_d : (2, 2) error dynamics [1/s].
     """
     import control  # takes a second to import, so only where it is needed
@@ -159,9 +155,7 @@ def drift_check(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
-
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
+    gains : of (8) to (12).   direction : (2, 2) D [s].
     """
     found = drift_frequency(
         A_d=gains.matrix, forgetting=gains.forgetting, law=law, direction=direction
@@ -170,13 +164,9 @@ def drift_check(
     advice = ""
     if operation.bandwidth > limit:
         leakage = sufficient_leakage(
-            A_d=gains.matrix,
-            forgetting=gains.forgetting,
-            law=law,
-            eta_W=gains.eta_W,
-            n_h=operation.n_h,
-            direction=direction,
-        )
+            A_d=gains.matrix, forgetting=gains.forgetting, law=law, eta_W=gains.eta_W,
+            n_h=operation.n_h, direction=direction,
+        )  # fmt: skip
         advice = f"raise A_d and forgetting; a leakage of {leakage:.3g} 1/s would stop the drift"
     return Property(
         name="drift",
@@ -252,10 +242,7 @@ def bound_checks(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array, proven: Proven
 ) -> list[Property]:
     """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
-
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
-    proven : of `proven_bounds`.
+    gains : of (8) to (12).   direction : (2, 2) D [s].   proven : of `proven_bounds`.
     """
     A_d = gains.matrix
     if not operation.resolves(A_d):
@@ -312,13 +299,10 @@ def _stated(proven: Proven) -> list[Property]:
     if proven.projection is not None:
         entries.append(
             statement(
-                "projection_bound",
-                "proven bound of |xi - xi_hat| by the projection",
-                proven.projection.xi_tilde,
-                "U s",
-                _CONDITION,
+                "projection_bound", "proven bound of |xi - xi_hat| by the projection",
+                proven.projection.xi_tilde, "U s", _CONDITION,
             )
-        )
+        )  # fmt: skip
     if not math.isfinite(proven.xi_tilde):
         entries.append(
             _unproven(
@@ -344,15 +328,9 @@ def _stated(proven: Proven) -> list[Property]:
 
 def _unproven(name: str, title: str, unit: str, advice: str) -> Property:
     return Property(
-        name=name,
-        title=title,
-        value=math.inf,
-        limit=None,
-        margin=None,
-        status="warn",
-        unit=unit,
+        name=name, title=title, value=math.inf, limit=None, margin=None, status="warn", unit=unit,
         advice=advice,
-    )
+    )  # fmt: skip
 
 
 def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
@@ -373,14 +351,9 @@ def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: 
     """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
     resting = math.sqrt(operation.n_h) * gains.W_free
     capacity = resting + steady_capacity(
-        gains.matrix,
-        law=law,
-        forgetting=gains.forgetting,
-        eta_W=gains.eta_W,
-        rho_W=gains.rho_W,
-        n_h=operation.n_h,
-        direction=direction,
-    )
+        gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
+        n_h=operation.n_h, direction=direction,
+    )  # fmt: skip
     need = operation.needed_force
     enough = capacity >= need
     return Property(

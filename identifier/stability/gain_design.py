@@ -43,10 +43,7 @@ class DesignError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainDesign:
     """Gains and what is proved of them.
-
-    gains : of (8) to (12).
-    bounds : proven bounds of |ξ̃| and |W_hat|.
-    V_max : bound on |V_hat|, kept by ρ_V.
+    gains : of (8) to (12).   bounds : proven bounds of |ξ̃| and |W_hat|.
     """
 
     gains: Gains
@@ -62,9 +59,7 @@ def gain_for_phase_margin(
 
     The loop is (g/a) (c_ξ + c_z/(s + λ))/((s + a) s); the frequency where its phase is PM - 180° is
     found by bisection, g is the inverse of its magnitude there.
-
-    a : decay rate [1/s].
-    lam : forgetting factor λ [1/s].
+    a : decay rate [1/s].   lam : forgetting factor λ [1/s].
     phase_margin : wanted [deg], above 0 and below 90.
     dt : step of explicit Euler [s]; None for continuous time (RK4 at a dt <= 0.2 comes to it).
     """
@@ -95,7 +90,6 @@ def gain_for_phase_margin(
 
 def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
     """Return a = λ of rule 1 [1/s].
-
     bandwidth : highest frequency of steering that matters [Hz].
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
@@ -118,26 +112,17 @@ def design_gains(
     minimal_decay: float = 0.0,
 ) -> GainDesign:
     """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
-
-    bandwidth : highest frequency of steering that matters [Hz].
-    dt : sampling interval T_s [s].
-    disturbance : what acts on the error, for the proven bounds.
+    bandwidth : highest frequency of steering that matters [Hz].   dt : sampling interval T_s [s].
     needed_force : that the network is expected to hold [U].
-    V_max : wanted bound on |V_hat|, at least its initial norm.
     phase_margin : wanted phase margin of the sampled loop at the worst regressor [deg].
     capacity : force that W can hold at |s|² = n_h, in units of needed_force.
     integrator : "euler" or "rk4", as in the step.
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
     require_positive(
-        ValueError,
-        bandwidth=bandwidth,
-        dt=dt,
-        x_bar_max=x_bar_max,
-        needed_force=needed_force,
-        V_max=V_max,
-        capacity=capacity,
-    )
+        ValueError, bandwidth=bandwidth, dt=dt, x_bar_max=x_bar_max, needed_force=needed_force,
+        V_max=V_max, capacity=capacity,
+    )  # fmt: skip
     a = decay_rate(bandwidth, minimal_decay)
     if not a * dt <= FASTEST:
         raise DesignError(
@@ -217,27 +202,19 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
 
 
 def leakage(gains: Gains, known: Operation) -> Gains:
-    """Return the gains as they are: the paper's leakage alone.
-
-    gains : of `design_gains`.
-    """
+    """Return the gains as they are: the paper's leakage alone.   gains : of `design_gains`."""
     del known
     return gains
 
 
 def dead_zone(gains: Gains, known: Operation) -> Gains:
     """Return the gains with a leakage of what lies beyond the balls.
-
     gains : of `design_gains`.
     """
     return replace(gains, W_free=known.W_large, V_free=known.V_start)
 
 
 def projection(gains: Gains, known: Operation) -> Gains:
-    """Return the gains with a projection on the balls, and no leakage.
-
-    gains : of `design_gains`.
-    """
     return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)
 
 

@@ -31,24 +31,17 @@ Integrator = Callable[[ComplexArray], ComplexArray]
 
 
 def exact(mu: ComplexArray) -> ComplexArray:
-    """Continuous time: exp(μ dt).
-
-    mu : eigenvalues times the step [-].
-    """
+    """Continuous time: exp(μ dt).   mu : eigenvalues times the step [-]."""
     return np.exp(mu)
 
 
 def euler(mu: ComplexArray) -> ComplexArray:
-    """Explicit Euler: 1 + μ dt.
-
-    mu : eigenvalues times the step [-].
-    """
+    """Explicit Euler: 1 + μ dt.   mu : eigenvalues times the step [-]."""
     return 1.0 + mu
 
 
 def rk4(mu: ComplexArray) -> ComplexArray:
     """Runge-Kutta of order 4: 1 + μ + μ²/2 + μ³/6 + μ⁴/24, with μ times dt.
-
     mu : eigenvalues times the step [-].
     """
     return 1.0 + mu * (1.0 + mu / 2.0 * (1.0 + mu / 3.0 * (1.0 + mu / 4.0)))
@@ -63,9 +56,7 @@ INSTANTANEOUS = DrivingError(0.0, 1.0)
 
 def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
-
-    law : of `identifier.paper.laws.LAWS`.
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    law : of `identifier.paper.laws.LAWS`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     found: Array = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
     return found
@@ -74,12 +65,9 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
     """The loop at one frozen regressor.
-
-    A_d : (2, 2) error dynamics [1/s].
-    forgetting : λ of (9) and (10) [1/s].
+    A_d : (2, 2) error dynamics [1/s].   forgetting : λ of (9) and (10) [1/s].
     law : coefficients of z and ξ̃ in the driving error.
-    G : (2, 2) loop gain, symmetric positive semidefinite.
-    leakage : l = ρ |ξ̃| [1/s].
+    G : (2, 2) loop gain, symmetric positive semidefinite.   leakage : l = ρ |ξ̃| [1/s].
     input_feedback : (2, 2) J_f K [1/s], None where the network reads the measured x.
     direction : (2, 2) matrix D that replaces -A_d⁻ᵀ [s], None for (11) and (12) as printed.
     """
@@ -118,7 +106,6 @@ class Loop:
 
     def scaled(self, factor: float) -> "Loop":
         """Return the same loop with eta_W and eta_V multiplied by the factor.
-
         factor : multiplier of the loop gain [-].
         """
         return replace(self, G=factor * self.G)
@@ -126,7 +113,6 @@ class Loop:
 
 def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
     """Stack the loop's matrices for many (complex) factors on the loop gain, (n, 6, 6).
-
     factors : (n,) multipliers of G; complex ones turn the phase.
     """
     base = loop.matrix().astype(np.complex128)
@@ -136,16 +122,12 @@ def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
 
 
 def eigenvalues(matrices: ArrayLike) -> ComplexArray:
-    """Eigenvalues as complex numbers, (..., n) [1/s].
-
-    matrices : (..., n, n).
-    """
+    """Eigenvalues as complex numbers, (..., n) [1/s].   matrices : (..., n, n)."""
     return np.asarray(np.linalg.eigvals(np.asarray(matrices)), dtype=np.complex128)
 
 
 def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
     """Eigenvalues of the loop for many factors on the gain, (n, 6) [1/s], unsorted.
-
     factors : (n,) multipliers of G.
     """
     return eigenvalues(scaled_matrices(loop, factors))
@@ -153,9 +135,7 @@ def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
 
 def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float = 1.0) -> Array:
     """Log max|R(μ dt)| / dt [1/s]: negative is stable; the spectral abscissa for `exact`.
-
-    matrices : (..., n, n) loop matrices.
-    dt : step [s]; irrelevant for `exact`.
+    matrices : (..., n, n) loop matrices.   dt : step [s]; irrelevant for `exact`.
     """
     mu = eigenvalues(matrices)
     growth = np.max(mu.real, axis=-1)
@@ -166,9 +146,7 @@ def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float =
 
 def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> Array:
     """max|R(μ dt)|: below one the sampled loop is stable.
-
-    matrices : (..., n, n) loop matrices.
-    dt : step [s].
+    matrices : (..., n, n) loop matrices.   dt : step [s].
     """
     return np.exp(growth_rate(matrices, integrator, dt) * dt)
 
@@ -189,11 +167,8 @@ def worst_gain(
     A unit i adds η_W u + η_V |x_bar|² |W_i|² (1 - u)² with u = s_i² in [0, 1], convex in u and in
     W: the worst is at a corner, where every unit is saturated but perhaps the one that holds all
     of W. So V learns at no cost in margin while η_V x_bar_max² W_max² <= η_W.
-
-    eta_W : learning rate of (11).
-    eta_V : learning rate of (12).
-    n_h : hidden units; |s|² <= n_h.
-    W_max : bound on |W| (Frobenius) [U]; needed where V learns.
+    eta_W : learning rate of (11).   eta_V : learning rate of (12).
+    n_h : hidden units; |s|² <= n_h.   W_max : bound on |W| (Frobenius) [U]; needed where V learns.
     """
     if not (eta_W >= 0.0 and eta_V >= 0.0 and n_h >= 1):
         raise ValueError(f"eta_W, eta_V >= 0 and n_h >= 1, they are {(eta_W, eta_V, n_h)}")
@@ -206,19 +181,11 @@ def worst_gain(
 
 
 def regressor_gains(
-    *,
-    eta_W: float,
-    eta_V: float,
-    s: ArrayLike,
-    x_bar: ArrayLike,
-    W: ArrayLike,
+    *, eta_W: float, eta_V: float, s: ArrayLike, x_bar: ArrayLike, W: ArrayLike
 ) -> Array:
     """G along a run, (n, 2, 2).
-
-    eta_W : learning rate of (11).
-    eta_V : learning rate of (12).
-    s : (n, n_h) hidden units tanh(V x_bar).
-    x_bar : (n, n_in) network input.
+    eta_W : learning rate of (11).   eta_V : learning rate of (12).
+    s : (n, n_h) hidden units tanh(V x_bar).   x_bar : (n, n_in) network input.
     W : (n, 2, n_h) or (2, n_h) output weights [U].
     """
     s, x_bar, W = np.atleast_2d(s), np.atleast_2d(x_bar), np.asarray(W, dtype=np.float64)
@@ -234,7 +201,6 @@ def regressor_gains(
 
 def strongest(gains: ArrayLike) -> tuple[int, float]:
     """Index of the sample with the largest λ_max(G), and that value.
-
     gains : (n, 2, 2) loop gains along a run.
     """
     largest = np.linalg.eigvalsh(np.asarray(gains))[:, -1]
@@ -254,8 +220,6 @@ def root(
     rtol: float = FINEST,
 ) -> float:
     """Return x between two ends at which f is zero, by Brent's method.
-
-    f : continuous, of other sign at either end.
     xtol, rtol : how near it must be, absolute and over its size.
     """
     from scipy.optimize import brentq  # takes longer to import than a log of a minute to learn from

@@ -21,11 +21,8 @@ class LyapunovError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LyapunovPair:
     """P and Q of A_dᵀ P + P A_d = -Q, with the residual found by substitution.
-
-    A_d : (2, 2) error dynamics [1/s].
-    P : (2, 2) solution [s, for Q without unit].
-    Q : (2, 2) right-hand side [-].
-    residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
+    A_d : (2, 2) error dynamics [1/s].   P : (2, 2) solution [s, for Q without unit].
+    Q : (2, 2) right-hand side [-].   residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
     """
 
     A_d: Array
@@ -35,10 +32,7 @@ class LyapunovPair:
 
 
 def require_square(A_d: ArrayLike) -> Array:
-    """Return A_d as a finite (2, 2) array.
-
-    A_d : (2, 2) error dynamics [1/s].
-    """
+    """Return A_d as a finite (2, 2) array.   A_d : (2, 2) error dynamics [1/s]."""
     matrix = np.array(A_d, dtype=np.float64)
     if matrix.shape != (2, 2) or not np.all(np.isfinite(matrix)):
         raise ValueError(f"A_d must be a finite 2x2 matrix, it is {matrix.tolist()}")
@@ -47,7 +41,6 @@ def require_square(A_d: ArrayLike) -> Array:
 
 def require_hurwitz(A_d: ArrayLike) -> Array:
     """Return A_d as an array after checking that all its eigenvalues have Re < 0.
-
     A_d : (2, 2) error dynamics [1/s].
     """
     matrix = require_square(A_d)
@@ -60,9 +53,7 @@ def require_hurwitz(A_d: ArrayLike) -> Array:
 
 def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
     """Substitute P back: |A_dᵀ P + P A_d + Q| / |Q|.
-
-    A_d : (2, 2) error dynamics [1/s].
-    P : (2, 2) candidate solution.
+    A_d : (2, 2) error dynamics [1/s].   P : (2, 2) candidate solution.
     Q : (2, 2) right-hand side.
     """
     A_d, P, Q = np.asarray(A_d), np.asarray(P), np.asarray(Q)
@@ -71,9 +62,7 @@ def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
 
 def lyapunov(A_d: ArrayLike, Q: ArrayLike) -> LyapunovPair:
     """Solve A_dᵀ P + P A_d = -Q (the P and Q of (14)) and check the answer by substitution.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    Q : (2, 2) symmetric positive definite matrix.
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   Q : (2, 2) symmetric positive definite matrix.
     """
     A_d, Q = require_hurwitz(A_d), require_square(Q)
     if not np.allclose(Q, Q.T, rtol=1e-12) or not np.linalg.eigvalsh(Q)[0] > 0.0:
@@ -94,7 +83,6 @@ def peak_gain(A_d: ArrayLike) -> float:
     1 / min|Re pole| where A_d is normal (symmetric, or a multiple of the identity plus a
     rotation); otherwise Gauss-Legendre quadrature, refined until it agrees with itself to 1e-10.
     With complex poles exp(A_d T) = -exp(m T) I after T = π/|Im|: one such period is enough.
-
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
     A_d = require_hurwitz(A_d)
@@ -123,7 +111,6 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
 
     m = tr A_d/2, k = |the symmetric part of A_d - m I|, S = sinh(q t)/q, q² = m² - det A_d: the
     singular values of C I + S (A_d - m I) are sqrt(1 + k² S²) ± k |S|.
-
     A_d : (2, 2) error dynamics [1/s].
     t : times [s], positive; within half a turn where the poles are complex.
     """
@@ -143,9 +130,7 @@ def _transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
 
 def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
     """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
-
-    A_d : (2, 2) error dynamics [1/s].
-    dt : step [s].
+    A_d : (2, 2) error dynamics [1/s].   dt : step [s].
     """
     step = np.eye(2) + dt * require_hurwitz(A_d)
     radius = float(np.max(np.abs(np.linalg.eigvals(step))))
@@ -156,9 +141,7 @@ def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
 
 def power_norms(step: Array, entry: Array) -> tuple[float, float]:
     """Largest and sum of |step^k entry| over k = 0, 1, ...
-
-    step : (2, 2) with every eigenvalue inside the unit circle.
-    entry : (2, 2).
+    step : (2, 2) with every eigenvalue inside the unit circle.   entry : (2, 2).
     """
     radius, size = float(np.max(np.abs(np.linalg.eigvals(step)))), np.linalg.norm(entry, 2)
     scalar = np.linalg.norm(step - step[0, 0] * np.eye(2), 2) <= 1e-14

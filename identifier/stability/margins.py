@@ -3,6 +3,11 @@
 Gain margin: the factor on eta_W and eta_V at which the loop of `loop.py` turns unstable.
 Phase margin: the phase lag in the learning path that does the same, in degrees.
 For A_d = -a I both are those of the scalar loop (g/a) (c_ξ + c_z/(s + λ)) / ((s + a)(s + l)).
+
+In functions:
+integrator : `exact` for continuous time, or the integrator of the step.
+dt : step [s]; irrelevant for `exact`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
+forgetting : λ [1/s].   direction : (2, 2) D, None for -A_d⁻ᵀ.
 """
 
 import math
@@ -36,7 +41,6 @@ AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _GainMargin:
     """Where the loop turns unstable.
-
     factor : multiplier of the loop gain [-]; inf if none up to 1e6, 0 if unstable without gain.
     frequency : of the oscillation at the margin [rad/s]; nan if there is no margin to reach.
     """
@@ -50,9 +54,6 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
 
     Any A_d, any law, any input source: factors from 1e-6 to 1e6 are searched (150 a decade) for
     the first unstable one, and the crossing is refined to round-off.
-
-    integrator : `exact` for continuous time, or the integrator of the step.
-    dt : step [s]; irrelevant for `exact`.
     """
 
     def growth_at(log_factors: Array) -> Array:
@@ -73,9 +74,6 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
 
     0 if the loop is already unstable, 180 if no lag below half a turn does it. Defined for any
     A_d: the gain G is turned to G exp(-jθ) on both channels at once.
-
-    integrator : `exact` for continuous time, or the integrator of the step.
-    dt : step [s]; irrelevant for `exact`.
     """
 
     def growth_at(angles: Array) -> Array:
@@ -147,11 +145,7 @@ def passivity(
     direction: Array | None = None,
 ) -> Array:
     """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
-
     frequency : (n,) ω [rad/s].
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
     dynamics = require_hurwitz(A_d)
     c_z, c_xi = law
@@ -171,10 +165,6 @@ def drift_frequency(
 
     For A_d = -a I: sqrt(a λ) for the integral law, inf for the instantaneous law and for the
     PI-lead law with τ >= 1/a.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
 
     def relative(frequency: ArrayLike) -> Array:
@@ -205,8 +195,6 @@ def passivity_shortage(
 
     For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²). The other
     arguments are those of `drift_frequency`, `direction` (2, 2) [s].
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
 
     def lowest(log_frequency: ArrayLike) -> Array:
@@ -239,12 +227,7 @@ def sufficient_leakage(
     """Constant leakage rate s0 [1/s] above which no regressor can drift, η |s|²_max shortage.
 
     The leakage ρ |ξ̃| of (11) reaches it where |ξ̃| = s0/ρ: about the error at which a drift ends.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    eta_W : learning rate of (11).
-    n_h : hidden units; |s|² <= n_h.
-    direction : (2, 2) D, None for -A_d⁻ᵀ.
+    eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
     """
     shortage = passivity_shortage(A_d=A_d, forgetting=forgetting, law=law, direction=direction)
     return eta_W * n_h * shortage

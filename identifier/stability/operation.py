@@ -1,4 +1,11 @@
-"""What a certificate must know besides the gains, and the worst loop that follows from it."""
+"""What a certificate must know besides the gains, and the worst loop that follows from it.
+
+In functions:
+gains : of (8) to (12).   direction : (2, 2) D [s], of `direction_matrix`.   m : mass [kg].
+I_z : yaw inertia [kg m²].   l_f : center of gravity to front axle [m].
+l_r : center of gravity to rear axle [m].   v_x : speed [m/s].   slip : largest slip angle [rad].
+friction : μ [-].
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -55,20 +62,16 @@ class Sampled(Protocol):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Operation:
     """Where and how the identifier runs: what the certificate must know besides the gains.
-
-    n_h : hidden units.
-    dt : sampling interval T_s [s].
-    integrator : "euler", "rk4" or "exact".
+    n_h : hidden units.   dt : sampling interval T_s [s].   integrator : "euler", "rk4" or "exact".
     bandwidth : highest frequency of steering that matters [Hz].
-    disturbance : sup|f|, noise and rates that act on the error.
     needed_force : that the network should be able to hold against its leakage [U].
     x_bar_max : bound on |x_bar| [-], without what the error adds where the network reads x_hat.
     input_feedback : (2, 2) J_f K [1/s] where the network reads x_hat; None where it reads x.
     W_M : bound on the ideal weights (Frobenius) [U], for (14).
     w_bar : bound on the approximation error [U], for (14).
     V_start : largest |V_hat| to begin with (Frobenius) [-].
-    W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this
-        one (Frobenius) [U]; the V layer's share of the loop gain grows with it.
+    W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this one
+        (Frobenius) [U]; the V layer's share of the loop gain grows with it.
     input_per_error : what an error adds to |x_bar| where the network reads x_hat [1/(U s)].
     """
 
@@ -88,13 +91,9 @@ class Operation:
 
     def __post_init__(self) -> None:
         require_positive(
-            ValueError,
-            n_h=self.n_h,
-            dt=self.dt,
-            bandwidth=self.bandwidth,
-            needed_force=self.needed_force,
-            x_bar_max=self.x_bar_max,
-        )
+            ValueError, n_h=self.n_h, dt=self.dt, bandwidth=self.bandwidth,
+            needed_force=self.needed_force, x_bar_max=self.x_bar_max,
+        )  # fmt: skip
         if self.integrator not in INTEGRATORS:
             raise ValueError(
                 f"integrator must be one of {list(INTEGRATORS)}, not {self.integrator!r}"
@@ -107,26 +106,19 @@ class Operation:
 
     @property
     def step(self) -> Integrator:
-        """The integrator as a function of eigenvalues."""
         return INTEGRATORS[self.integrator]
 
     def resolves(self, A_d: Array) -> bool:
-        """Whether the step keeps the error dynamics stable.
-
-        A_d : (2, 2) error dynamics [1/s].
-        """
+        """Whether the step keeps the error dynamics stable.   A_d : (2, 2) error dynamics [1/s]."""
         return bool(spectral_radius(A_d, self.step, self.dt) < 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proven:
     """What is proven of a design; None and inf where nothing is.
-
-    leakage : bounds that the leakage of W gives.
-    projection : bounds that the projection of W gives.
     V : bound on |V_hat| [-].
-    leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no
-        bound is proven.
+    leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no bound
+        is proven.
     """
 
     leakage: SampledBounds | None
@@ -161,11 +153,7 @@ _NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, l
 def proven_bounds(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Proven:
-    """Return all bounds that are proven, for the start of `sampled_bound.py`.
-
-    gains : of (8) to (12).
-    direction : (2, 2) D [s], of `direction_matrix`.
-    """
+    """Return all bounds that are proven, for the start of `sampled_bound.py`."""
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
     if not operation.resolves(A_d):
         return _NOTHING
@@ -220,9 +208,6 @@ def worst_loop(
     """Return the loop at the worst regressor, and |W_hat| up to W.
 
     Where W is infinite, the V layer cannot be counted and is left out.
-
-    gains : of (8) to (12).
-    direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
     """
     g = worst_gain(
@@ -252,13 +237,7 @@ def worst_loop(
 
 
 def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
-    """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
-
-    m : mass [kg].
-    I_z : yaw inertia [kg m²].
-    l_f : center of gravity to front axle [m].
-    l_r : center of gravity to rear axle [m].
-    """
+    """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6)."""
     require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
@@ -267,22 +246,10 @@ def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
 
 
 def estimated_input_feedback(
-    *,
-    m: float,
-    I_z: float,
-    l_f: float,
-    l_r: float,
-    stiffness_lost: ArrayLike,
-    v_x: float,
+    *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
-
-    m : mass [kg].
-    I_z : yaw inertia [kg m²].
-    l_f : center of gravity to front axle [m].
-    l_r : center of gravity to rear axle [m].
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
-    v_x : speed [m/s].
     """
     require_positive(ValueError, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
@@ -292,10 +259,7 @@ def estimated_input_feedback(
 
 
 def minimal_decay(feedback: ArrayLike) -> float:
-    """Smallest a [1/s] with -a I + J_f K Hurwitz.
-
-    feedback : (2, 2) J_f K [1/s].
-    """
+    """Smallest a [1/s] with -a I + J_f K Hurwitz.   feedback : (2, 2) J_f K [1/s]."""
     return float(np.max(np.linalg.eigvals(np.asarray(feedback)).real))
 
 
@@ -315,24 +279,15 @@ def minimal_decay(feedback: ArrayLike) -> float:
 def largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
-    """Bound of every signal that a network may read, SI.
-
-    v_x : speed [m/s].
-    slip : largest slip angle [rad].
-    friction : μ [-].
-    """
+    """Bound of every signal that a network may read, SI."""
     require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
     v_y = vehicle.l_r * r + v_x * slip
     return {
-        "v_y": v_y,
-        "r": r,
-        "delta_f": slip + (v_y + vehicle.l_f * r) / v_x,
-        "delta_r": slip + (v_y + vehicle.l_r * r) / v_x,
-        "v_x": v_x,
-        "alpha_f": slip,
+        "v_y": v_y, "r": r, "delta_f": slip + (v_y + vehicle.l_f * r) / v_x,
+        "delta_r": slip + (v_y + vehicle.l_r * r) / v_x, "v_x": v_x, "alpha_f": slip,
         "alpha_r": slip,
-    }
+    }  # fmt: skip
 
 
 def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
@@ -351,9 +306,7 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
 
 def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
-
     vehicle : the car; its stiffness is at least half that of the tires.
-    slip : largest slip angle [rad].
     """
     require_positive(ValueError, slip=slip)
     return slip * math.hypot(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
@@ -363,9 +316,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
     """Force that the linear tire misses on a usual tire, F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))).
 
     No bound, but what the network must be able to hold where both axles are at the slip [N].
-
-    slip : largest slip angle [rad].
-    friction : μ [-].
     """
     require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)
@@ -376,9 +326,7 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
 def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -> Disturbance:
     """Return bounds of all that acts on the error dynamics, proven for the declared driving.
-
-    dt : sampling interval [s].
-    unit : force unit U [N].
+    dt : sampling interval [s].   unit : force unit U [N].
     """
     C, lever = _stiffness(vehicle), np.array([vehicle.l_f, vehicle.l_r])
     K_inv = np.abs(np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv)))
@@ -418,14 +366,9 @@ def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float
     speed = driving.noise_v_x * (signals["v_y"] + vehicle.wheelbase * signals["r"]) / slow
     slip = driving.noise_delta + (sideways + speed) / (slow - driving.noise_v_x)
     noise = {
-        "v_y": driving.noise_v_y,
-        "r": driving.noise_r,
-        "delta_f": driving.noise_delta,
-        "delta_r": driving.noise_delta,
-        "v_x": driving.noise_v_x,
-        "alpha_f": slip,
-        "alpha_r": slip,
-    }
+        "v_y": driving.noise_v_y, "r": driving.noise_r, "delta_f": driving.noise_delta,
+        "delta_r": driving.noise_delta, "v_x": driving.noise_v_x, "alpha_f": slip, "alpha_r": slip,
+    }  # fmt: skip
     assert design.network.scale is not None
     named = zip(design.network.inputs, design.network.scale, strict=True)
     return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
@@ -433,7 +376,6 @@ def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float
 
 def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
     """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
-
     driving : how hard it is driven; the slowest speed counts.
     """
     slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x
@@ -455,13 +397,10 @@ def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
     found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
     expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
     feedback = estimated_input_feedback(
-        m=vehicle.mass,
-        I_z=vehicle.yaw_inertia,
-        l_f=vehicle.l_f,
-        l_r=vehicle.l_r,
+        m=vehicle.mass, I_z=vehicle.yaw_inertia, l_f=vehicle.l_f, l_r=vehicle.l_r,
         stiffness_lost=(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear),
         v_x=(1.0 - SPEED_SPREAD) * driving.v_x,
-    )
+    )  # fmt: skip
     estimated = design.input_source == "estimated"
     return Operation(
         n_h=design.network.hidden,

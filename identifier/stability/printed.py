@@ -30,11 +30,8 @@ from models.rules import require_positive
 
 def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h (|P| + (η/ρ) |A_d⁻¹|)]/2, the one that gives (14) as printed [U].
-
-    W_M : bound on the ideal weights (Frobenius) [U].
-    n_h : hidden units; |s| <= √n_h.
-    eta_W : learning rate of (11).
-    rho_W : leakage gain of (11) [1/(U s²)].
+    W_M : bound on the ideal weights (Frobenius) [U].   n_h : hidden units; |s| <= √n_h.
+    eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, rho_W=rho_W)
     inverse = float(np.linalg.norm(np.linalg.inv(pair.A_d), 2))
@@ -55,9 +52,7 @@ def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: 
 
 def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    eta_W : learning rate of (11).
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, eta_W=eta_W, rho_W=rho_W)
@@ -87,14 +82,9 @@ def k_b_with_V(
     k_b² = (K1² + c l2 K1 K2 + c K2²)/(1 - c l2²/4), c l2² < 4. It grows with c: as c -> 0 the V
     layer costs nothing, because w_bar already holds what V_hat does to the force, and V_hat itself
     is bounded by its leakage.
-
-    k_b : K1, of `printed_k_b` or `tight_k_b` [U].
-    A_d : (2, 2) error dynamics [1/s].
-    W_M : bound on the ideal W (Frobenius) [U].
-    V_M : bound on the ideal V (Frobenius) [-].
-    eta_V : learning rate of (12).
-    rho_V : leakage gain of (12) [1/(U s²)].
-    weight : c > 0.
+    k_b : K1, of `printed_k_b` or `tight_k_b` [U].   A_d : (2, 2) error dynamics [1/s].
+    W_M : bound on the ideal W (Frobenius) [U].   V_M : bound on the ideal V (Frobenius) [-].
+    eta_V : learning rate of (12).   rho_V : leakage gain of (12) [1/(U s²)].   weight : c > 0.
     """
     require_positive(ValueError, rho_V=rho_V, weight=weight)
     inverse = float(np.linalg.norm(np.linalg.inv(np.asarray(A_d, dtype=np.float64)), 2))
@@ -108,7 +98,6 @@ def k_b_with_V(
 
 def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     """B = 2 (|P| w_bar + k_b²)/λ_min(Q) of (14) [U s]: where L' < 0, not yet an ultimate bound.
-
     w_bar : bound on the approximation error [U].
     k_b : of `printed_k_b`, `tight_k_b` or `k_b_with_V` [U].
     """
@@ -119,9 +108,7 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
     """γ sup|f| [U s]: the ultimate bound of an identifier that has no network at all.
 
     A bound above this one says nothing about learning.
-
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    residual_bound : sup|f| [U].
+    A_d : (2, 2) Hurwitz error dynamics [1/s].   residual_bound : sup|f| [U].
     """
     return peak_gain(A_d) * residual_bound
 
@@ -129,7 +116,6 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _UltimateBound:
     """The largest |ξ̃| of the sublevel set of L that contains the whole set L' >= 0.
-
     xi_tilde : limsup |ξ̃| does not exceed it [U s].
     worst_y : |W_t| at which the maximum is taken [U].
     """
@@ -144,9 +130,7 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     b_UUB² = max over 0 <= y <= w_b of [λ_max(P) x(y)² + y²/ρ_W]/λ_min(P), with
     x(y) = max(0, b - (2/λ_min(Q)) (y - k_b)²) and w_b = k_b + sqrt(k_b² + |P| w_bar). The objective
     is a quartic where x > 0: its stationary points are roots of a cubic, none is missed.
-
-    w_bar : bound on the approximation error [U].
-    k_b : of `printed_k_b` or `tight_k_b` [U].
+    w_bar : bound on the approximation error [U].   k_b : of `printed_k_b` or `tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, rho_W=rho_W)
@@ -178,7 +162,6 @@ def printed_bounds(
     gains: Gains, law: DrivingError, operation: Operation, trivial: float
 ) -> list[Property]:
     """State b of (14) by the printed and the tight route, with the V layer, and b_UUB [U s].
-
     gains : of (8) to (12), with leakage.
     trivial : bound of an identifier without a network [U s].
     """
@@ -188,14 +171,8 @@ def printed_bounds(
     k_b = printed_k_b(pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
     tight = tight_k_b(tight_pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
     entries = {
-        "printed_bound": (
-            "bound (14), printed route",
-            bound_14(pair, w_bar=w_bar, k_b=k_b),
-        ),
-        "tight_bound": (
-            "bound (14), tight route",
-            bound_14(tight_pair, w_bar=w_bar, k_b=tight),
-        ),
+        "printed_bound": ("bound (14), printed route", bound_14(pair, w_bar=w_bar, k_b=k_b)),
+        "tight_bound": ("bound (14), tight route", bound_14(tight_pair, w_bar=w_bar, k_b=tight)),
         "ultimate_bound": (
             "true ultimate bound behind (14)",
             ultimate_bound(pair, w_bar=w_bar, k_b=k_b, rho_W=rho_W).xi_tilde,
@@ -212,7 +189,6 @@ def printed_bounds(
 
 def _best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
     """Return P and Q = q I with |P| = W_M/√n_h + (η/ρ) |A_d⁻¹|, where the printed b is smallest.
-
     gains : of (8) to (12), with leakage.
     """
     unit = lyapunov(gains.matrix, np.eye(2))

@@ -45,7 +45,6 @@ from models.rules import require_positive
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
     """Bounds of the residual, of the noise, and of what a held input leaves out.
-
     residual : sup|f|, the force the linear tire misses as the samples show it, with what sensors
         add to A_ξ ξ + B_ξ u [U].
     noise : sup of the sensors' error of ξ, which is in every measured ξ̃ [U s].
@@ -72,7 +71,6 @@ _NEWTON_STEPS = 100
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledBounds:
     """What the state of the running identifier never exceeds.
-
     xi_tilde : bound on |ξ̃| at every sample [U s].
     stage : bound on |ξ̃| at the inner stages too [U s]; leakage acts with it.
     W : bound on |W_hat| [U].
@@ -86,11 +84,8 @@ class SampledBounds:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorGains:
     """How large an error what acts on it can hold.
-
-    start : τ, largest growth of an error that is left alone [-].
-    force : γ_f of the residual [s].
-    rate : γ_ξ of ξ' [s].
-    weights : γ_i of the force of the network at each stage [s].
+    start : τ, largest growth of an error that is left alone [-].   force : γ_f of the residual [s].
+    rate : γ_ξ of ξ' [s].   weights : γ_i of the force of the network at each stage [s].
     inner : for stages 2 to 4, the factors on |ξ̃|, and on |A_ξ ξ + B_ξ u| and each f_hat before.
     """
 
@@ -103,10 +98,8 @@ class ErrorGains:
 
 def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
     """Return the gains of the error dynamics.
-
     A_d : (2, 2) error dynamics [1/s], which the step keeps stable.
-    integrator : "euler", "rk4" or "exact" (continuous time).
-    dt : sampling interval [s].
+    integrator : "euler", "rk4" or "exact" (continuous time).   dt : sampling interval [s].
     """
     if integrator == "exact":
         gamma = peak_gain(A_d)
@@ -127,11 +120,7 @@ def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
     inner = (  # ξ̃ of each stage = first ξ̃ - second dt known - third dt f_hat
         (eye + Z / 2.0, eye / 2.0, (eye / 2.0,)),
         (eye + Z / 2.0 + Z2 / 4.0, eye / 2.0 + Z / 4.0, (Z / 4.0, eye / 2.0)),
-        (
-            eye + Z + Z2 / 2.0 + Z3 / 4.0,
-            eye + Z / 2.0 + Z2 / 4.0,
-            (Z2 / 4.0, Z / 2.0, eye),
-        ),
+        (eye + Z + Z2 / 2.0 + Z3 / 4.0, eye + Z / 2.0 + Z2 / 4.0, (Z2 / 4.0, Z / 2.0, eye)),
     )
     return ErrorGains(
         start=power_norms(R, eye)[0],
@@ -147,11 +136,8 @@ def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Learning:
     """How the weights of one layer are driven and leak.
-
-    law : coefficients of z and ξ̃ in the driving error.
-    forgetting : λ [1/s].
-    leakage : ρ [1/(U s²)].
-    drive : g', what |driving error| moves the weights by.
+    law : coefficients of z and ξ̃ in the driving error.   forgetting : λ [1/s].
+    leakage : ρ [1/(U s²)].   drive : g', what |driving error| moves the weights by.
     dt : sampling interval [s]; 0 in continuous time.
     staged : whether the step has inner stages (RK4).
     free : radius of the dead zone of the leakage, in the unit of the weights.
@@ -167,7 +153,6 @@ class Learning:
 
     def kept(self, X: float) -> float:
         """Bound on the weights while |ξ̃| <= X; inf where the leakage of a step is too large.
-
         X : bound on |ξ̃| at every stage [U s].
         """
         (c_z, c_xi), lam = self.law, self.forgetting
@@ -183,7 +168,6 @@ class Learning:
 
     def beyond(self, X: float) -> tuple[float, ...]:
         """What inner stages may lie beyond the weights of the sample, one for each stage.
-
         X : bound on |ξ̃| at every stage [U s].
         """
         if not self.staged:
@@ -200,10 +184,7 @@ def output_layer(
     gains: Gains, law: DrivingError, direction: Array, *, n_h: int, integrator: str, dt: float
 ) -> Learning:
     """Return how W is driven: g' = η_W |D| √n_h.
-
-    gains : of (8) to (12).
-    direction : (2, 2) D [s].
-    integrator : "euler", "rk4" or "exact".
+    gains : of (8) to (12).   direction : (2, 2) D [s].   integrator : "euler", "rk4" or "exact".
     dt : sampling interval [s].
     """
     return Learning(
@@ -223,10 +204,7 @@ def by_leakage(
     """Return the bounds that leakage gives, or None where the circle does not close.
 
     The smallest X >= F(X), F increasing and convex, by Newton from below.
-
-    error : of `error_gains`.
-    learning : of `output_layer`.
-    A_d : (2, 2) error dynamics [1/s].
+    error : of `error_gains`.   learning : of `output_layer`.   A_d : (2, 2) error dynamics [1/s].
     """
 
     def around(X: float) -> tuple[float, float, float]:
@@ -259,9 +237,7 @@ def by_projection(
     error: ErrorGains, A_d: Array, acting: Disturbance, *, n_h: int, W_max: float
 ) -> SampledBounds:
     """Return the bounds while |W_hat| <= W_max at every stage: for any law and any gain.
-
-    error : of `error_gains`.
-    A_d : (2, 2) error dynamics [1/s].
+    error : of `error_gains`.   A_d : (2, 2) error dynamics [1/s].
     W_max : radius of the projection (Frobenius) [U].
     """
     forces = (math.sqrt(n_h) * W_max,) * len(error.weights)

@@ -7,19 +7,7 @@ from identifier.verdict.judging import judge, judge_identification, judge_predic
 from identifier.verdict.verdict import Number, Objection, Verdict, WindowForces
 
 __all__ = [
-    "BoundViolatedError",
-    "Number",
-    "Objection",
-    "Road",
-    "RoadFriction",
-    "Verdict",
-    "WindowForces",
-    "calibrated",
-    "contradictions",
-    "guaranteed",
-    "judge",
-    "judge_identification",
-    "judge_prediction",
-    "road_friction",
-    "within_band",
-]
+    "BoundViolatedError", "Number", "Objection", "Road", "RoadFriction", "Verdict", "WindowForces",
+    "calibrated", "contradictions", "guaranteed", "judge", "judge_identification",
+    "judge_prediction", "road_friction", "within_band",
+]  # fmt: skip

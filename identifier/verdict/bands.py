@@ -86,7 +86,6 @@ def calibrated(
     """Return the model frozen at a time, its band calibrated; as frozen where that cannot be done.
 
     It cannot where the model has no band, or too little is driven.
-
     t : time of the freeze in the recording's own clock [s]; None is the end.
     verdict : what `judge` said of that time; None asks it where it is needed.
     """
@@ -134,9 +133,7 @@ def calibration(
     missed: Missed, noise: Array, windows: Windows, told: BandCalibration
 ) -> BandCalibration | None:
     """Return factors and color of errors on segments that did not teach; None: too few windows.
-
     noise : variance of the sensors' white noise in them (2,).
-    told : what else is kept of the drive, and factors of an axle that has too few windows.
     """
     factors, speeds = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
     for i in range(2):
@@ -173,9 +170,7 @@ def _shared(values: Array, share: Array, everywhere: float) -> float:
 
 def quantile(values: Array, share: Array) -> float:
     """Return what the next value stays below in a share `LEVEL` of cases; inf: too few to tell.
-
-    values : of windows that overlap by half (m,).
-    share : of each that counts (m,).
+    values : of windows that overlap by half (m,).   share : of each that counts (m,).
     """
     order = np.argsort(values)
     count = np.cumsum(share[order])
@@ -190,7 +185,6 @@ def color_of(error: Array, windows: Windows) -> float:
 
     The sum of their autocorrelation, over windows that do not overlap, until it is first not
     positive.
-
     error : of the windows, nan where nothing was asked (m,).
     """
     step = max(1, windows.n // 2)

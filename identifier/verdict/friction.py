@@ -47,7 +47,6 @@ _SIMILAR = 0.1  # of ln μ: by so much roads of a tire are not similar
 
 class Road(NamedTuple):
     """A segment of another friction than that of the drive that taught.
-
     first, last : from when to when it was told, in the recording's own clock [s].
     ratio : friction over that of the drive that taught [-].   sd : standard deviation of it [-].
     """
@@ -59,7 +58,6 @@ class Road(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The segment in words."""
         return (
             f"from {self.first:.4g} to {self.last:.4g} s the road has "
             f"{with_doubt(self.ratio, self.sd)} of the friction of the identification drive"
@@ -68,7 +66,6 @@ class Road(NamedTuple):
 
 class RoadFriction(NamedTuple):
     """Friction over that of the drive that taught, window by window of 0.3 s.
-
     t : end of the windows, in the recording's own clock [s], (m,).
     ratio : friction, mean of its logarithm [-], (m,).
     sd : standard deviation of the logarithm [-], (m,).
@@ -114,7 +111,6 @@ def road_friction(
     Nobody can of a model without a calibrated band, and of a drive of fewer than eight brisk
     windows. More friction is told of a model alone that learnt its grip. Of a long drive those
     parts are asked that the verdict asks.
-
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """
@@ -144,7 +140,6 @@ def road_friction(
 
 def filtered(t: Array, grid: Array, away: Array, slope: Array, variance: Array) -> RoadFriction:
     """Return the friction that windows tell one after the other.
-
     t : end of the windows [s], rising, (m,).
     grid : ln μ of the frictions that are held for possible, rising, one of them 0, (k,).
     away : what each of them leaves of the force that was shown [static axle loads], (k, m, 2).

@@ -48,7 +48,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
 
     None without a lateral velocity that was measured: slip would be what the model makes of it.
     None of a model whose forces are no curves of slip.
-
     model : frozen; its lag, sway and offsets make the slip.
     road : what a banked road pushes to the left at each sample [weights], (n,); None unknown.
     """
@@ -80,8 +79,6 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
 
 def triangle(n: int, dt: float) -> tuple[Array, Array]:
     """Return g (n + 1,), and the weights whose product with ξ is Σ g dξ/dt [1/s].
-
-    n : steps of a moment.
     dt : sampling interval [s].
     """
     step = np.minimum(np.arange(n) + 0.5, n - np.arange(n) - 0.5)  # of each step, in its middle
@@ -100,7 +97,6 @@ def guaranteed(
 
     There is none where the method learns no curve of slip, no lateral velocity was measured, or too
     little is driven.
-
     bound : of the errors: their size [static axle loads] of both axles, or a `ForceBound`; None
         estimates it from the drive.
     t : time of the freeze in the recording's own clock [s]; None is the end.

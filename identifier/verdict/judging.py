@@ -44,7 +44,6 @@ ROADS = 3  # segments of another friction that are listed one by one
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
     """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
-
     missed : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
     doubt : standard deviation of the curve over the prior's, where the force is [-].
@@ -81,18 +80,15 @@ class Asked(NamedTuple):
 
     @property
     def recording(self) -> Recording:
-        """What is asked of the drive."""
         return self.portion.recording
 
     @property
     def forceless(self) -> list[bool]:
-        """Which axles have no force to judge by."""
         return [bool(peak < RULES.force) for peak in self.found.peak]
 
 
 def judge(history: History, t: float | None = None) -> Verdict:
     """Return the verdict on a run: on the model that was frozen, over all of its recording.
-
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
     model, whole = history.freeze(t), history.recording
@@ -109,7 +105,6 @@ def judge_identification(
     reached: Sequence[Reached] | None = None,
 ) -> Verdict:
     """Return the verdict on a model over the drive that taught it.
-
     frozen : samples that taught; None is all of them.
     reached : numbers that rest at their bounds; None asks the model.
     """
@@ -125,7 +120,6 @@ def judge_prediction(
     model: TireModel, recording: Recording, *, another_road: bool = True
 ) -> Verdict:
     """Return the verdict on a stored model over a drive: does it give back the drive's motion?
-
     another_road : whether the road may be another one than that which taught, and its friction is
         reported; of a drive that taught the model it is not.
     """
@@ -173,16 +167,9 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
 
 def _findings(asked: Asked) -> list[Objection]:
     rules = (
-        _v_y_stuck,
-        _no_force,
-        _missed,
-        _left_out,
-        _unsure,
-        _no_tire,
-        _beyond,
-        _turning,
+        _v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning,
         _unobserved,
-    )
+    )  # fmt: skip
     return [finding for rule in rules for finding in rule(asked)]
 
 
@@ -351,7 +338,6 @@ def _roads(found: RoadFriction | None) -> list[Objection]:
 
 
 def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict:
-    """Return the verdict of what was found."""
     model, recording, found = asked.model, asked.recording, asked.found
     if len(recording) < len(whole):
         minutes = len(recording) * whole.dt / 60.0, whole.duration / 60.0

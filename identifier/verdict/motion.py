@@ -29,10 +29,7 @@ _CONFINED = 0.6  # and of what is missed with the piece
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Windows:
     """Where means are taken: half-overlapping windows of n samples in which the car drives.
-
-    starts : index of the first sample of each window (m,).
-    n : steps in a window.
-    duration : T [s].
+    starts : index of the first sample of each window (m,).   duration : T [s].
     """
 
     starts: NDArray[np.intp]
@@ -42,23 +39,16 @@ class Windows:
     @classmethod
     def of(cls, recording: Recording, min_speed: float) -> "Windows":
         """Return the windows of a recording.
-
         min_speed : a window counts where the car is never slower [m/s], in one segment.
         """
         return cls.where(recording.v_x >= min_speed, recording, WINDOW)
 
     @classmethod
     def where(
-        cls,
-        counts: NDArray[np.bool_],
-        recording: Recording,
-        length: float,
-        overlapping: int = 2,
+        cls, counts: NDArray[np.bool_], recording: Recording, length: float, overlapping: int = 2
     ) -> "Windows":
         """Return the windows of a length in one segment of which every sample counts.
-
-        counts : which samples do (n,).
-        length : of a window [s].
+        counts : which samples do (n,).   length : of a window [s].
         """
         n = max(2, round(length / recording.dt))
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
@@ -68,12 +58,10 @@ class Windows:
         return cls(starts=starts[whole], n=n, duration=n * recording.dt)
 
     def __len__(self) -> int:
-        """Return how many there are."""
         return int(self.starts.size)
 
     def mean(self, signal: Array) -> Array:
         """Return means over the windows by the trapezoidal rule, (m,) or (m, k).
-
         signal : samples (n,) or (n, k).
         """
         steps = 0.5 * (signal[1:] + signal[:-1])
@@ -83,7 +71,6 @@ class Windows:
 
     def rate(self, signal: Array) -> Array:
         """Return rates of change over the windows, (m,) or (m, k).
-
         signal : samples (n,) or (n, k).
         """
         change: Array = signal[self.starts + self.n] - signal[self.starts]
@@ -94,7 +81,6 @@ def measured_force(
     recording: Recording, vehicle: Vehicle, windows: Windows, road: Array | None = None
 ) -> Array:
     """Return mean axle forces that the motion shows [static axle loads], (m, 2).
-
     recording : v_x, v_y and r; where no v_y was logged, a_y and r.
     road : what a banked road pushes to the left at each sample, taken off [weights], (n,); without
         v_y what the accelerometer shows beside forces; None where nobody knows of it.
@@ -145,7 +131,6 @@ def lateral_noise(recording: Recording, windows: Windows) -> tuple[float, float]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """Measured and modelled mean forces over the windows of a drive.
-
     measured, modelled : [static axle loads], (m, 2).
     noise : variance of white sensor noise in `measured` (2,).
     """
@@ -211,9 +196,7 @@ class Evidence:
 
 def clean_rms(signal: Array, noise: Array) -> Array:
     """Return the root mean square of a signal whose noise has a known variance, (2,).
-
-    signal : (m, 2).
-    noise : its variance (2,).
+    signal : (m, 2).   noise : its variance (2,).
     """
     rms: Array = np.sqrt(np.maximum(np.mean(signal**2, axis=0) - noise, 0.0))
     return rms
@@ -221,9 +204,7 @@ def clean_rms(signal: Array, noise: Array) -> Array:
 
 def clean_share(missed: Array, force: Array, noise: Array) -> Array:
     """Return the rms of what is missed over that of the force, (2,); one where there is no force.
-
-    missed, force : (m, 2).
-    noise : variance in `missed` (2,).
+    missed, force : (m, 2).   noise : variance in `missed` (2,).
     """
     size = np.sqrt(np.mean(force**2, axis=0))
     share: Array = np.divide(clean_rms(missed, noise), size, out=np.ones(2), where=size > 0.0)
@@ -261,7 +242,6 @@ class MotionError:
 
     The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
     small the forces are right, where it is large they need not be wrong.
-
     lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
     """
 
@@ -282,7 +262,6 @@ def motion_error(
     force: Array, recording: Recording, vehicle: Vehicle, counted: NDArray[np.bool_]
 ) -> MotionError | None:
     """Return what axle forces miss of the measured motion; None where no window counts.
-
     force : lateral axle forces (n, 2) [N], frame of the body.
     counted : samples that count (n,); a window counts where all of its samples do, in one segment.
     """

@@ -42,7 +42,6 @@ class _AskedRun(NamedTuple):
 
 def asked_run(history: History, t: float | None = None) -> _AskedRun:
     """Return what of a run is asked.
-
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
     model, whole = history.freeze(t), history.recording

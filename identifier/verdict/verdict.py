@@ -27,7 +27,6 @@ WITHOUT_V_Y = (
 
 class Objection(NamedTuple):
     """A finding on a model.
-
     code : for machines.   axle : that it is about, None for the car or the drive.
     text : what it means and the likely cause, one line.   refuses : whether it makes it not valid.
     """
@@ -39,15 +38,13 @@ class Objection(NamedTuple):
 
     @property
     def line(self) -> str:
-        """The finding as a line of text."""
         where = f"{self.axle} axle: " if self.axle else ""
         return f"{'not valid' if self.refuses else 'note'}: {where}{self.text}"
 
 
 class Number(NamedTuple):
     """A number of one axle, identified or not.
-
-    title, axle : what.   value, unit : how much.   sd : its standard deviation ±, None unknown.
+    sd : its standard deviation ±, None unknown.
     declared : value in the vehicle file or None.   identified : whether the drive decided it.
     valid : whether it is identified, within its bounds, and nothing was found against its axle.
     """
@@ -76,7 +73,6 @@ class Number(NamedTuple):
 
 class WindowForces(NamedTuple):
     """Forces over the windows that an answer is judged by [static axle loads].
-
     t : middle of each window (m,) [s].   measured : mean force in the motion (m, 2).
     modelled : that of the model (m, 2).
     """

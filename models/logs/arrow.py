@@ -53,9 +53,7 @@ def _of_arrow(block: bytes) -> Any:
 
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
-
-    block : whole lines in UTF-8.
-    wanted : column from 0 -> how its cells are read.
+    block : whole lines in UTF-8.   wanted : column from 0 -> how its cells are read.
     """
     import pyarrow
     import pyarrow.csv
@@ -106,7 +104,6 @@ def words(cells: Any) -> Words:
     """Return cells of any type as the distinct words of them, "" where one is missing.
 
     What a dictionary keeps once is never written out row by row.
-
     cells : array of pyarrow, (n,).
     """
     import pyarrow
@@ -122,7 +119,6 @@ def words(cells: Any) -> Words:
 
 def doubles(cells: Any) -> NDArray[np.float64]:
     """Return numbers of any type as float64, (n,), NaN where one is missing.
-
     cells : array of pyarrow, (n,).
     """
     import pyarrow
@@ -134,10 +130,7 @@ def doubles(cells: Any) -> NDArray[np.float64]:
 
 
 def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
-    """Return whole numbers or instants [ns] as int64, (n,).
-
-    cells : array of pyarrow, (n,).
-    """
+    """Return whole numbers or instants [ns] as int64, (n,).   cells : array of pyarrow, (n,)."""
     import pyarrow
 
     if pyarrow.types.is_timestamp(cells.type):

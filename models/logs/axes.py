@@ -63,9 +63,7 @@ class Found(NamedTuple):
 
 def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z.
-
-    words : of each channel's name.
-    units : of each channel, "" where none is told.
+    words : of each channel's name.   units : of each channel, "" where none is told.
     """
     found: dict[tuple[str, ...], dict[str, str]] = {}
     quantity_of: dict[tuple[str, ...], str] = {}
@@ -148,9 +146,6 @@ def along_axes(
     steering: str,
 ) -> Found:
     """Return what the channels of triads are by their numbers, where their letters mislead.
-
-    found : the triads of a log.
-    seen : channels that were read.
     speed, yaw_rate, lateral, steering : channels of the forward speed, r, a_y and δ by their names;
         but for the speed in no triad; "" where there is none.
     """

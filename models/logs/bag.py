@@ -65,30 +65,20 @@ KNOWN = {
 }
 # By package-free type and field: the unit of it and of all in it.
 UNITS = {
-    ("Twist", "linear"): "m/s",
-    ("Twist", "angular"): "rad/s",
-    ("Accel", "linear"): "m/s^2",
-    ("Accel", "angular"): "rad/s^2",
-    ("Pose", "position"): "m",
-    ("Imu", "angular_velocity"): "rad/s",
-    ("Imu", "linear_acceleration"): "m/s^2",
+    ("Twist", "linear"): "m/s", ("Twist", "angular"): "rad/s", ("Accel", "linear"): "m/s^2",
+    ("Accel", "angular"): "rad/s^2", ("Pose", "position"): "m",
+    ("Imu", "angular_velocity"): "rad/s", ("Imu", "linear_acceleration"): "m/s^2",
     ("AckermannDrive", "steering_angle"): "rad",
-    ("AckermannDrive", "steering_angle_velocity"): "rad/s",
-    ("AckermannDrive", "speed"): "m/s",
-    ("AckermannDrive", "acceleration"): "m/s^2",
-    ("AckermannDrive", "jerk"): "m/s^3",
+    ("AckermannDrive", "steering_angle_velocity"): "rad/s", ("AckermannDrive", "speed"): "m/s",
+    ("AckermannDrive", "acceleration"): "m/s^2", ("AckermannDrive", "jerk"): "m/s^3",
     ("SteeringReport", "steering_tire_angle"): "rad",
     ("VelocityReport", "longitudinal_velocity"): "m/s",
-    ("VelocityReport", "lateral_velocity"): "m/s",
-    ("VelocityReport", "heading_rate"): "rad/s",
-}
+    ("VelocityReport", "lateral_velocity"): "m/s", ("VelocityReport", "heading_rate"): "rad/s",
+}  # fmt: skip
 PACKAGES = (
-    "geometry_msgs",
-    "sensor_msgs",
-    "ackermann_msgs",
-    "autoware_vehicle_msgs",
+    "geometry_msgs", "sensor_msgs", "ackermann_msgs", "autoware_vehicle_msgs",
     "autoware_auto_vehicle_msgs",
-)
+)  # fmt: skip
 
 
 class _Topic(NamedTuple):
@@ -121,7 +111,6 @@ _OF_TF = tuple(
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
-    """List the channels of a bag."""
     with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
         definitions, undefined = _definitions(path, bag)
         topics, rates, skipped = _topics(bag, definitions)
@@ -224,7 +213,6 @@ def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
 
 
 def _plugin(path: Path) -> str:
-    """Return what rosbags reads a path by."""
     if path.is_dir():
         return "dir"
     with path.open("rb") as file:
@@ -382,7 +370,6 @@ class _Reading:
         self.parts = {name: Growing() for name in fields}
 
     def add(self, time: int, raw: bytes) -> None:
-        """Take the next message."""
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)
@@ -390,7 +377,6 @@ class _Reading:
             self._read()
 
     def _read(self) -> None:
-        """Read the messages that were taken."""
         raws, stamp = self.raws, self.topic.stamp
         ns = np.array(self.times, dtype=np.int64)
         values = {name: np.empty(len(raws)) for name in self.fields}
@@ -465,7 +451,6 @@ def _unit(field: Field) -> str:
 
 
 def _said(topics: Sequence[_Topic], skipped: Mapping[str, str]) -> tuple[str, ...]:
-    """Return what is left out or taken for granted."""
     received = [topic.name for topic in topics if topic.stamp is None]
     return (
         *noted("no stamp in the message, its clock is when the bag received it", received),

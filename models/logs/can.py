@@ -39,7 +39,6 @@ _Selectors = tuple[tuple[Any, tuple[int, ...]], ...]
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class _Group:
     """Signals that are sent together: they share a clock.
-
     t : when they were sent [s], (n,).
     data : of the frames of one identifier on one bus, (m, bytes).
     sent : which of the frames hold the signals, (n,); None where all do.
@@ -54,8 +53,7 @@ class _Group:
         """Return a signal in its unit, (n,)."""
         data, sent = self.data, self.sent
         return filled(
-            self.t.size,
-            lambda part: values_of(data[part if sent is None else sent[part]], signal),
+            self.t.size, lambda part: values_of(data[part if sent is None else sent[part]], signal)
         )
 
 
@@ -82,7 +80,6 @@ class _Dbc(NamedTuple):
 
 
 def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
-    """Read signals, frame by frame."""
     groups: dict[_Group, dict[str, Any]] = {}
     for listed, place in asked:
         if place.fault:
@@ -244,7 +241,6 @@ def _sent(frames: Frames, selectors: _Selectors) -> NDArray[np.intp] | None:
 
 def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """Return a signal in its unit, (n,), NaN where the DBC says that a value is no number.
-
     data : of the frames, (n, bytes).
     """
     raw = raw_values(data, signal)
@@ -262,7 +258,6 @@ def _words(name: Any) -> str:
 
 def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     """Return the integers, or floats, of a signal as they are in frames, (n,).
-
     data : of the frames, (n, bytes).
     """
     length, little = signal.length, signal.byte_order == "little_endian"

@@ -76,7 +76,6 @@ def fields_of(
 
 
 def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
-    """Return the layout of a message."""
     order = ORDERS.get(bytes(raw[:2]))
     if order is None:
         raise CdrError("a message is not plain CDR")
@@ -88,10 +87,7 @@ def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
 
 
 def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Return which messages have a layout.
-
-    messages : (n, size).
-    """
+    """Return which messages have a layout.   messages : (n, size)."""
     order = next(word for word, one in ORDERS.items() if one == layout.order)
     same: NDArray[np.bool_] = np.all(messages[:, :2] == np.frombuffer(order, np.uint8), axis=1)
     for place, value in layout.lengths:
@@ -101,10 +97,7 @@ def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def numbers(layout: Layout, messages: NDArray[np.uint8], field: Field) -> NDArray[Any]:
-    """Return a number of each message, (n,), as it is stored.
-
-    messages : (n, size).
-    """
+    """Return a number of each message, (n,), as it is stored.   messages : (n, size)."""
     place, kind = layout.places[field.path], np.dtype(layout.order + field.kind)
     raw = np.ascontiguousarray(messages[:, place : place + kind.itemsize])
     return raw.reshape(-1).view(kind)
@@ -132,7 +125,6 @@ class _Walk:
                 self.many(value[0], count, depth)
 
     def one(self, node: Any, path: str | None, depth: int) -> None:
-        """Go through one value."""
         number, value = _kind(node), node[1]
         if number == NAME:
             self.message(value, None if path is None else f"{path}.", depth + 1)
@@ -170,7 +162,6 @@ class _Walk:
         return size
 
     def length(self) -> int:
-        """Read a length."""
         self.align("uint32")
         place = self.place + PREFIX
         if place + 4 > len(self.raw):

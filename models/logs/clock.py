@@ -37,7 +37,6 @@ class Segment(NamedTuple):
 
 class Raw(NamedTuple):
     """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand.
-
     holes : how many cells without a value were cut out.
     """
 
@@ -59,7 +58,6 @@ def holes(channel: Channel) -> NDArray[np.intp]:
 
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     """Return a channel without the empty cells that a slower channel has in a table.
-
     cut : whether `holes` are left out too; else they stay, and are refused.
     """
     kept = ~np.isnan(channel.values)
@@ -77,9 +75,7 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
 
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
-
-    t : rising time stamps [s], (n,).
-    longest : time without a sample that is none yet [s].
+    t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
     limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
     found = [part.start + 1 + np.flatnonzero(steps > limit) for part, steps in _steps(t)]
@@ -88,7 +84,6 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
 
 def typical_step(t: Array) -> float:
     """Return the median time between samples [s], of all of them; NaN of one.
-
     t : rising time stamps [s], (n,).
     """
     steps = large((max(t.size - 1, 0),))
@@ -108,10 +103,7 @@ def _steps(t: Array) -> Iterator[tuple[slice, Array]]:
 
 
 def are_one_clock(raws: Sequence[Raw]) -> bool:
-    """Whether all signals are sampled at the same instants.
-
-    raws : at least one.
-    """
+    """Whether all signals are sampled at the same instants."""
     first = raws[0].t
     return all(raw.t is first or np.array_equal(raw.t, first) for raw in raws[1:])
 
@@ -120,9 +112,7 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
     """Return signals of several clocks on one, in the segments in which all of them are there.
 
     Clocks of the calendar are compared since their first instant, to the microsecond.
-
-    raws : by signal; times rise.
-    dt : step of the clock [s].
+    raws : by signal; times rise.   dt : step of the clock [s].
     longest : time without a sample that is no gap yet [s].
     """
     zero = min(float(raw.t[0]) for raw in raws.values())
@@ -165,31 +155,22 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
         first = t[np.concatenate([[0], cuts])]
         last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
         own = list(zip(first.tolist(), last.tolist(), strict=True))
-        spans = _intersection(spans, own)
+        found, i, j = [], 0, 0
+        while i < len(spans) and j < len(own):
+            begin, end = max(spans[i][0], own[j][0]), min(spans[i][1], own[j][1])
+            if begin < end:
+                found.append((begin, end))
+            if spans[i][1] < own[j][1]:
+                i += 1
+            else:
+                j += 1
+        spans = found
     return spans
-
-
-def _intersection(
-    one: list[tuple[float, float]], other: list[tuple[float, float]]
-) -> list[tuple[float, float]]:
-    """Return where both lists of rising spans hold."""
-    found, i, j = [], 0, 0
-    while i < len(one) and j < len(other):
-        begin, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
-        if begin < end:
-            found.append((begin, end))
-        if one[i][1] < other[j][1]:
-            i += 1
-        else:
-            j += 1
-    return found
 
 
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:
     """Return a signal at the instants of a clock, of samples that were there by then.
-
-    raw : the signal; a sample lies at or before the first instant.
-    grid : instants [s], (m,).
+    raw : the signal; a sample lies at or before the first instant.   grid : instants [s], (m,).
     dt : step of the clock [s].
     """
     interval = _interval(raw.t)
@@ -211,7 +192,6 @@ def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
 
 
 def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) -> Array:
-    """Return means of samples from first to last."""
     begin = int(first[0])
     total = np.concatenate([[0.0], np.cumsum(values[begin : int(last[-1]) + 1])])
     means: Array = (total[last + 1 - begin] - total[first - begin]) / (last + 1 - first)
@@ -219,7 +199,6 @@ def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) 
 
 
 def require_rising(label: str, raw: Raw) -> None:
-    """Refuse time that does not rise."""
     wrong = np.flatnonzero(~(np.diff(raw.t) > 0.0))
     if wrong.size:
         raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")

@@ -21,13 +21,10 @@ ENDINGS = (
     ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".npz", ".npy",
 )  # fmt: skip
 OPENERS = {
-    "parquet": "models.logs.parquet:open_parquet",
-    "mdf": "models.logs.mdf:open_",
-    "matlab": "models.logs.matlab:open_",
-    "bag": "models.logs.bag:open_",
-    "can": "models.logs.can:open_",
-    "text": "models.logs.text:open_text",
-}
+    "parquet": "models.logs.parquet:open_parquet", "mdf": "models.logs.mdf:open_",
+    "matlab": "models.logs.matlab:open_", "bag": "models.logs.bag:open_",
+    "can": "models.logs.can:open_", "text": "models.logs.text:open_text",
+}  # fmt: skip
 _JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
 _RATED = ("text", "parquet", "matlab")  # which may lack a time
 
@@ -42,9 +39,7 @@ def open_log(
     rate: float = 0.0,
 ) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
-
     path : of a file; of a folder, where a format keeps a log in one.
-    dbc : of the file that tells the signals in the frames of a CAN bus.
     mend : whether stamps that do not rise are mended, and not refused.
     clock, clock_unit : channel that is the time, where it is not what the format takes for it.
     rate : of the samples [Hz], where no channel is a time; 0 where none is told.
@@ -83,7 +78,6 @@ def open_log(
 
 
 def _function(place: str) -> Any:
-    """Import a function by its place."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)
 

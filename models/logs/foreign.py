@@ -30,7 +30,6 @@ _LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 
 def need(path: Path, module: str, format: str, extra: str) -> Any:
-    """Import what reads a format."""
     library = module.partition(".")[0]
     try:
         with _quiet():
@@ -78,7 +77,6 @@ def _forget(error: BaseException | None) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """Return the first words of an error, on one line."""
     text = " ".join(str(error).split())
     if not text:
         return type(error).__name__

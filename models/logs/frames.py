@@ -47,7 +47,6 @@ FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 
 
 def group_of(identifier: int) -> int:
-    """Return the parameter group of J1939 that a long identifier is of."""
     group = (identifier >> 8) & 0x3FFFF
     return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00  # else it has a receiver
 
@@ -55,7 +54,6 @@ def group_of(identifier: int) -> int:
 @dataclass(frozen=True)
 class Known:
     """The frames of a database.
-
     widths : how many bytes they have, by identifier with `EXTENDED`.
     groups : parameter group of J1939 -> identifier of it in the database.
     """
@@ -90,18 +88,13 @@ class _Gathered:
         self._t, self._data = Growing(), Growing(np.uint8)
 
     def add(self, time: float, data: bytes) -> None:
-        """Take the next frame."""
         self._times.append(time)
         self._bytes += data[: self.width]
         if len(self._times) == TOGETHER:
             self._store()
 
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
-        """Take the next frames.
-
-        times : (n,) [s].
-        data : (n, bytes).
-        """
+        """Take the next frames.   times : (n,) [s].   data : (n, bytes)."""
         self._t.extend(times)
         self._data.extend(data[:, : self.width].reshape(-1))
 
@@ -112,7 +105,6 @@ class _Gathered:
             self._times, self._bytes = array("d"), bytearray()
 
     def finished(self) -> Frames:
-        """Return all of them."""
         self._store()
         return Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
 
@@ -139,7 +131,6 @@ class Log(NamedTuple):
 
 
 def gather(path: Path, kind: str, known: Known) -> Log:
-    """Read the frames of a log."""
     if kind == "MDF4":
         return _of_mdf(path, known)
     found: dict[Key, _Gathered] = {}
@@ -170,7 +161,6 @@ def gather(path: Path, kind: str, known: Known) -> Log:
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
-    """Yield the messages of a log."""
     if kind in ("CSV", "candump text"):
         yield from _of_table(path) if kind == "CSV" else _of_lines(path)
         return
@@ -193,8 +183,6 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
 
 
 class _Frame(NamedTuple):
-    """A frame of a log in text."""
-
     timestamp: float
     arbitration_id: int
     data: bytes
@@ -211,7 +199,6 @@ _LINE = re.compile(  # of candump without -L: (1600000000.123456)  can0  18F0093
 
 
 def _of_lines(path: Path) -> Iterator[_Frame]:
-    """Yield the frames that candump prints."""
     before = -math.inf
     with path.open("r", encoding="latin-1") as text:
         for number, line in enumerate(text, start=1):
@@ -341,7 +328,6 @@ def _has_data(group: Any) -> bool:
 
 
 def _what(group: Any) -> str:
-    """Return what the frames of a group are, that are no data frames."""
     kinds = {name.partition(".")[0] for name in _names(group)}
     return "error and remote" if kinds & set(_NO_DATA) else "other"
 
@@ -357,7 +343,6 @@ class _Part(NamedTuple):
 
 
 def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
-    """Return some data frames of a group."""
     names = _names(file.groups[number])
 
     def signal(name: str) -> Any:
@@ -365,13 +350,9 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
         if full not in names:
             return None
         return file.get(
-            full,
-            group=number,
-            raw=True,
-            ignore_invalidation_bits=True,
-            record_offset=first,
+            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=first,
             record_count=count,
-        )
+        )  # fmt: skip
 
     def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
         found = signal(name)

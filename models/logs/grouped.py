@@ -14,16 +14,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import (
-    Channel,
-    Clock,
-    Heading,
-    Listed,
-    RecordingError,
-    chosen,
-    one_run,
-    some,
-)
+from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
 from models.schema import require_few
@@ -48,7 +39,6 @@ class Samples(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 class GroupedLog(Generic[P]):
     """A log of groups of channels, as `LogFile` says.
-
     place : what a sample is in the file: "message" or "sample".
     channels : as listed, each with where the format finds it.
     said : what is left out or taken for granted.
@@ -57,6 +47,10 @@ class GroupedLog(Generic[P]):
         starts again.
     clock_name, clock_unit : of the channel that is the time of all; empty leaves each its own.
     """
+
+    dialect = ()
+    clock = None
+    unlisted = ()
 
     path: Path
     format: str
@@ -85,7 +79,6 @@ class GroupedLog(Generic[P]):
         remedy: str = "",
     ) -> "GroupedLog[P]":
         """Return the log of channels whose names may repeat.
-
         missing : what the file does not hold where there are none, for the message.
         """
         if not found:
@@ -111,23 +104,7 @@ class GroupedLog(Generic[P]):
         """What is left out or taken for granted, and what was mended in what has been read."""
         return (*self.said, *dict.fromkeys(self._mended))
 
-    @property
-    def dialect(self) -> tuple[str, ...]:
-        """Nothing: such a file is written in one way."""
-        return ()
-
-    @property
-    def clock(self) -> Clock | None:
-        """None: each group has its own."""
-        return None
-
-    @property
-    def unlisted(self) -> tuple[str, ...]:
-        """Nothing: what is left out, the notes say."""
-        return ()
-
     def headings(self) -> tuple[Heading, ...]:
-        """Return names and units of the channels."""
         return tuple(Heading(listed.name, listed.unit) for listed, _ in self.channels)
 
     def listed(self) -> tuple[Listed, ...]:
@@ -135,12 +112,10 @@ class GroupedLog(Generic[P]):
         return tuple(listed for listed, _ in self.channels)
 
     def runs(self) -> tuple[str, ...]:
-        """Return no names: such a log is one run."""
         return ()
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names; those of one clock share its times.
-
         run : None.
         """
         one_run(self.path, self.runs(), run)
@@ -162,18 +137,13 @@ class GroupedLog(Generic[P]):
             t, values_of, rows = found[listed.name]
             result.append(
                 Channel(
-                    name=listed.name,
-                    unit=listed.unit,
-                    t=t,
-                    values=values_of,
-                    place=self.place,
+                    name=listed.name, unit=listed.unit, t=t, values=values_of, place=self.place,
                     rows=rows,
                 )
-            )
+            )  # fmt: skip
         return tuple(result)
 
     def _timed(self, names: Sequence[str]) -> tuple[Channel, ...]:
-        """Return channels on the time that one of them tells."""
         clock, *found = replace(self, clock_name="").read([self.clock_name, *names])
         label = f"{self.path}: t (channel {clock.name!r})"
         t = clock.values * to_si(self.clock_unit or clock.unit, TIME, label)
@@ -217,7 +187,6 @@ def unique(names: Iterable[tuple[str, str]]) -> list[str]:
 
 def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
     """Return a note of names, none where there are none.
-
     names : all of them; the first few are listed.
     """
     if not names:

@@ -35,7 +35,6 @@ def _told(file: IO[bytes] | None) -> Iterator[None]:
 
 class Growing:
     """A column of unknown length.
-
     in_memory : how many it holds before it goes to disk; None takes `LONGEST_IN_MEMORY`.
     """
 
@@ -51,10 +50,7 @@ class Growing:
         return self._size
 
     def extend(self, values: NDArray[Any]) -> None:
-        """Add numbers at the end.
-
-        values : (n,), which are copied.
-        """
+        """Add numbers at the end.   values : (n,), which are copied."""
         part = np.array(values, dtype=self._dtype)
         self._size += part.size
         self._parts.append(part)

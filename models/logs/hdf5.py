@@ -30,8 +30,6 @@ def read_tree(path: Path) -> dict[str, Tree]:
 
 
 class _Reader:
-    """Reads an open file."""
-
     def __init__(self, path: Path, h5py: Any, file: Any) -> None:
         self.path, self.h5py, self.file = path, h5py, file
         self.count = 0
@@ -45,7 +43,6 @@ class _Reader:
         return [(name, group[name]) for name in hard]
 
     def tree(self, node: Any, depth: int) -> Tree:
-        """Return what a group or dataset holds."""
         self.count += 1
         require_few(RecordingError, str(self.path), depth, "depth", "levels of groups")
         require_few(RecordingError, str(self.path), self.count, "values", "groups and arrays")
@@ -78,7 +75,6 @@ class _Reader:
         return {name: tree for name, (_, tree) in members.items()}
 
     def dataset(self, node: Any, kind: str, depth: int) -> Tree:
-        """Return what a dataset holds."""
         if node.external or node.is_virtual:
             return Unread("in another file")
         if "MATLAB_empty" in node.attrs or node.shape is None:
@@ -106,7 +102,6 @@ class _Reader:
         )
 
     def text(self, node: Any, is_numbers: bool) -> Tree:
-        """Return a text, or a list of them."""
         read_at_once = max(node.size, _chunk(node)) * node.dtype.itemsize
         if read_at_once > _LONGEST_TEXT or (not is_numbers and node.size > _MOST_TEXTS):
             return Unread("a long text")

@@ -21,7 +21,6 @@ VALUES = ("value", "val", "data", "values", "reading")
 
 def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:
     """Return the logs of a folder as one, joined by their times.
-
     opened : its files, as logs or with why they are none.
     """
     logs = {one: log for one, log in opened.items() if not isinstance(log, RecordingError)}

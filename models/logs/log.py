@@ -51,7 +51,6 @@ class Clock(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Listed:
     """A channel as a file lists it.
-
     name : as in the file, unique in it; a message's field has its topic before it.
     unit : as in the file, "" where it tells none.
     rate : typical samples per second [Hz], NaN where it is not known without reading them.
@@ -66,7 +65,6 @@ class Listed:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
     """One signal as it was written.
-
     t : time of each sample [s], (n,), on the clock of the log; channels of one clock share it.
     values : (n,) float64 as in the file, NaN for an empty cell.
     place : what a sample is in the file, for messages: "line", "row", "message" or "sample".
@@ -119,13 +117,11 @@ class LogFile(Protocol):
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
-
         run : one of `runs`; None where there are none.
         """
 
 
 def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
-    """Return what is known by names."""
     for name in names:
         if name not in known:
             similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)

@@ -24,17 +24,8 @@ from models.schema import most_unpacked, require_dense, require_few, swells
 HEADER = 128  # bytes
 MATRIX, _COMPRESSED = 14, 15  # types of an element
 NUMBERS = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
-}
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 _CELL, _STRUCT, OBJECT, _CHAR, _SPARSE, _OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
 _NUMERIC = range(6, 16)
@@ -50,8 +41,6 @@ class DamagedError(TireidError, ValueError):
 
 
 class _Element(NamedTuple):
-    """An element: type and data."""
-
     kind: int
     data: memoryview
 
@@ -98,8 +87,6 @@ def read_tree(path: Path) -> dict[str, Tree]:
 
 
 class _Variable(NamedTuple):
-    """Where a variable lies in a file."""
-
     path: Path
     place: int
     length: int
@@ -155,7 +142,6 @@ class _Read(NamedTuple):
 
 
 def _elements(data: memoryview, order: str) -> Iterator[_Element]:
-    """Yield the elements of data one by one."""
     place = 0
     while place + 8 <= len(data):
         kind, length = struct.unpack(order + "II", data[place : place + 8])
@@ -168,7 +154,6 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
 
 
 def _beginning(data: memoryview, order: str) -> _Beginning:
-    """Return what a variable says of itself."""
     if not data:
         return _Beginning(6, False, (0, 0), 2, "", data)
     place, parts = 0, []
@@ -231,7 +216,6 @@ def _load(path: Path, begin: _Beginning, order: str) -> Array:
 
 
 def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
-    """Return what a variable holds."""
     require_few(RecordingError, str(path), depth, "depth", "levels of structs and cells")
     begin = _beginning(data, order)
     if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
@@ -270,7 +254,6 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
 
 
 def _take(elements: Iterator[_Element], count: int) -> list[_Element]:
-    """Return so many variables."""
     result = []
     for _ in range(count):
         element = next(elements, None)

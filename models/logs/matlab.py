@@ -34,7 +34,6 @@ class _Time(NamedTuple):
 
 def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
     """List the channels of a file.
-
     rate : of vectors without a time beside them [Hz]; 0 takes that which the file tells.
     """
     with path.open("rb") as file:

@@ -43,8 +43,6 @@ PROBED = 200  # samples of a clock that its rate is taken from
 
 
 class _Place(NamedTuple):
-    """Where a channel is in the file."""
-
     group: int
     channel: int
 
@@ -53,7 +51,6 @@ _Asked = tuple[Listed, _Place]
 
 
 def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
-    """Read channels group by group."""
     groups: dict[int, list[_Asked]] = {}
     for one in asked:
         groups.setdefault(one[1].group, []).append(one)
@@ -97,12 +94,10 @@ def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Ar
 
 
 def _kept(values: Array) -> Array:
-    """Return numbers as they are kept: on disk where they are many."""
     return filled(values.size, lambda part: values[part])
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
-    """List the channels of a file."""
     with one_line(path, "an MDF file"), opened(path, "MDF") as file:
         return _list(path, file)
 
@@ -115,7 +110,6 @@ class _Found:
         self.others: dict[str, list[str]] = {reason: [] for reason in REASONS}
 
     def group(self, file: Any, number: int, is_4: bool) -> None:
-        """Collect the channels of a group."""
         group = file.groups[number]
         about = group.channel_group
         samples, master = int(about.cycles_nr), file.masters_db.get(number)
@@ -142,7 +136,6 @@ class _Found:
 
 
 def _list(path: Path, file: Any) -> GroupedLog[_Place]:
-    """List the channels of an open file."""
     is_4 = str(file.version) >= "4"
     found = _Found()
     for number in range(len(file.groups)):
@@ -163,7 +156,6 @@ def _list(path: Path, file: Any) -> GroupedLog[_Place]:
 
 
 def _group_name(group: Any, number: int) -> str:
-    """Return what a group of channels is called."""
     about = group.channel_group
     for name in (getattr(about, "acq_name", None), getattr(about, "comment", None)):
         if isinstance(name, str) and name.strip() and name.isprintable():

@@ -40,7 +40,6 @@ class _Form(NamedTuple):
 @contextmanager
 def opened(path: Path, format: str) -> Iterator[Any]:
     """Open a file by asammdf.
-
     format : that it is read as, for the message where the library is missing.
     """
     asammdf = need(path, "asammdf", format, "mdf")
@@ -73,7 +72,6 @@ def _require_ends(path: Path) -> None:
 
 
 def _list(path: Path, file: BinaryIO, form: _Form, place: int, seen: set[int]) -> Iterator[int]:
-    """Yield the places of a list of blocks."""
     while place:
         if place in seen:
             raise RecordingError(f"{path}: is a damaged MDF file, its blocks run in a circle")
@@ -83,7 +81,6 @@ def _list(path: Path, file: BinaryIO, form: _Form, place: int, seen: set[int]) -
 
 
 def _link(file: BinaryIO, place: int, form: _Form) -> int:
-    """Read a place; 0 where the file ends before."""
     file.seek(place)
     raw = file.read(form.link.size)
     return int(form.link.unpack(raw)[0]) if len(raw) == form.link.size else 0

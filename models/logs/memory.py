@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.spelling import without_unit
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
@@ -21,7 +21,6 @@ _NANOSECONDS = 1e9  # of a second
 
 class ArrayLog:
     """Columns of one length, of which one is the time.
-
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
@@ -29,6 +28,11 @@ class ArrayLog:
     mend : whether times that do not rise are mended, and not refused.
     rate : of the samples [Hz], in place of a time; 0 where none is told.
     """
+
+    format = "arrays"
+    dialect = ()
+    clock = None
+    unlisted = ()
 
     def __init__(
         self,
@@ -68,33 +72,12 @@ class ArrayLog:
 
     @property
     def path(self) -> Path:
-        """The name, in place of a file."""
         return Path(self._name)
-
-    @property
-    def format(self) -> str:
-        """What it is."""
-        return "arrays"
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was mended in what has been read so far, one sentence each."""
         return tuple(dict.fromkeys(self._noted))
-
-    @property
-    def dialect(self) -> tuple[str, ...]:
-        """Nothing: arrays are written in one way."""
-        return ()
-
-    @property
-    def clock(self) -> Clock | None:
-        """None: the time is in seconds, so that there is nothing to be said of it."""
-        return None
-
-    @property
-    def unlisted(self) -> tuple[str, ...]:
-        """Nothing: words show in reading."""
-        return ()
 
     def headings(self) -> tuple[Heading, ...]:
         """Return the columns, but for the time and the runs; which are numeric shows in reading."""
@@ -115,10 +98,7 @@ class ArrayLog:
         return tuple(dict.fromkeys(str(word) for word in self._arrays[RUN].tolist()))
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return columns as channels.
-
-        run : one of `runs`; None where there are none, or one.
-        """
+        """Return columns as channels.   run : one of `runs`; None where there are none, or one."""
         run = one_run(self.path, self.runs(), run)
         chosen(self.path, names, self._arrays)
         clock = str(self._clock)
@@ -155,7 +135,12 @@ class ArrayLog:
                 f"{self._name}: {name} must have one axis, its shape is {value.shape}"
             )
         if name == self._clock and value.dtype.kind in "Mm":
-            return _since_first(value)
+            there = value[~np.isnat(value)]
+            seconds = np.full(value.size, np.nan)
+            if there.size:
+                since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
+                seconds[~np.isnat(value)] = since / _NANOSECONDS
+            return seconds
         try:
             if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
                 raise TypeError
@@ -165,16 +150,6 @@ class ArrayLog:
             raise RecordingError(
                 f"{self._name}: {name} must be numeric, its type is {value.dtype}"
             ) from None
-
-
-def _since_first(stamps: NDArray[Any]) -> Array:
-    """Return times of the calendar, or durations, since the first [s]; those missing are NaN."""
-    there = stamps[~np.isnat(stamps)]
-    seconds = np.full(stamps.size, np.nan)
-    if there.size:
-        since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
-        seconds[~np.isnat(stamps)] = since / _NANOSECONDS
-    return seconds
 
 
 def _array(name: str, column: str, value: Any) -> NDArray[Any]:

@@ -22,16 +22,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
-from models.logs.signals import (
-    BETA,
-    COLUMNS,
-    NEEDED,
-    POSE,
-    QUANTITIES,
-    WHEELS,
-    Signal,
-    quantity_of,
-)
+from models.logs.signals import BETA, COLUMNS, NEEDED, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_ending
 from models.logs.stamps import typical_rate
 from models.logs.units import (
@@ -67,7 +58,6 @@ SAME = 2e-3  # of their size: by less two channels differ that are one, but for 
 
 class Rule(NamedTuple):
     """How a signal is called.
-
     known : whole names, words joined.   vague : names that may mean something else.
     never : words that mean something else.   words : sets of words that all occur; "a|b" is either.
     """
@@ -130,7 +120,6 @@ WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
 
 
 def _with_corner(word: str) -> tuple[str, ...]:
-    """Return a word, or what it is made of where a corner of the car is written with it."""
     for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
         if corner in CORNERS and stem in _BOTH:
             return stem, corner
@@ -138,10 +127,6 @@ def _with_corner(word: str) -> tuple[str, ...]:
 
 
 def wheel_words(signal: str, words: Sequence[str]) -> bool:
-    """Return whether a name is that of the speed of a wheel.
-
-    signal : one of `WHEELS`.
-    """
     listed = frozenset(part for word in words for part in _with_corner(word))
     if listed & OTHERS:
         return False
@@ -162,9 +147,7 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guess:
     """A channel, or the channels of two wheels, that may be a signal.
-
     confidence : from 0 to 1.
-    hand : whether it is the angle of the hand wheel, which wants a ratio.
     unit : of the file, or what the numbers look like where it tells none.
     sign : channel that has the sign of the amounts in this one; empty where there is none.
     factor : -1 of an axis that points the other way.
@@ -182,7 +165,6 @@ class Guess:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
     """What the channels of a log probably are.
-
     rivals : by signal, all that are as good as the best, it included, where there are several.
     """
 
@@ -257,7 +239,6 @@ def _matches(group: str, words: frozenset[str]) -> bool:
 
 def name_confidence(signal: str, name: str) -> float:
     """Return how sure a name alone says that a channel is a signal, 0 where it does not.
-
     signal : one of `RULES`, or a wheel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
@@ -300,7 +281,6 @@ def propose(
     log: LogFile, headings: Sequence[Heading] | None = None, run: str | None = None
 ) -> Proposal:
     """Return what the channels of a log probably are.
-
     log : as a format reads it; numbers are read of the channels that are in question.
     headings : names and units to choose from; None all of the log.
     run : which of its runs is looked at; None the only one, or the first.
@@ -537,7 +517,6 @@ def _with_given_unit(one: Heading) -> Heading:
 
 
 def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
-    """Return a guess by what the unit says of it."""
     quantity = quantity_of(signal, one.unit)
     if not is_given(one.unit):
         if guess.confidence == _STANDARD:  # names of ours are in SI, as the documents say
@@ -592,7 +571,6 @@ def _said(guess: Guess, why: str) -> Guess:
 
 
 def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
-    """Return a guess by what the numbers say of it."""
     size = usual = 0.0
     for name in guess.channel:
         if name not in seen:
@@ -715,6 +693,5 @@ def _usual(values: Array) -> float:
 
 
 def _root_mean_square(values: Array) -> float:
-    """Return it of the finite ones."""
     finite = values[np.isfinite(values)]
     return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else 0.0

@@ -36,7 +36,6 @@ def read_tree(path: Path) -> dict[str, Tree]:
 
 
 def _shown_name(member: zipfile.ZipInfo) -> str:
-    """Return what an array of an archive is called."""
     return member.filename.removesuffix(".npy")
 
 
@@ -47,7 +46,6 @@ def _top(path: Path, member: str, name: str) -> dict[str, Tree]:
 
 
 def _tree(path: Path, member: str) -> Tree:
-    """Return what an array holds, by its header."""
     with _opened(path, member) as file:
         version = npy.read_magic(file)
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0

@@ -23,7 +23,6 @@ BATCH = 1 << 16  # rows that are read at once
 
 
 def open_parquet(path: Path) -> TableLog:
-    """Return the log in a Parquet file."""
     parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
     with one_line(path, WHAT), parquet.ParquetFile(path) as file:
@@ -43,10 +42,9 @@ def open_parquet(path: Path) -> TableLog:
 
 @dataclass(frozen=True, kw_only=True)
 class _ParquetTable:
-    """A table in a Parquet file.
+    """A table in a Parquet file."""
 
-    schema : of its columns, as pyarrow gives it.
-    """
+    words = ()
 
     path: Path
     schema: Any
@@ -58,7 +56,6 @@ class _ParquetTable:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
         return tuple(self.schema.names)
 
     @cached_property
@@ -68,19 +65,9 @@ class _ParquetTable:
 
     @cached_property
     def numeric(self) -> tuple[bool, ...]:
-        """Which columns hold numbers."""
         return tuple(_is_numeric(one.type) for one in self.schema)
 
-    @property
-    def words(self) -> tuple[str, ...]:
-        """How the file is written, for people."""
-        return ()
-
     def first_rows(self, column: int) -> list[str]:
-        """Return the first cells of a column as text, "" where one is missing.
-
-        column : from 0.
-        """
         with one_line(self.path, WHAT):
             if column not in self._head:
                 return ["?"] * min(self.rows, HEAD)
@@ -95,7 +82,6 @@ class _ParquetTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
-
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
@@ -143,7 +129,6 @@ class _ParquetTable:
         return tuple(result)
 
     def _column(self, column: int, kind: Kind, cells: Any, rows: Any) -> Any:
-        """Return the cells of a batch as their kind asks."""
         import pyarrow
 
         found = self.schema.field(column).type
@@ -217,7 +202,6 @@ def _as_text(cells: Any, kind: Any) -> list[str]:
 
 
 def _unit(field: Any) -> str:
-    """Return the unit of a column, by its metadata or its name."""
     about = field.metadata or {}
     for key in (b"unit", b"units", b"Unit", b"Units"):
         if key in about:

@@ -66,16 +66,12 @@ _LONGEST_CELL = csv.field_size_limit()  # characters
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
     """Where the table of a text file is, and how its cells are written.
-
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
-    delimiter : one character, " " for any number of blanks and tabs.
-    decimal : "." or ",".
+    delimiter : one character, " " for any number of blanks and tabs.   decimal : "." or ",".
     thousands : what sets thousands apart in some cell, "" where nothing does.
     units : of the columns, "" where none is told.
     first : line of the first row of data, from 1; one beyond the header where there is none.
     again : lines of header and units, which may come again further down and are no data then.
-    numeric : which columns hold numbers, as far as the beginning tells.
-    rows : cells of the first rows of data.
     made_by : the logger or program whose format it is, "" where nothing tells.
     rate : of samples, that the preamble tells [Hz]; 0 where it tells none.
     """
@@ -118,10 +114,7 @@ class _Way(NamedTuple):
 
 
 def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
-    """Return the layout of a text file.
-
-    whole : whether they are all of it.
-    """
+    """Return the layout of a text file.   whole : whether they are all of it."""
     encoding = _encoding(path, head)
     text = _decoded(path, head, encoding)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -162,7 +155,6 @@ def _require_one_block(path: Path, lines: list[str]) -> None:
 
 
 def _encoding(path: Path, head: bytes) -> str:
-    """Return the codec of a text, by its mark or by its bytes."""
     for mark, name in (
         (codecs.BOM_UTF8, "utf-8-sig"),
         (codecs.BOM_UTF32_LE, "utf-32"),
@@ -206,7 +198,6 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
 
 def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
     """Return the cells of one line, the line itself where it has none.
-
     delimiter : one character, " " for any number of blanks and tabs.
     """
     if delimiter == BLANKS:
@@ -265,7 +256,6 @@ def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
 
 
 def _numbers_in(line: _Line, way: _Way) -> int:
-    """Return how many cells of a line are numbers."""
     cells = [cell for cell in line.cells[:MANY] if cell]
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
@@ -284,7 +274,6 @@ def _is_data(line: _Line, way: _Way) -> bool:
 
 
 def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
-    """Return the layout of a table whose cells are written this way."""
     zone, first = _header_zone(path, lines, way)
     names_line, units_line = _named(zone, way)
     names = list(_uncommented(names_line, way))
@@ -395,7 +384,6 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
 
 
 def _uncommented(line: _Line, way: _Way) -> tuple[str, ...]:
-    """Return the cells of a line that may be a comment."""
     text = line.text.lstrip()
     for mark in COMMENT:
         if text.startswith(mark):
@@ -445,7 +433,6 @@ def _encoding_word(encoding: str) -> str:
 
 
 def _maker(lines: Sequence[_Line]) -> str:
-    """Return whose format a preamble is of."""
     start = " ".join(line.text for line in lines[:8]).lower()
     for words, maker in (
         ("motec csv", "MoTeC i2"),
@@ -462,7 +449,6 @@ def _maker(lines: Sequence[_Line]) -> str:
 
 
 def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
-    """Return the layout of a header without a row of data."""
     number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
     delimiter = max(DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
     names = cells_of(text, delimiter)
@@ -501,7 +487,6 @@ def _sections(lines: list[str]) -> dict[str, int] | None:
 
 
 def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) -> Layout:
-    """Return the layout of a .vbo file."""
     names = tuple(" ".join(lines[at["column names"] + 1 : at["data"]]).split())
     if not names:
         raise RecordingError(

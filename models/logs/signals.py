@@ -48,26 +48,15 @@ COLUMNS = {
 }  # what a column is called where it differs
 MEANINGS: Mapping[str, str] = MappingProxyType(
     {
-        "v_x": "forward speed",
-        "v_y": "lateral velocity",
-        BETA: "sideslip angle",
-        "r": "yaw rate",
-        "delta_f": "front steering angle",
-        "delta_r": "rear steering angle",
-        "a_y": "lateral acceleration",
-        "a_x": "longitudinal acceleration",
-        "x": "position",
-        "y": "position",
-        "heading": "heading",
-        "Fyf": "front axle force",
-        "Fyr": "rear axle force",
-        "wheel_fl": "speed of the front left wheel",
-        "wheel_fr": "speed of the front right wheel",
-        "wheel_rl": "speed of the rear left wheel",
-        "wheel_rr": "speed of the rear right wheel",
+        "v_x": "forward speed", "v_y": "lateral velocity", BETA: "sideslip angle", "r": "yaw rate",
+        "delta_f": "front steering angle", "delta_r": "rear steering angle",
+        "a_y": "lateral acceleration", "a_x": "longitudinal acceleration", "x": "position",
+        "y": "position", "heading": "heading", "Fyf": "front axle force", "Fyr": "rear axle force",
+        "wheel_fl": "speed of the front left wheel", "wheel_fr": "speed of the front right wheel",
+        "wheel_rl": "speed of the rear left wheel", "wheel_rr": "speed of the rear right wheel",
         "wheel": "speed of the wheels, by one encoder",
     }
-)
+)  # fmt: skip
 SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
@@ -93,7 +82,6 @@ def quantity_of(name: str, unit: str) -> str:
 
 def signal_name(name: str) -> str | None:
     """Return our name of a signal by its own or by that of its column; None where it has neither.
-
     name : for example "vy" or "v_y".
     """
     by_column = {column: ours for ours, column in COLUMNS.items()}
@@ -107,7 +95,6 @@ class Signal:
 
     In SI it is (mean or sum of the channels) · factor - offset; by `ratio` or `table` the angle of
     the road wheels, where that of the hand wheel was logged.
-
     channel : names in the file; of several, forces are added and anything else is averaged.
     unit : as users write units; empty takes that of the file, SI where it tells none.
     factor : the numbers are multiplied by it [-]; -1 turns a sign.
@@ -156,10 +143,7 @@ class Signal:
         return (*self.channel, self.sign) if self.sign else self.channel
 
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
-        """Return the signal of its channels.
-
-        parts : each channel in SI, on one clock (n,).
-        """
+        """Return the signal of its channels.   parts : each channel in SI, on one clock (n,)."""
         plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
         if len(parts) == 1 and self == plain:
             return parts[0]
@@ -168,7 +152,6 @@ class Signal:
         )
 
     def _value(self, parts: Sequence[Array], quantity: str) -> Array:
-        """Return the signal of some samples of its channels."""
         total: Array = parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
         if len(parts) > 1 and quantity != FORCE:
             total = total / len(parts)
@@ -177,22 +160,17 @@ class Signal:
         if self.offset != 0.0:
             total = total - self.offset
         if self.table:
-            return self._by_table(total)
+            hand, road = np.array(self.table).T
+            inside: Array = np.interp(total, hand, road)
+            first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
+            below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
+            road_wheel: Array = inside + first * below + last * above
+            return road_wheel
         return total if self.ratio == 1.0 else total / self.ratio
-
-    def _by_table(self, angle: Array) -> Array:
-        """Return the angle of the road wheels; beyond the table its last slope goes on."""
-        hand, road = np.array(self.table).T
-        inside: Array = np.interp(angle, hand, road)
-        first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
-        below, above = np.minimum(angle - hand[0], 0.0), np.maximum(angle - hand[-1], 0.0)
-        road_wheel: Array = inside + first * below + last * above
-        return road_wheel
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
     """Return amounts with the sign that another channel has then, (n,).
-
     t : times of the amounts [s], (n,).
     sign_t, sign : times and values of the other channel, (m,).
     """

@@ -23,12 +23,10 @@ _LENKRAD = re.compile("(?i:lenk_?rad)$")  # German for a wheel: no angle in rad
 
 
 def is_unit(word: str) -> bool:
-    """Return whether a word is a unit, or stands where one would."""
     return is_known(word) or word.strip("[](){} ").lower() in _OTHERS
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Return whether cells are a row of units: all in brackets, or all known, and not all "1"."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     if not filled:
         return False
@@ -47,7 +45,6 @@ def unit_in_name(name: str) -> str:
 
 
 def _split(name: str) -> tuple[str, str]:
-    """Return a name without the unit that it holds, and the unit; it and ""."""
     if len(name) > LONGEST_NAME:
         return name, ""
     held = _BRACKETS.fullmatch(name)
@@ -79,7 +76,6 @@ def without_unit(name: str) -> str:
 
 def without_ending(name: str, unit: str) -> str:
     """Return a name without the unit that it holds, where it is that unit.
-
     name : of a column, as in the file: "speed_kmh", "speed [km/h]".
     unit : that was understood: "km/h".
     """

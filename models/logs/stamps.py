@@ -4,6 +4,9 @@ Stamps that are rounded (ten samples of 0.01 s that share the stamp 0.1 s, 400 H
 milliseconds) are put back on the even clock that they were taken from, where one explains every
 stamp; it is said. Stamps that fall are no rounding: a clock that starts again, or a mixed order.
 They are refused, or mended where that is asked for.
+
+In functions:
+values : (n,) as in the file.   rows : (n,) where each is in the file.   t : times [s], (n,).
 """
 
 import datetime
@@ -78,7 +81,6 @@ _SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
 
 class Stamps(NamedTuple):
     """Time of each sample [s], (n,), and what was mended, one sentence each.
-
     order : which rows they are of, (n,); None are all as they stand.
     """
 
@@ -87,7 +89,6 @@ class Stamps(NamedTuple):
     order: NDArray[np.intp] | None = None
 
     def of(self, column: NDArray[Any]) -> NDArray[Any]:
-        """Return the cells of a column that the stamps are of."""
         return column if self.order is None else column[self.order]
 
 
@@ -101,8 +102,6 @@ def find_clock(
 
     Of several that are called so it is the first whose stamps hardly ever repeat, as one that is
     rounded to seconds does. One that counts samples, or the way, is none.
-
-    head : gives the first cells of a column, with decimal points.
     """
     named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
     named.sort(key=lambda k: NAMES.index(_plain(names[k])))
@@ -159,7 +158,6 @@ def _even(
 
 
 def _is_way(name: str, unit: str) -> bool:
-    """Whether a column is the distance driven, by its name, or by that and its unit."""
     plain = _plain(name)
     return plain in WAYS or (plain.endswith(("distance", "dist")) and unit in ("", "m", "km", "ft"))
 
@@ -187,8 +185,6 @@ def own_clocks(
     of the others, called alike or of another rate, rises without a rest from about the same instant
     on: what a receiver tells of the same rows has another name and the same steps. What stands
     behind a time that is none of its own has the first.
-
-    head : gives the first cells of a column, with decimal points.
     """
     found = {}
     for k, name in enumerate(names):
@@ -228,7 +224,6 @@ def _is_beside(
 
 def given_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
     """Return a column that is said to be the time; None where its cells are none.
-
     column : from 0.
     """
     found = _clock(column, name, unit, head, _is_any)
@@ -275,7 +270,6 @@ def _clock(
 
 
 def _is_any(_: Array) -> bool:
-    """Return that any steps will do."""
     return True
 
 
@@ -300,7 +294,6 @@ def _rises_evenly(steps: Array) -> bool:
 
 
 def _unit(t: Array, told: str) -> tuple[str, bool]:
-    """Return the unit of times and whether they count from 1970, by what is told or by steps."""
     finite = t[np.isfinite(t)]
     largest = float(np.abs(finite).max()) if finite.size else 0.0
     for unit, (low, high) in _EPOCHS.items():
@@ -329,7 +322,6 @@ def _number(cell: str) -> float | None:
 
 def nanoseconds(cell: str) -> int | None:
     """Return a date and time (since 1970), or a time of day, in ns; None where it is neither.
-
     cell : ISO 8601, or with the day first, or hh:mm:ss, mm:ss, or "0.01 sec" as MATLAB writes a
         duration; "" gives `MISSING`.
     """
@@ -409,10 +401,7 @@ def _of_day(text: str) -> int | None:
 def require_times(
     label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
 ) -> None:
-    """Refuse a row without a time.
-
-    values, rows : as of `seconds`, (n,) each.
-    """
+    """Refuse a row without a time.   values, rows : as of `seconds`, (n,) each."""
     missing = _first(values, lambda part: part == MISSING if part.dtype.kind == "i" else
                      ~np.isfinite(part))  # fmt: skip
     if missing is not None:
@@ -435,9 +424,6 @@ def seconds(
 
     Dates and times of day count from the first of them; numbers stay as they stand, in seconds,
     those since 1970 too.
-
-    values : (n,) as in the file.
-    rows : (n,) where each is in the file.
     mend : whether samples out of order are sorted, those that share a stamp with another left out,
         and what follows where the clock goes back for long is put after the rest; refused else.
     restarts : whether a clock that goes back for long is mended, too: not one of several.
@@ -448,7 +434,10 @@ def seconds(
     t = in_seconds(clock, values)
     fall = _first_step(t, lambda step: step < 0.0)
     if fall is not None and clock.unit in ("instant", "hhmmss"):
-        t = _past_midnight(t)
+        steps = np.diff(t)
+        days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * DAY) & (steps > -1.1 * DAY))])
+        later: Array = np.round(t + DAY * days, 6)
+        t = later
         fall = _first_step(t, lambda step: step < 0.0)
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
     even = None if fall is not None else _even_clock(t)
@@ -473,18 +462,12 @@ def risen(
     mend: bool = False,
     restarts: bool = True,
 ) -> Stamps:
-    """Return times in seconds as `seconds` does.
-
-    t : times [s], (n,).
-    rows : (n,) where each is in the file.
-    """
     clock = Clock(0, name, "s", False, "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 
 
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     """Return stamps that rise and the rows that they are of; None where that is no mending.
-
     t : stamps [s], some of which are not above the one before, (n,).
     restarts : whether a clock that goes back for long is mended: samples of two runs are not mixed.
     """
@@ -524,18 +507,13 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
 
 def _starts_again(first: float, before: float, after: float) -> bool:
     """Return whether a clock that fell starts again; else its samples are out of order.
-
-    first : stamp since which it rose [s].
-    before, after : stamps between which it fell [s].
+    first : stamp since which it rose [s].   before, after : stamps between which it fell [s].
     """
     return bool(after - first <= 0.5 * (before - first) and before > first)
 
 
 def typical_rate(t: Array) -> float:
-    """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two.
-
-    t : times [s], (n,).
-    """
+    """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two."""
     steps = np.diff(t[:_MOST_STEPS])
     step = float(np.median(steps)) if steps.size else 0.0
     return 1.0 / step if step > 0.0 else math.nan
@@ -543,18 +521,13 @@ def typical_rate(t: Array) -> float:
 
 def since(t: Array, first: float) -> Array:
     """Return times of the calendar since an instant, (n,); doubles hold them to the microsecond.
-
-    t : times since 1970 [s], (n,).
-    first : instant since 1970 [s].
+    t : times since 1970 [s], (n,).   first : instant since 1970 [s].
     """
     return filled(t.size, lambda part: np.round((t[part] - first) * _MICROSECONDS) / _MICROSECONDS)
 
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
-    """Return stamps in seconds, (n,); those of the calendar from the first on.
-
-    values : (n,) as in the file.
-    """
+    """Return stamps in seconds, (n,); those of the calendar from the first on."""
     first = values[0]
     per_second = PER_SECOND.get(clock.unit, 1.0)
     if clock.unit == "instant":
@@ -568,33 +541,20 @@ def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
 
 
 def started(clock: Clock, cell: str) -> float:
-    """Return the instant that a clock of the calendar counts from [s]; 0 of any other.
-
-    cell : its first one.
-    """
+    """Return the instant that a clock of the calendar counts from [s]; 0 of any other."""
     if clock.unit == "instant":
         return (nanoseconds(cell) or 0) / 1e9
     return float(_of_digits(np.array([float(cell)]))[0]) if clock.unit == "hhmmss" else 0.0
 
 
 def _of_digits(values: Array) -> Array:
-    """Return hhmmss.ss in seconds."""
     hours, rest = np.divmod(values, 10000.0)
     minutes, whole = np.divmod(rest, 100.0)
     total: Array = hours * 3600.0 + minutes * 60.0 + whole
     return total
 
 
-def _past_midnight(t: Array) -> Array:
-    """Return times of day that go on after midnight."""
-    steps = np.diff(t)
-    days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * DAY) & (steps > -1.1 * DAY))])
-    later: Array = np.round(t + DAY * days, 6)
-    return later
-
-
 def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) -> int | None:
-    """Return the first place where something is wrong."""
     for part in blocks(values.size, overlap=1):
         found = np.flatnonzero(wrong(values[part]))
         if found.size:
@@ -603,7 +563,6 @@ def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) 
 
 
 def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
-    """Return the sample before the first step with which something is wrong."""
     return _first(t, lambda part: wrong(np.diff(part)))
 
 
@@ -620,7 +579,6 @@ class _Even(NamedTuple):
 @np.errstate(all="ignore")
 def _even_clock(t: Array) -> _Even | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
-
     t : stamps [s] that never fall, (n,).
     """
     if t.size < 10 or not t[-1] > t[0]:
@@ -728,10 +686,7 @@ def _even_step(t: Array, tick: float) -> float | None:
 @np.errstate(all="ignore")
 def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool = True) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
-
     t : stamps [s], one of which is not above the one before, (n,).
-    rows : (n,) where each is in the file.
-    restarts : whether a clock that starts again can be mended.
     """
     k = _first_step(t, lambda step: ~(step > 0.0))
     assert k is not None

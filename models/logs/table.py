@@ -13,16 +13,7 @@ from numpy.typing import NDArray
 
 from codegen.escape import shown
 from models.logs.growing import Growing
-from models.logs.log import (
-    Channel,
-    Clock,
-    Heading,
-    Listed,
-    RecordingError,
-    chosen,
-    one_run,
-    some,
-)
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,
@@ -61,7 +52,6 @@ class Words(NamedTuple):
 
     @classmethod
     def of(cls, cells: Sequence[str]) -> "Words":
-        """Return the words of cells."""
         codes: dict[str, int] = {}
         coded = [codes.setdefault(cell, len(codes)) for cell in cells]
         return cls(list(codes), np.array(coded, dtype=np.int32))
@@ -123,7 +113,6 @@ class Table(Protocol):
 
 class Gathered:
     """Columns that are gathered block by block.
-
     kinds : column from 0 -> how its cells are read.
     run : column and word of the rows to keep; None keeps all.
     """
@@ -153,9 +142,7 @@ class Gathered:
 
     def extend(self, rows: NDArray[np.int64], columns: Mapping[int, Any]) -> None:
         """Add the rows of a block.
-
-        rows : (n,) where they are in the file.
-        columns : column -> (n,) values, or `Words`.
+        rows : (n,) where they are in the file.   columns : column -> (n,) values, or `Words`.
         """
         self._seen += rows.size
         if self._seen > self._most:
@@ -199,7 +186,6 @@ class Gathered:
 @dataclass(frozen=True, kw_only=True)
 class TableLog:
     """A table as a log: which of its columns is the clock, and which names the runs.
-
     clock_name, clock_unit : of the column that is the time; empty finds them.
     rate : of all samples [Hz], in place of a time; 0 where none is told.
     mend : whether stamps that do not rise are mended, and not refused.
@@ -214,12 +200,10 @@ class TableLog:
 
     @property
     def path(self) -> Path:
-        """The file."""
         return self.table.path
 
     @property
     def format(self) -> str:
-        """Its format as users call it."""
         return self.table.format
 
     @property
@@ -287,7 +271,6 @@ class TableLog:
 
     @cached_property
     def _own_clocks(self) -> dict[int, Clock]:
-        """By column the clock of those that have one of their own."""
         if self.clock_name or self.clock is None or self._run_column is not None:
             return {}
         return own_clocks(self.names, self.table.units, self.table.first_rows, self.clock)
@@ -370,7 +353,6 @@ class TableLog:
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return columns as channels on the clock of the log.
-
         run : one of `runs`; None where there are none.
         """
         places, clock = chosen(self.path, names, self._places), self.clock
@@ -411,7 +393,6 @@ class TableLog:
         return {name: k for k, name in enumerate(self.names)}
 
     def _one_run(self, run: str | None) -> tuple[int, str] | None:
-        """Return column and word of a run."""
         found = one_run(self.path, self.runs(), run)
         if self._run_column is None or found is None or (run is None and len(self.runs()) == 1):
             return None
@@ -419,5 +400,4 @@ class TableLog:
 
 
 def kind_of(clock: Clock) -> Kind:
-    """Return how the cells of a clock are read."""
     return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER

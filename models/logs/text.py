@@ -51,9 +51,10 @@ def open_text(path: Path) -> TableLog:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable:
     """A table in a text file.
-
     arrow : whether pyarrow is used; None where it is installed and the file is large.
     """
+
+    place = "line"
 
     path: Path
     layout: Layout
@@ -61,17 +62,10 @@ class TextTable:
 
     @property
     def format(self) -> str:
-        """The format as users call it."""
         return "VBO" if self.layout.made_by == "Racelogic VBOX" else "CSV"
 
     @property
-    def place(self) -> str:
-        """What a sample is in."""
-        return "line"
-
-    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns as in the file."""
         return self.layout.names
 
     @property
@@ -96,7 +90,6 @@ class TextTable:
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column, with decimal points, "" where one is missing.
-
         column : from 0.
         """
         layout = self.layout
@@ -107,7 +100,6 @@ class TextTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
-
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
@@ -210,10 +202,7 @@ class _Row(NamedTuple):
 
 
 class _Python:
-    """Reads blocks of one table.
-
-    wanted : column from 0 -> how its cells are read.
-    """
+    """Reads blocks of one table.   wanted : column from 0 -> how its cells are read."""
 
     def __init__(self, path: Path, layout: Layout, wanted: Mapping[int, Kind]) -> None:
         self._path, self._layout, self._wanted = path, layout, wanted
@@ -280,7 +269,6 @@ class _Python:
     def _column(
         self, column: int, kind: Kind, cells: list[str], lines: Sequence[int], marked: bool
     ) -> Any:
-        """Return the cells of one column as numbers, words or instants."""
         if kind is Kind.WORD:
             return Words.of(cells)
         if kind is Kind.INSTANT:
@@ -309,7 +297,6 @@ class _Python:
         dtype: Any,
         what: str,
     ) -> NDArray[Any]:
-        """Return what each cell is read as; refuse the first that cannot be."""
         values = [read(cell) for cell in cells]
         if None in values:
             k = values.index(None)

@@ -33,10 +33,7 @@ _MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leaf:
-    """An array of real numbers that is not read yet.
-
-    load : reads it, (rows, columns) float64.
-    """
+    """An array of real numbers that is not read yet.   load : reads it, (rows, columns) float64."""
 
     shape: tuple[int, int]
     load: Callable[[], Array]
@@ -79,7 +76,6 @@ class Signal(NamedTuple):
 
     @property
     def samples(self) -> int:
-        """How many there are."""
         return self.leaf.shape[self.along]
 
 
@@ -94,7 +90,6 @@ class Found(NamedTuple):
 
 def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
     """Return the channels of a tree, in its order; their names may repeat.
-
     rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
         the like of the tree, if there is one.
     """
@@ -134,8 +129,6 @@ _Clockless = tuple[str, str, Leaf, tuple[list[str], list[str]] | None]
 
 
 class _Walk:
-    """Collects what a tree holds."""
-
     def __init__(self) -> None:
         self.signals: list[Signal] = []
         self.clockless: dict[str, _Clockless] = {}
@@ -167,7 +160,6 @@ class _Walk:
                 self.other(child, name, clocks)
 
     def other(self, node: Tree, path: str, clocks: tuple[Clock, ...]) -> None:
-        """Collect the channels of anything."""
         if isinstance(node, Leaf):
             self.leaf(node, path, "", clocks, None)
         elif isinstance(node, Unread):
@@ -187,7 +179,6 @@ class _Walk:
         clocks: tuple[Clock, ...],
         columns: tuple[list[str], list[str]] | None,
     ) -> None:
-        """Collect a vector, or the columns of a matrix."""
         rows, width = leaf.shape
         if rows * width < 2:
             self.told(name, leaf)
@@ -246,16 +237,12 @@ def _lines(
 
 
 def line_of(values: Array, signal: Signal) -> Array:
-    """Return the values of a channel, (n,).
-
-    values : of its leaf, (rows, columns).
-    """
+    """Return the values of a channel, (n,).   values : of its leaf, (rows, columns)."""
     line = values[:, signal.place] if signal.along == 0 else values[signal.place]
     return np.array(line, dtype=np.float64)
 
 
 def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
-    """Yield the clocks of a struct."""
     for key, child in node.items():
         unit = _unit_of_clock(key)
         name = f"{path}.{key}" if path else key

@@ -16,14 +16,9 @@ SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
 ACCELERATION, FORCE, TIME, LENGTH = "acceleration", "force", "time", "length"
 TURNS = "rate of turns"  # of wheels; in rad/s it is called a rate as that of yaw
 SI = {
-    SPEED: "m/s",
-    ANGLE: "rad",
-    RATE: "rad/s",
-    ACCELERATION: "m/s^2",
-    FORCE: "N",
-    TIME: "s",
+    SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "N", TIME: "s",
     LENGTH: "m",
-}
+}  # fmt: skip
 
 TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
@@ -110,9 +105,7 @@ def is_given(unit: str) -> bool:
 
 def unit_of_range(quantity: str, largest: float) -> str:
     """Return the unit that numbers without one can have; "" where SI can be.
-
-    quantity : one of `SI`, or `HAND_WHEEL`.
-    largest : how far the numbers go from zero.
+    quantity : one of `SI`, or `HAND_WHEEL`.   largest : how far the numbers go from zero.
     """
     if quantity == ACCELERATION:
         return "g" if largest < _SMALLEST_ACCELERATION else ""
@@ -122,9 +115,7 @@ def unit_of_range(quantity: str, largest: float) -> str:
 
 def to_si(unit: str, quantity: str, what: str) -> float:
     """Return the factor to SI.
-
-    unit : as written; where it tells none, SI is meant.
-    quantity : of the signal, one of `SI`.
+    unit : as written; where it tells none, SI is meant.   quantity : of the signal, one of `SI`.
     """
     plain = _plain(unit)
     if plain in _NO_UNIT:

@@ -40,9 +40,7 @@ class Wheel(NamedTuple):
 
     def velocity(self, v_x: Any, v_y: Any, r: Any) -> tuple[Any, Any]:
         """Velocity of the wheel center [m/s] in the body frame.
-
-        v_x, v_y : velocity of the center of gravity, body frame [m/s].
-        r : yaw rate [rad/s].
+        v_x, v_y : velocity of the center of gravity, body frame [m/s].   r : yaw rate [rad/s].
         """
         return v_x - self.y * r, v_y + self.x * r
 
@@ -61,7 +59,6 @@ def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
 
 def mounted(tire: Tire, wheel: Wheel) -> Tire:
     """Return the tire for the side of the wheel; only measured tires have sides.
-
     tire : any of `models.tires`.
     """
     if isinstance(tire, MagicFormula):
@@ -75,11 +72,8 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     σ d(tan α')/dt + |V_cx| tan α' = -V_cy with the velocity V_c of the contact point in the frame
     of the wheel (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 7.2; no division by speed,
     so it is well posed down to standstill).
-
-    slip : lagged slip tan(α') [-].
-    delta : steering angle of the wheel [rad].
-    velocity : of the wheel, body frame [m/s].
-    length : relaxation length σ [m].
+    slip : lagged slip tan(α') [-].   delta : steering angle of the wheel [rad].
+    velocity : of the wheel, body frame [m/s].   length : relaxation length σ [m].
     """
     v_x, v_y = velocity
     along = v_x * ca.cos(delta) + v_y * ca.sin(delta)
@@ -89,12 +83,9 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
 
 def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
     """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
-
-    slip : lagged slip tan(α') [-].
-    camber : γ > 0 when the top leans right [rad].
+    slip : lagged slip tan(α') [-].   camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
-    load : vertical load [N].
-    mu : friction over the tire's own [-].
+    load : vertical load [N].   mu : friction over the tire's own [-].
     """
     floored = ca.fmax(load, _LEAST_LOAD)
     # A tire may push at zero slip (its shifts); a free wheel then slips to where it does not.
@@ -112,7 +103,6 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
 
 def downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
     """Return what the air adds to the loads of front and rear axle [N]; 0 of a car without.
-
     v_x : longitudinal speed [m/s].
     """
     if not vehicle.has_downforce:
@@ -134,11 +124,9 @@ def wheel_loads(
     An axle takes its share of the spring and damper moment and, through its roll center, the
     moment of its own side force. A wheel that would pull on the road is lifted: its load is zero
     and the other wheel of the axle carries all; the moment beyond that is lost.
-
     roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
     axle_force : side force of the front and the rear axle, body frame, (2,) [N].
-    a_x : longitudinal acceleration [m/s^2].
-    pressed : downforce of front and rear axle [N].
+    a_x : longitudinal acceleration [m/s^2].   pressed : downforce of front and rear axle [N].
     """
     c = vehicle.require_chassis()
     total = vehicle.weight + pressed[0] + pressed[1]
@@ -164,7 +152,6 @@ def wheel_loads(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
     """Gains of the speed controller; the defaults hold the speed within about 0.1 m/s.
-
     gain : acceleration per speed error [1/s].
     integral_gain : acceleration per integrated speed error [1/s^2], zero for none.
     acceleration_limit : largest demand, driving and braking [m/s^2].
@@ -181,9 +168,7 @@ class Driver:
 
     def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
         """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
-
-        error : wanted minus actual speed [m/s].
-        integral : of the error [m].
+        error : wanted minus actual speed [m/s].   integral : of the error [m].
         """
         unlimited = self.gain * error + self.integral_gain * integral
         limit = self.acceleration_limit
@@ -199,8 +184,6 @@ OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "accelerat
 
 def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
     """Return the components of a wheel-frame vector in the body frame.
-
-    x, y : components in the frame of the wheel.
     angle : steering angle of the wheel [rad].
     """
     c, s = ca.cos(angle), ca.sin(angle)
@@ -274,21 +257,16 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     outputs = [ca.vertcat(*v) for v in (F_x, F_y)] + [F_z]
     outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y + wind))]
     return ca.Function(
-        "car",
-        [x, command, v_ref, mu, places, aside],
-        [x_dot, *outputs],
-        ["x", "command", "v_ref", "mu", "places", "aside"],
-        ["x_dot", *OUTPUTS],
-    )
+        "car", [x, command, v_ref, mu, places, aside], [x_dot, *outputs],
+        ["x", "command", "v_ref", "mu", "places", "aside"], ["x_dot", *OUTPUTS],
+    )  # fmt: skip
 
 
 def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
     """Return one classical fourth-order step as an MX function which calls `car` four times.
 
     Its outputs are those of the state before the step.
-
-    car : from `dynamics`.
-    dt : step [s].
+    car : from `dynamics`.   dt : step [s].
     """
     x = ca.MX.sym("x", N_STATES)
     rest = [ca.MX.sym(car.name_in(i), *car.size_in(i)) for i in range(1, car.n_in())]

@@ -27,7 +27,6 @@ from models.vehicle import GRAVITY, Vehicle, VehicleError
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlantRun:
     """The truth of a run: n samples, SI, ISO axes; wheels in the order FL, FR, RL, RR.
-
     t : time [s], (n,).
     v_x, v_y : velocity of the center of gravity in the body frame [m/s], (n,).
     r : yaw rate [rad/s], (n,).
@@ -71,9 +70,7 @@ class PlantRun:
         cls, name: str, vehicle: Vehicle, t: Array, command: Array, record: Mapping[str, Array]
     ) -> "PlantRun":
         """Name the columns of what the compiled loop recorded.
-
-        t : time [s], (n,).
-        command : steering asked for [rad], (n, 2).
+        t : time [s], (n,).   command : steering asked for [rad], (n, 2).
         record : state "x" (n, 18) in the order of `models.plant.dynamics`, and its outputs.
         """
         names = ("v_x", "v_y", "r", "roll", "roll_rate", "X", "Y", "psi")
@@ -82,37 +79,21 @@ class PlantRun:
         a_x, a_y = record["acceleration"].T
         forces = {key: record[key] for key in ("F_x", "F_y", "F_z", "alpha", "axle_force")}
         return cls(
-            name=name,
-            vehicle=vehicle,
-            t=t,
-            a_x=a_x,
-            a_y=a_y,
-            command=command,
-            delta_f=delta_f,
-            delta_r=delta_r,
-            **motion,
-            **forces,
-        )
+            name=name, vehicle=vehicle, t=t, a_x=a_x, a_y=a_y, command=command, delta_f=delta_f,
+            delta_r=delta_r, **motion, **forces,
+        )  # fmt: skip
 
     def recording(
         self, sensors: Sensors | None = None, rng: np.random.Generator | None = None
     ) -> Recording:
         """Return what a log of this run would hold, with the axle forces as truth.
-
         sensors : what the signals go through; None measures exactly.
         rng : source of the noise; needed when there are sensors.
         """
         exact = Recording(
-            name=self.name,
-            t=self.t,
-            v_x=self.v_x,
-            v_y=self.v_y,
-            r=self.r,
-            delta_f=self.delta_f,
-            delta_r=self.delta_r,
-            a_y=self.a_y,
-            axle_force=self.axle_force,
-        )
+            name=self.name, t=self.t, v_x=self.v_x, v_y=self.v_y, r=self.r, delta_f=self.delta_f,
+            delta_r=self.delta_r, a_y=self.a_y, axle_force=self.axle_force,
+        )  # fmt: skip
         if sensors is None:
             return exact
         if rng is None:
@@ -133,11 +114,7 @@ FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
 
 
 class _CompiledLoop(NamedTuple):
-    """A plant over time: the library of all cars that are built alike, and the numbers of this one.
-
-    scan : of one step of the integration.
-    constants : its input of that name.
-    """
+    """A plant over time: library of cars that are built alike, and the numbers of this one."""
 
     scan: Scan
     constants: Array
@@ -148,7 +125,6 @@ def _compiled_loop(
     vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt: float
 ) -> _CompiledLoop:
     """Return the compiled loop of a plant over time, built once.
-
     dt : step of the integration [s].
     """
     car, constants = lifted(dynamics(vehicle, tires, driver))
@@ -163,7 +139,6 @@ _GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 
 def tire_of(vehicle: Vehicle) -> MagicFormula:
-    """Return the tire of the file that a chassis names."""
     file = vehicle.require_chassis().tire
     if file is None:
         raise VehicleError(
@@ -191,7 +166,6 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
 
 class Plant:
     """A double-track car on its tires.
-
     vehicle : the car; it needs a chassis.
     tire : of all four wheels, a frozen record; None reads the file named by the chassis.
     rear_tire : of the two rear wheels, where they have another.
@@ -234,8 +208,6 @@ class Plant:
         sample_time : step of the record [s], a multiple of `dt`.
         name : of the run; None takes the name of the maneuver's class.
 
-        Returns
-        -------
         The run at every `sample_time` from 0 to the maneuver's duration.
         """
         every = round(sample_time / dt) if dt > 0.0 else 0
@@ -269,10 +241,7 @@ class Plant:
         return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
 
     def loop(self, dt: float) -> _CompiledLoop:
-        """Return the compiled loop over time.
-
-        dt : step of the integration [s].
-        """
+        """Return the compiled loop over time.   dt : step of the integration [s]."""
         return _compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
 
 
@@ -307,7 +276,6 @@ class PlantState(NamedTuple):
 
 class StepwisePlant:
     """A plant that is driven period by period.
-
     friction : of the road; None is what the tire was measured on.
     period : for which command and wanted speed are held [s], a multiple of `dt`.
     dt : step of the integration [s].
@@ -343,10 +311,7 @@ class StepwisePlant:
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
-
-        v_x : speed [m/s].
-        X, Y : position of the center of gravity [m].
-        psi : heading [rad].
+        v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
         """
         if not v_x > 0.0:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
@@ -356,9 +321,7 @@ class StepwisePlant:
 
     def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
         """Return the plant one period later.
-
-        command : steering angles asked for, [δ_f, δ_r] [rad].
-        v_ref : wanted speed [m/s].
+        command : steering angles asked for, [δ_f, δ_r] [rad].   v_ref : wanted speed [m/s].
         """
         if not np.isfinite([*command, v_ref]).all():
             raise ValueError(f"command and v_ref must be finite, they are {command} and {v_ref}")

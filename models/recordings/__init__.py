@@ -9,17 +9,7 @@ from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
 
 __all__ = [
-    "LogMap",
-    "Recording",
-    "RecordingError",
-    "Repair",
-    "Wheels",
-    "check_against_vehicle",
-    "check_physics",
-    "joined",
-    "read_recording",
-    "read_repaired",
-    "runs",
-    "split_log_argument",
+    "LogMap", "Recording", "RecordingError", "Repair", "Wheels", "check_against_vehicle",
+    "check_physics", "joined", "read_recording", "read_repaired", "runs", "split_log_argument",
     "write_recording",
-]
+]  # fmt: skip

@@ -73,15 +73,9 @@ class Segments(NamedTuple):
 
 
 def recording_of(
-    log: LogFile,
-    name: str,
-    log_map: LogMap,
-    *,
-    run: str | None,
-    dt: float,
+    log: LogFile, name: str, log_map: LogMap, *, run: str | None, dt: float
 ) -> Recording:
     """Return one run of a log on a uniform clock, not yet judged by physics.
-
     name : of the recording, without its run.
     run : name of the run; None where the map names it, or there is only one.
     dt : sample time T_s of the result [s].
@@ -144,11 +138,7 @@ def _notes(log: LogFile) -> tuple[str, ...]:
 
 
 def _channels(
-    log: LogFile,
-    label: str,
-    signals: Mapping[str, Signal],
-    log_map: LogMap,
-    run: str | None,
+    log: LogFile, label: str, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
 ) -> dict[str, list[Raw]]:
     """Return by signal its channels in SI, each on its own clock.
 
@@ -183,10 +173,7 @@ def _channels(
 
 
 def scaled(values: Array, factor: float) -> Array:
-    """Return values times a factor; themselves where it is one.
-
-    values : (n,).
-    """
+    """Return values times a factor; themselves where it is one.   values : (n,)."""
     if factor == 1.0:
         return values
     return filled(values.size, lambda part: values[part] * factor)
@@ -311,7 +298,6 @@ def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
 
 
 def _gap_notes(segments: list[Segment]) -> tuple[str, ...]:
-    """Return what is to be said of gaps."""
     if len(segments) < 2:
         return ()
     times = [after.t[0] - before.t[-1] for before, after in pairwise(segments)]
@@ -358,7 +344,6 @@ def wheel_scales(
     log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
 ) -> dict[str, Scale]:
     """Return how wheels roll by the v_x that is logged as well, by name of the wheel.
-
     signals : v_x, wheels, and r where it is there; others are not looked at.
     """
     headings = log.headings()
@@ -378,7 +363,6 @@ def _scale_note(
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
-    """Return the units of wheels, told or else of the file, by signal."""
     units = {one.name: one.unit for one in headings}
     return {
         name: one.unit if is_given(one.unit) else units[one.channel[0]]

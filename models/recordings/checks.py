@@ -57,13 +57,7 @@ def _refuse(recording: Recording, contradiction: str | None) -> None:
 
 
 def physics_contradiction(recording: Recording) -> str | None:
-    """Return how a recording contradicts the laws of motion: column, rule, value and remedy.
-
-    Returns
-    -------
-    str | None
-        One line about the first law that is broken, None where all hold.
-    """
+    """Return how a recording contradicts the laws of motion: column, rule, value and remedy."""
     world = world_axes(recording)
     if world is not None:
         return world
@@ -311,7 +305,9 @@ def _check_steering(recording: Recording, w: Means, turn: Steering) -> str | Non
     steering says the same as large, since a car that slides over its front wheels reads long;
     lower bound 0.03 m (half a 1:43 car) rising to 0.12 m at 8 m/s (a sedan in degrees/s 0.05).
     """
-    column = _larger_steering(recording)
+    some = slice(None, None, thinning(len(recording)))
+    front, rear = (np.mean(angle[some] ** 2) for angle in (recording.delta_f, recording.delta_r))
+    column = "delta_f" if front >= rear else "delta_r"
     L = turn.wheelbase
     if turn.correlation < 0.7:
         return None
@@ -405,13 +401,6 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
     return None
 
 
-def _larger_steering(recording: Recording) -> str:
-    """Name the axle that steers more."""
-    some = slice(None, None, thinning(len(recording)))
-    front, rear = (np.mean(angle[some] ** 2) for angle in (recording.delta_f, recording.delta_r))
-    return "delta_f" if front >= rear else "delta_r"
-
-
 # The checks that need the axle positions: slip angles against accelerations and forces.
 
 LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
@@ -442,7 +431,6 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     each axle's force, or failing that the lateral acceleration for the rear, rises with its slip
     angle (correlation above -0.3); the mass that the forces accelerate is a third to three times
     the vehicle's.
-
     vehicle : anything with l_f and l_r [m] and mass [kg].
     """
     _refuse(recording, vehicle_contradiction(recording, vehicle))
@@ -450,13 +438,7 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
 
 def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
     """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`.
-
     vehicle : anything with l_f and l_r [m] and mass [kg].
-
-    Returns
-    -------
-    str | None
-        One line about the first rule that is broken, None where all hold.
     """
     w = windows(recording)
     a = w.acceleration

@@ -52,7 +52,6 @@ def column_of(name: str) -> str:
 def chosen_signals(
     log: LogFile, headings: Sequence[Heading], log_map: LogMap, run: str | None
 ) -> Reading:
-    """Return how each signal is read."""
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
     lost = _lost_text(log_map.signals, by_map)
@@ -153,7 +152,6 @@ def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:
 
 
 def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
-    """Return the signals that bear the standard names of columns."""
     found = {}
     for name in QUANTITIES:
         column = column_of(name)

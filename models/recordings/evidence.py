@@ -130,9 +130,7 @@ def windows(recording: Recording) -> Means:
 
 def least_squares(X: Array, y: Array) -> Fit:
     """Fit y = X theta; standard errors count overlapping windows once.
-
-    X : regressors, shape (k, p).
-    y : response, shape (k,).
+    X : regressors, shape (k, p).   y : response, shape (k,).
     """
     size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
     theta, *_ = np.linalg.lstsq(X / size, y, rcond=None)
@@ -149,7 +147,6 @@ def least_squares(X: Array, y: Array) -> Fit:
 
 def correlation(a: Array, b: Array) -> float:
     """Correlation about zero, from -1 to 1; 0 where one is zero throughout.
-
     a, b : samples of two signals, shape (k,).
     """
     return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)
@@ -159,7 +156,6 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
     """Return the windows where one of two measures is beyond a fifth of what it reaches, (k,).
 
     So neither a long straight nor a channel that holds noise hides the other.
-
     a, b : of each window, in any unit (k,).
     """
     some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)
@@ -170,9 +166,7 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
 
 def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     """Return how two measures of the same bends go together, in the windows where either turns.
-
-    a, b : of each window, in any unit (k,).
-    keep : windows that may count (k,).
+    a, b : of each window, in any unit (k,).   keep : windows that may count (k,).
     """
     some = turning(a, b)
     if keep is not None:
@@ -227,8 +221,6 @@ def steering(w: Means) -> Steering | None:
     It is the wheelbase L of a neutral car; understeer adds K v_x^2. Samples with the tail out,
     where a driver may countersteer, do not count. Needs 2 s of turning, in which r and the steering
     go together beyond chance.
-
-    w : window means.
     """
     return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
 
@@ -237,8 +229,6 @@ def proportional(w: Means) -> bool:
     """Whether the car turns the more, the more it is steered: it does not slide over its front.
 
     Large steering, beyond 0.7 of what is usual at most, is compared with 0.3 to 0.7 of that.
-
-    w : window means.
     """
     size = np.abs(w.v_x * w.delta)
     most = float(np.percentile(size, 95))
@@ -256,8 +246,6 @@ def onset(w: Means) -> Steering | None:
     """Return the same from the windows with less than half the usual peak steering, or None.
 
     A car that slides over its front wheels reads long at large steering and normal here.
-
-    w : window means.
     """
     size = np.abs(w.delta)
     return _wheelbase(w, size < 0.5 * np.percentile(size, 95))
@@ -282,7 +270,6 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
 
 
 def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:
-    """Return the sums of `width` samples of a signal from each start."""
     if n > LONG:  # windows are far apart: their samples are looked at alone
         sums: Array = np.sum([signal(start + k) for k in range(width)], axis=0)
         return sums

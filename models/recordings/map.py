@@ -71,11 +71,6 @@ class LogMap:
         one, of second order, which looks at no later sample: so none is late against another.
     wheels : what they are, where v_x is made of their speeds.
     repair : corrections of the recording and of the car, after reading.
-
-    Raises
-    ------
-    RecordingError
-        Where a signal, word or number is none that can be.
     """
 
     signals: Mapping[str, Signal] = field(default_factory=dict)
@@ -131,12 +126,7 @@ class LogMap:
         return set(NEEDED) <= given_by(self.signals)
 
     def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
-        """Return the map with some signals declared otherwise; v_y and beta replace one another.
-
-        Parameters
-        ----------
-        signals : by our name.
-        """
+        """Return the map with some signals declared otherwise; v_y and beta replace one another."""
         merged = dict(self.signals)
         for name in signals:
             merged.pop(INSTEAD.get(name, ""), None)
@@ -145,10 +135,6 @@ class LogMap:
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> "LogMap":
         """Read a log.toml.
-
-        Parameters
-        ----------
-        path : of the file.
 
         Raises
         ------

@@ -30,7 +30,6 @@ class Portion(NamedTuple):
 
     def place(self, index: int) -> int:
         """Return how many of its samples lie before a sample of the whole.
-
         index : of the sample; as many as there are is the end.
         """
         return int(np.searchsorted(self.samples, index))
@@ -41,7 +40,6 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
 
     The recording is divided into parts of one length, and of each the segment is taken in which the
     car is turned hardest: by the sum of (v_x r)².
-
     middle : sample before which half of the segments shall lie; None spreads them over all.
     """
     n = len(recording)

@@ -38,7 +38,6 @@ def with_pose(
     """Return signals and their channels with v_x, v_y and r of the pose in its place, and notes.
 
     A gyro tells how late it, and what else a box has, is against the pose; that is taken out.
-
     parts : by signal its channels in SI.
     """
     if not set(POSE) <= set(signals):
@@ -116,7 +115,6 @@ class Smooth(NamedTuple):
 
 def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
     """Return how a car moves by its pose.
-
     parts : by name of `POSE` on one clock or several, SI.
     """
     x = parts["x"]
@@ -169,7 +167,6 @@ class _Piece(NamedTuple):
 
 
 def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
-    """Return a piece on an even clock, smoothed."""
     step = float((t[-1] - t[0]) / (t.size - 1))
     even = t[0] + step * np.arange(t.size)
     even = t if np.abs(even - t).max() < 1e-6 * step else even
@@ -181,7 +178,6 @@ def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
 
 def smoothed(z: Array) -> Smooth:
     """Return columns of one size, smoothed alike as strongly as they predict themselves best.
-
     z : (n, k), evenly sampled.
     """
     from scipy.fft import dct  # takes longer than to read a short log

@@ -98,8 +98,6 @@ def read_repaired(
 
     Parameters
     ----------
-    path : a log of any format.
-    vehicle : as it was declared.
     run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
     columns, log_map : as of `read_recording`.
@@ -135,7 +133,6 @@ def repair_text(repair: Repair) -> str:
 
 def map_of(told: Told) -> LogMap:
     """Return a map that may be given as a path; an empty one where there is none.
-
     told : a map, the path of a log.toml, or None.
     """
     if told is None:

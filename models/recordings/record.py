@@ -38,16 +38,9 @@ MISSING = {
 
 # Beyond these, in SI, a number is no signal of a car whatever its unit: degrees, g and km/h fit.
 LARGEST = {
-    "t": 1e12,
-    "v_x": 1e4,
-    "v_y": 1e4,
-    "r": 1e4,
-    "delta_f": 1e5,
-    "delta_r": 1e5,
-    "a_x": 1e5,
-    "a_y": 1e5,
-    "axle_force": LARGEST_FORCE,
-}
+    "t": 1e12, "v_x": 1e4, "v_y": 1e4, "r": 1e4, "delta_f": 1e5, "delta_r": 1e5, "a_x": 1e5,
+    "a_y": 1e5, "axle_force": LARGEST_FORCE,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -152,7 +145,6 @@ class Recording:
                 )
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return int(self.t.size)
 
     @property
@@ -195,11 +187,6 @@ class Recording:
         Parameters
         ----------
         name : "v_y" [m/s] or "a_y" [m/s²].
-
-        Raises
-        ------
-        RecordingError
-            Where it was not logged.
         """
         signal: Array | None = getattr(self, name)
         if signal is None:
@@ -277,7 +264,6 @@ class Recording:
 
     def __getitem__(self, times: slice) -> "Recording":
         """Return the part between two times [s], both included, as label slices of pandas have it.
-
         times : `log[5.0:20.0]`, on the recording's own clock; what is left out is the begin or end.
         """
         if not isinstance(times, slice) or times.step is not None:
@@ -309,11 +295,6 @@ class Recording:
         Parameters
         ----------
         kept : consecutive samples as a slice, which is not copied, or indices that rise.
-
-        Raises
-        ------
-        RecordingError
-            Where no segment of 10 samples is left.
         """
         pieces = self._pieces(kept)
         whole = [piece for piece in pieces if piece.stop - piece.start >= MINIMUM_SAMPLES]
@@ -341,12 +322,7 @@ class Recording:
         return replace(self, **cut, breaks=tuple(int(k) for k in ends[:-1]), notes=notes)
 
     def without_scraps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Return samples but for those of segments that `taken` would leave out.
-
-        Parameters
-        ----------
-        samples : indices, rising.
-        """
+        """Return samples but for those of segments that `taken` would leave out."""
         pieces = self._pieces(samples)
         lengths = np.array([piece.stop - piece.start for piece in pieces], dtype=np.intp)
         return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
@@ -372,10 +348,7 @@ class Recording:
 
 
 def peak(signal: Array) -> float:
-    """Return the largest size of a signal.
-
-    signal : samples, any shape (...).
-    """
+    """Return the largest size of a signal.   signal : samples, any shape (...)."""
     return max(abs(float(signal.min())), abs(float(signal.max())))
 
 
@@ -388,9 +361,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
 
     Each keeps its own time where it begins after the one before; else its time is moved to begin
     `PAUSE` after it. Signals that one lacks are left out of all.
-
-    recordings : sampled alike; at least one.
-    name : of the drive; None takes all their names.
+    recordings : sampled alike; at least one.   name : of the drive; None takes all their names.
     """
     first = recordings[0]
     name = " + ".join(one.name for one in recordings) if name is None else name
@@ -474,7 +445,6 @@ def _nobody_writes(array: NDArray[Any]) -> bool:
 
 def side_by_side(first: Array, second: Array) -> Array:
     """Return two signals as columns that nobody may write, (n, 2).
-
     first, second : signals (n,).
     """
     both = large((first.size, 2))
@@ -502,11 +472,6 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     segments where each lasts a second and time leaps by more than 0.1 s between them. Over a
     shorter gap a reader draws a line, unless its map tells a shorter `longest_gap`, and shorter
     segments it leaves out. The file appears whole or not at all; an existing one is replaced.
-
-    Returns
-    -------
-    Path
-        The file written.
     """
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
@@ -519,15 +484,10 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
 def _columns(recording: Recording) -> dict[str, Array]:
     """Return the signals that there are, by the standard names of columns."""
     signals = {
-        "t": recording.t,
-        "vx": recording.v_x,
-        "vy": recording.logged_v_y,
-        "r": recording.r,
-        "delta_f": recording.delta_f,
-        "delta_r": recording.delta_r,
-        "ay": recording.a_y,
+        "t": recording.t, "vx": recording.v_x, "vy": recording.logged_v_y, "r": recording.r,
+        "delta_f": recording.delta_f, "delta_r": recording.delta_r, "ay": recording.a_y,
         "ax": recording.a_x,
-    }
+    }  # fmt: skip
     columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
@@ -535,7 +495,6 @@ def _columns(recording: Recording) -> dict[str, Array]:
 
 
 def _csv(columns: Mapping[str, Array]) -> Iterator[bytes]:
-    """Yield a table as CSV, block by block."""
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(columns)
@@ -569,9 +528,7 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
 
     Time stamps that are that grid keep their bits. Those that only jitter about it, or drift by
     less than 1 % of a step, are replaced by it, and the values stay.
-
-    t : rising time stamps [s], shape (n,).
-    columns : name -> values, shape (n,).
+    t : rising time stamps [s], shape (n,).   columns : name -> values, shape (n,).
     dt : step of the grid [s].
     """
     off = _off_grid(t, dt)

@@ -2,7 +2,7 @@
 
 What a log shows of a drive is made in this order: the place of the sensor, the way it looks, its
 low pass, its delay, its offset, its factor. It is taken out backwards. Conventions are those of
-`models.faults`: a fault that is applied and repaired gives the drive back.
+`benchmarks.faults`: a fault that is applied and repaired gives the drive back.
 """
 
 import math
@@ -75,16 +75,10 @@ class Repair:
             _require_finite(name, getattr(self, name))
 
     def __bool__(self) -> bool:
-        """Whether there is anything to repair."""
         return self != Repair()
 
     def apply(self, recording: Recording, vehicle: Vehicle) -> tuple[Recording, Vehicle]:
         """Return the recording and the car without the faults; true forces stay those of the drive.
-
-        Parameters
-        ----------
-        recording : as it was logged.
-        vehicle : as it was declared.
 
         Raises
         ------
@@ -146,17 +140,7 @@ class Repair:
         return signal
 
     def on(self, vehicle: Vehicle) -> Vehicle:
-        """Return the car with the corrected numbers.
-
-        Parameters
-        ----------
-        vehicle : as it was declared.
-
-        Raises
-        ------
-        VehicleError
-            Where these are the numbers of no car.
-        """
+        """Return the car with the corrected numbers."""
         if not self.vehicle:
             return vehicle
         numbers: dict[str, Any] = dict(self.vehicle)
@@ -190,10 +174,6 @@ class Repair:
         """Return what both take out, as of numbers that were estimated together.
 
         Factors multiply, all else adds; of the numbers of the car the other's hold.
-
-        Parameters
-        ----------
-        other : repairs that come beside these.
         """
         sums: dict[str, Any] = {
             name: _added(getattr(self, name), getattr(other, name))
@@ -218,10 +198,6 @@ class Repair:
         taken off behind a turned sensor; a place is that of the signals as they end. It is exact
         but for products of small numbers: a turn before v_x and v_y are scaled by different sizes,
         a place before a turn, and channels that are late and are used for another.
-
-        Parameters
-        ----------
-        other : what the log, repaired by this, still wants.
 
         Raises
         ------
@@ -269,11 +245,6 @@ class Repair:
         Parameters
         ----------
         table : as `tables` returns it; what is missing repairs nothing.
-
-        Raises
-        ------
-        ValueError
-            Of the table's class for a key or type that is not known; `RecordingError` for a value.
         """
         table.only(*SCALARS, "sideslip", *TABLES)
         given: dict[str, Any] = {name: table.number(name) for name in SCALARS if name in table}
@@ -303,7 +274,6 @@ def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, fl
 
 def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
     """Return values of samples that are computed of their segment alone, block by block (n,).
-
     compute : returns the values of a part (k,) of a segment, told both.
     """
     values = large((len(recording),))
@@ -315,7 +285,6 @@ def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array])
 
 
 def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:
-    """Return samples of a part of a segment of a signal a delay earlier."""
     return np.interp(t[part] + delay, t[whole], signal[whole])
 
 

@@ -36,7 +36,6 @@ SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 class _Rolled(NamedTuple):
     """Forward speed of a segment [m/s], (n,), and what of it is not what all wheels say.
-
     gated, held : samples at which a wheel was left out, and at which all were.
     """
 
@@ -46,18 +45,11 @@ class _Rolled(NamedTuple):
 
 
 def rolled(
-    speeds: Mapping[str, Array],
-    r: Array,
-    delta_f: Array,
-    delta_r: Array,
-    wheels: Wheels,
-    dt: float,
+    speeds: Mapping[str, Array], r: Array, delta_f: Array, delta_r: Array, wheels: Wheels, dt: float
 ) -> _Rolled:
     """Return the forward speed at the center of gravity; no sample looks at a later one.
-
     speeds : at which wheels roll [m/s], by names of `WHEELS`, each (n,); at least one.
-    r : yaw rate [rad/s], (n,).
-    delta_f, delta_r : angles of the road wheels [rad], (n,).
+    r : yaw rate [rad/s], (n,).   delta_f, delta_r : angles of the road wheels [rad], (n,).
     dt : sample time [s].
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
@@ -116,7 +108,6 @@ class Rule(NamedTuple):
 
 def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
     """Return the speed at the next sample.
-
     c : speed of the center of gravity by each wheel [m/s], (k,).
     rates : by which each changed lately [m/s²], (k,).
     """
@@ -210,10 +201,7 @@ def _mean(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
 
 @cache
 def trust_scan(k: int) -> Scan:
-    """Return the compiled loop over samples.
-
-    k : wheels, and axles that count as one.
-    """
+    """Return the compiled loop over samples."""
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
     rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)
     after = trusted(

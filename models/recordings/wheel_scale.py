@@ -26,10 +26,7 @@ MOST = 200_000  # samples that are looked at
 
 class Scale(NamedTuple):
     """Speed over ground per what a wheel shows.
-
     value : radius [m] of one that shows turns, factor [-] of one that shows a speed.
-    turns : which of both.
-    seconds : of straight and even driving that tell it.
     """
 
     value: float
@@ -59,7 +56,6 @@ def identified_scales(
     parts: Mapping[str, Sequence[Raw]], signals: Mapping[str, Signal], units: Mapping[str, str]
 ) -> dict[str, Scale]:
     """Return the scale of each wheel that v_x tells, by name.
-
     parts : by signal its channels in SI; v_x, wheels, and r where it is there.
     """
     t = parts["v_x"][0].t
@@ -90,10 +86,7 @@ def identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[floa
     """Return the speed over ground per what a wheel shows, and the seconds that tell it.
 
     None where straight and even driving is too short, or does not agree on one number.
-
-    t : time [s], (n,), rising.
-    v_x : speed over ground [m/s], (n,).
-    r : yaw rate [rad/s], (n,).
+    t : time [s], (n,), rising.   v_x : speed over ground [m/s], (n,).   r : yaw rate [rad/s], (n,).
     wheel : what the wheel shows [rad/s or m/s], (n,).
     """
     step = float(np.median(np.diff(t)))

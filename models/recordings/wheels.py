@@ -69,12 +69,7 @@ class Wheels:
             )
 
     def radius_of(self, name: str) -> float | None:
-        """Return the radius of a wheel [m], of `wheel` that of the rear axle; None where unknown.
-
-        Parameters
-        ----------
-        name : of its signal.
-        """
+        """Return the radius of a wheel [m], of `wheel` that of the rear axle; None: unknown."""
         if not self.radius:
             return None
         k = WHEELS.index(name) if name in WHEELS[:4] else 2
@@ -84,12 +79,7 @@ class Wheels:
         return self.radius[min(k // 2, len(self.radius) - 1)]
 
     def completed(self, vehicle: Vehicle) -> "Wheels":
-        """Return it, completed by what the vehicle declares.
-
-        Parameters
-        ----------
-        vehicle : that drove.
-        """
+        """Return it, completed by what the vehicle declares."""
         track, chassis = self.track, vehicle.chassis
         if not track and chassis is not None:
             track = (chassis.track_front, chassis.track_rear)
@@ -113,11 +103,6 @@ class Wheels:
         Parameters
         ----------
         table : as `table` returns it.
-
-        Raises
-        ------
-        ValueError
-            Of the table's class for a key or type that is not known; `RecordingError` for a value.
         """
         table.only(*(one.name for one in fields(cls)))
         given: dict[str, Any] = {}

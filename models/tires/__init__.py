@@ -7,15 +7,6 @@ from models.tires.simple import DugoffTire, FialaTire, LinearTire
 from models.tires.tir import TirError, TirFile, ValidRange, read_tir
 
 __all__ = [
-    "Coefficients",
-    "DugoffTire",
-    "FialaTire",
-    "LinearTire",
-    "MagicFormula",
-    "TirError",
-    "TirFile",
-    "Tire",
-    "TireForces",
-    "ValidRange",
-    "read_tir",
-]
+    "Coefficients", "DugoffTire", "FialaTire", "LinearTire", "MagicFormula", "TirError", "TirFile",
+    "Tire", "TireForces", "ValidRange", "read_tir",
+]  # fmt: skip

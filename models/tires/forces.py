@@ -14,11 +14,7 @@ Expression: TypeAlias = Any  # float, casadi.DM, SX or MX; CasADi has no stubs
 
 class TireForces(NamedTuple):
     """The force of the road on one wheel, in the wheel frame.
-
-    Attributes
-    ----------
-    F_x : longitudinal force, > 0 drives [N].
-    F_y : lateral force, > 0 to the left [N].
+    F_x : longitudinal force, > 0 drives [N].   F_y : lateral force, > 0 to the left [N].
     """
 
     F_x: Expression
@@ -40,33 +36,23 @@ class Tire(Protocol):
         mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
-
-        alpha : slip angle, paper's sign [rad].
-        kappa : longitudinal slip [-].
-        gamma : camber [rad].
-        F_z : wheel load [N]; no force at F_z <= 0.
+        alpha : slip angle, paper's sign [rad].   kappa : longitudinal slip [-].
+        gamma : camber [rad].   F_z : wheel load [N]; no force at F_z <= 0.
         mu : friction of the road over that of the measurement [-].
         """
         ...
 
     def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ at zero slip and camber [N].
-
-        F_z : wheel load [N].
-        """
+        """∂F_x/∂κ at zero slip and camber [N].   F_z : wheel load [N]."""
         ...
 
     def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α at zero slip and camber [N/rad].
-
-        F_z : wheel load [N].
-        """
+        """∂F_y/∂α at zero slip and camber [N/rad].   F_z : wheel load [N]."""
         ...
 
 
 def positive(x: Expression) -> Expression:
     """The number where it is above 0, else 0; NaN stays NaN, which fmax(x, 0) would hide.
-
     x : any number; for a wheel load [N], 0 means lifted off: a tire cannot pull.
     """
     return x * (x > 0)
@@ -82,7 +68,6 @@ def folded(alpha: Expression) -> Expression:
 
     tan α is the sideways over the absolute forward speed, so a wheel that rolls backwards, with
     |α| > π/2, slips by π - α.
-
     alpha : slip angle [rad], any real number.
     """
     return ca.atan2(ca.sin(alpha), ca.fabs(ca.cos(alpha)))
@@ -99,11 +84,7 @@ NO_FORCE = 1e-6  # N; rounds the root of a sum of squares at zero, so that its d
 
 class Slips(NamedTuple):
     """The demand of a tread that never slides, and the speed it refers to.
-
-    Attributes
-    ----------
-    p_x, p_y : C_κ κ and C_α tan α [N].
-    size : length of (p_x, p_y) [N], never zero.
+    p_x, p_y : C_κ κ and C_α tan α [N].   size : length of (p_x, p_y) [N], never zero.
     rolling : 1 + κ, rolling over forward speed [-], never zero.
     """
 
@@ -115,11 +96,9 @@ class Slips(NamedTuple):
 
 def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
     """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
-
     alpha : slip angle, paper's sign [rad].
     kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-    C_alpha : cornering stiffness [N/rad].
-    C_kappa : longitudinal slip stiffness [N].
+    C_alpha : cornering stiffness [N/rad].   C_kappa : longitudinal slip stiffness [N].
     """
     tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR)
     p_x = C_kappa * kappa
@@ -128,7 +107,7 @@ def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) 
     return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
 
 
-# The two slopes of a tire whose stiffness is the same at every load: methods of such tires.
+# What tires share whose stiffness is the same at every load: methods of such tires.
 
 
 class _ConstantStiffness(Protocol):
@@ -144,16 +123,35 @@ class _ConstantStiffness(Protocol):
 
 
 def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
-    """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
-
-    F_z : wheel load [N].
-    """
+    """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.   F_z : wheel load [N]."""
     return self.C_kappa * (F_z > 0)
 
 
 def cornering_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
-    """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
-
-    F_z : wheel load [N].
-    """
+    """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.   F_z : wheel load [N]."""
     return self.C_alpha * (F_z > 0)
+
+
+class _BrushTire(_ConstantStiffness, Protocol):
+    """A tire of constant stiffness whose force points along the demand of its tread."""
+
+    def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
+        """Force over the demand of a tread that never slides [-]."""
+
+
+def brush_forces(
+    self: _BrushTire,
+    alpha: Expression,
+    kappa: Expression,
+    gamma: Expression,
+    F_z: Expression,
+    mu: Expression = 1.0,
+) -> TireForces:
+    """Longitudinal and lateral force in the wheel frame [N].
+    kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
+    gamma : camber [rad]; without effect.
+    """
+    del gamma
+    s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    per_demand = self.per_demand(s, F_z, mu)
+    return TireForces(s.p_x * per_demand, s.p_y * per_demand)

@@ -1,4 +1,10 @@
-"""The Magic Formula 5.2 (PAC2002) as a tire of this package, read from a `.tir` file."""
+"""The Magic Formula 5.2 (PAC2002) as a tire of this package, read from a `.tir` file.
+
+In functions:
+gamma : camber [rad].   F_z : wheel load, not negative [N].
+mu : friction of the road over that of the measurement [-].   alpha : slip angle, ISO sign [rad].
+kappa : longitudinal slip [-].
+"""
 
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -19,9 +25,6 @@ _EPSILON = 1e-9  # N; keeps B = K/(C D) finite in the air and on ice, changes no
 
 class _Shape(NamedTuple):
     """Curve of a force over its slip at one load and camber, without E, which needs the slip.
-
-    Attributes
-    ----------
     B, C, D : stiffness [1/rad for α, - for κ], shape [-] and peak [N].
     S_H, S_V : shift of the slip [rad or -] and of the force [N].
     """
@@ -37,11 +40,7 @@ def _magic_curve(
     x: Expression, B: Expression, C: Expression, D: Expression, E: Expression
 ) -> Expression:
     """D sin(C atan(B x - E (B x - atan B x))), (4.49) without shifts.
-
-    x : slip, shifted.
-    B, C : stiffness and shape factor.
-    D : peak value [N].
-    E : curvature factor.
+    B, C : stiffness and shape factor.   D : peak value [N].
     """
     Bx = B * x
     return D * ca.sin(C * ca.atan(Bx - E * (Bx - ca.atan(Bx))))
@@ -61,7 +60,6 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
     """Share of the pure-slip force left by the other slip: 1 at s = 0, never negative.
 
     G = cos(C atan(B s_S - E (B s_S - atan B s_S))) over the same at S_H, with s_S = s + S_H.
-
     s : the other slip, not shifted.
     B, C, E : stiffness, shape and curvature factor of the weight.
     """
@@ -81,13 +79,7 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
 
 
 def _lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> _Shape:
-    """All of the curve that does not depend on slip.
-
-    c : coefficients of the tire file.
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    mu : friction of the road over that of the measurement [-].
-    """
+    """All of the curve that does not depend on slip."""
     df_z = c.load_increment(F_z)  # (4.E2)
     F_z0 = c.FNOMIN * c.LFZO  # (4.E1)
     LMUY = c.LMUY * mu
@@ -107,13 +99,7 @@ def _lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expr
 def _lateral_curvature(
     c: Coefficients, alpha_y: Expression, gamma: Expression, F_z: Expression
 ) -> Expression:
-    """E_y, at most 1.
-
-    c : coefficients of the tire file.
-    alpha_y : slip angle, ISO sign, shifted [rad].
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    """
+    """E_y, at most 1.   alpha_y : slip angle, ISO sign, shifted [rad]."""
     df_z = c.load_increment(F_z)
     asymmetry = (c.PEY3 + c.PEY4 * gamma * c.LGAY) * ca.sign(alpha_y)
     return ca.fmin((c.PEY1 + c.PEY2 * df_z) * (1.0 - asymmetry) * c.LEY, 1.0)  # (4.E24)
@@ -122,14 +108,7 @@ def _lateral_curvature(
 def pure_lateral(
     c: Coefficients, alpha: Expression, gamma: Expression, F_z: Expression, mu: Expression
 ) -> Expression:
-    """F_y0 [N] of a wheel that rolls freely, (4.E19).
-
-    c : coefficients of the tire file.
-    alpha : slip angle, ISO sign [rad].
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    mu : friction of the road over that of the measurement [-].
-    """
+    """F_y0 [N] of a wheel that rolls freely, (4.E19)."""
     B_y, C_y, D_y, S_Hy, S_Vy = _lateral_shape(c, gamma, F_z, mu)
     alpha_y = alpha + S_Hy  # (4.E20)
     E_y = _lateral_curvature(c, alpha_y, gamma, F_z)
@@ -144,15 +123,7 @@ def combined_lateral(
     F_z: Expression,
     mu: Expression,
 ) -> Expression:
-    """F_y [N] at any slip, (4.E58).
-
-    c : coefficients of the tire file.
-    alpha : slip angle, ISO sign [rad].
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    mu : friction of the road over that of the measurement [-].
-    """
+    """F_y [N] at any slip, (4.E58)."""
     df_z = c.load_increment(F_z)
     B_yk = c.RBY1 * ca.cos(ca.atan(c.RBY2 * (alpha - c.RBY3))) * c.LYKA  # (4.E62)
     C_yk = c.RCY1  # (4.E63)
@@ -167,11 +138,7 @@ def combined_lateral(
 
 
 def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
-    """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0.
-
-    c : coefficients of the tire file.
-    F_z : wheel load, not negative [N].
-    """
+    """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0."""
     B_y, C_y, D_y, S_Hy, _ = _lateral_shape(c, 0.0, F_z, 1.0)
     E_y = _lateral_curvature(c, S_Hy, 0.0, F_z)
     return _magic_slope(S_Hy, B_y, C_y, D_y, E_y)
@@ -187,13 +154,7 @@ def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
 def _longitudinal_shape(
     c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression
 ) -> _Shape:
-    """All of the curve that does not depend on slip.
-
-    c : coefficients of the tire file.
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    mu : friction of the road over that of the measurement [-].
-    """
+    """All of the curve that does not depend on slip."""
     df_z = c.load_increment(F_z)  # (4.E2)
     LMUX = c.LMUX * mu
     gamma_x = gamma * c.LGAX
@@ -208,12 +169,7 @@ def _longitudinal_shape(
 
 
 def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:
-    """E_x, at most 1.
-
-    c : coefficients of the tire file.
-    kappa_x : slip, shifted [-].
-    F_z : wheel load, not negative [N].
-    """
+    """E_x, at most 1.   kappa_x : slip, shifted [-]."""
     df_z = c.load_increment(F_z)
     E_0 = c.PEX1 + c.PEX2 * df_z + c.PEX3 * df_z**2
     return ca.fmin(E_0 * (1.0 - c.PEX4 * ca.sign(kappa_x)) * c.LEX, 1.0)  # (4.E14)
@@ -222,14 +178,7 @@ def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expressio
 def _pure_longitudinal(
     c: Coefficients, kappa: Expression, gamma: Expression, F_z: Expression, mu: Expression
 ) -> Expression:
-    """F_x0 [N] of a wheel that runs straight, (4.E9).
-
-    c : coefficients of the tire file.
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    mu : friction of the road over that of the measurement [-].
-    """
+    """F_x0 [N] of a wheel that runs straight, (4.E9)."""
     B_x, C_x, D_x, S_Hx, S_Vx = _longitudinal_shape(c, gamma, F_z, mu)
     kappa_x = kappa + S_Hx  # (4.E10)
     E_x = _longitudinal_curvature(c, kappa_x, F_z)
@@ -255,11 +204,7 @@ def _combined_longitudinal(
 
 
 def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
-    """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0.
-
-    c : coefficients of the tire file.
-    F_z : wheel load, not negative [N].
-    """
+    """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0."""
     B_x, C_x, D_x, S_Hx, _ = _longitudinal_shape(c, 0.0, F_z, 1.0)
     E_x = _longitudinal_curvature(c, S_Hx, F_z)
     return _magic_slope(S_Hx, B_x, C_x, D_x, E_x)
@@ -268,7 +213,6 @@ def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MagicFormula:
     """Steady-state Magic Formula 5.2 in combined slip with camber.
-
     side : side of the car this tire belongs to, "left" or "right".
     name : where the tire comes from, for messages and tables.
     """
@@ -283,10 +227,7 @@ class MagicFormula:
 
     @classmethod
     def from_tir(cls, path: str | PathLike[str]) -> Self:
-        """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).
-
-        path : the `.tir` file.
-        """
+        """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).   path : the `.tir` file."""
         c, side, valid_range, name = read_magic_formula(path)
         return cls(coefficients=c, side=side, valid_range=valid_range, name=name)
 
@@ -301,7 +242,6 @@ class MagicFormula:
         """Longitudinal and lateral force in the wheel frame [N].
 
         Outside `valid_range` the formula extrapolates: finite, but nobody measured it.
-
         alpha : slip angle, paper's sign [rad]; beyond ±π/2 the wheel rolls backwards.
         gamma : camber [rad], > 0 leans the top to the right.
         mu : friction of the road over that of the measurement [-]; multiplies LMUX and LMUY.
@@ -332,7 +272,6 @@ class MagicFormula:
 
     def mounted(self, side: Literal["left", "right"]) -> Self:
         """The tire for that side: itself where it belongs there, else mirrored.
-
         side : "left" or "right".
         """
         _require_side(side)

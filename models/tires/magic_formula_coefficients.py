@@ -23,7 +23,6 @@ _POSITIVE_SCALES = ("LCX", "LMUX", "LKX", "LCY", "LMUY", "LKY")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coefficients:
     """One tire, as its file has it.
-
     FNOMIN : nominal wheel load [N], > 0.
     PCX1, PDX1, PKX1 : shape, friction, slip stiffness over load of F_x, > 0.
     PCY1, PDY1 : shape and friction of F_y, > 0.
@@ -126,10 +125,7 @@ class Coefficients:
             )
 
     def load_increment(self, F_z: Expression) -> Expression:
-        """df_z = (F_z - F_z0)/F_z0 with F_z0 = LFZO FNOMIN [-], (4.E2).
-
-        F_z : wheel load [N].
-        """
+        """df_z = (F_z - F_z0)/F_z0 with F_z0 = LFZO FNOMIN [-], (4.E2).   F_z : wheel load [N]."""
         F_z0 = self.FNOMIN * self.LFZO
         return (F_z - F_z0) / F_z0
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from models.rules import require_positive
+from models.rules import require_positive_fields
 from models.tires import forces as constant_stiffness
-from models.tires.forces import NO_FORCE, Expression, TireForces, positive, slips, smaller
+from models.tires.forces import NO_FORCE, Expression, Slips, TireForces, positive, smaller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,7 +12,6 @@ class LinearTire:
     """F_x = C_κ κ, F_y = C_α α while the wheel touches the ground.
 
     Load only decides about contact; friction and camber do nothing: no limit, by definition.
-
     C_alpha : cornering stiffness of one tire [N/rad], > 0.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0.
     """
@@ -21,7 +20,7 @@ class LinearTire:
     C_kappa: float
 
     def __post_init__(self) -> None:
-        require_positive(ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa)
+        require_positive_fields(self)
 
     def forces(
         self,
@@ -32,7 +31,6 @@ class LinearTire:
         mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
-
         gamma : camber [rad]; without effect.
         mu : friction of the road over that of the measurement [-]; without effect.
         """
@@ -55,7 +53,6 @@ class LinearTire:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FialaTire:
     """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
-
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
@@ -66,31 +63,16 @@ class FialaTire:
     friction: float
 
     def __post_init__(self) -> None:
-        require_positive(
-            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
-        )
+        require_positive_fields(self)
 
-    def forces(
-        self,
-        alpha: Expression,
-        kappa: Expression,
-        gamma: Expression,
-        F_z: Expression,
-        mu: Expression = 1.0,
-    ) -> TireForces:
-        """Longitudinal and lateral force in the wheel frame [N].
-
-        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-        gamma : camber [rad]; without effect.
-        """
-        del gamma
-        s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
+        """Force over the demand of a tread that never slides [-]."""
         sliding = 3.0 * mu * self.friction * positive(F_z)  # demand at which all contact slides
         demand = s.size / s.rolling
         x = smaller(demand / (sliding + NO_FORCE), 1.0)
-        per_demand = (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
-        return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+        return (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
 
+    forces = constant_stiffness.brush_forces
     slip_stiffness = constant_stiffness.slip_stiffness
     cornering_stiffness = constant_stiffness.cornering_stiffness
 
@@ -105,7 +87,6 @@ class FialaTire:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DugoffTire:
     """Friction-limited linear tire: |F| < μ F_z, reached only in the limit; camber does nothing.
-
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
@@ -116,29 +97,14 @@ class DugoffTire:
     friction: float
 
     def __post_init__(self) -> None:
-        require_positive(
-            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
-        )
+        require_positive_fields(self)
 
-    def forces(
-        self,
-        alpha: Expression,
-        kappa: Expression,
-        gamma: Expression,
-        F_z: Expression,
-        mu: Expression = 1.0,
-    ) -> TireForces:
-        """Longitudinal and lateral force in the wheel frame [N].
-
-        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-        gamma : camber [rad]; without effect.
-        """
-        del gamma
-        s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
+        """Force over the demand of a tread that never slides [-]."""
         half = mu * self.friction * positive(F_z) / (2.0 * s.size)  # λ/(1 + κ)
         lam = smaller(half * s.rolling, 1.0)
-        per_demand = smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
-        return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+        return smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
 
+    forces = constant_stiffness.brush_forces
     slip_stiffness = constant_stiffness.slip_stiffness
     cornering_stiffness = constant_stiffness.cornering_stiffness

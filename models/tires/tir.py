@@ -26,23 +26,13 @@ from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 # Q.., L..) are dimensionless or in radian whatever [UNITS] says: their equations are in SI.
 
 _DIMENSIONS: Mapping[str, Mapping[str, int]] = {
-    "FNOMIN": {"FORCE": 1},
-    "FZMIN": {"FORCE": 1},
-    "FZMAX": {"FORCE": 1},
-    "UNLOADED_RADIUS": {"LENGTH": 1},
-    "WIDTH": {"LENGTH": 1},
-    "RIM_RADIUS": {"LENGTH": 1},
-    "RIM_WIDTH": {"LENGTH": 1},
-    "ALPMIN": {"ANGLE": 1},
-    "ALPMAX": {"ANGLE": 1},
-    "CAMMIN": {"ANGLE": 1},
-    "CAMMAX": {"ANGLE": 1},
-    "LONGVL": {"LENGTH": 1, "TIME": -1},
-    "VXLOW": {"LENGTH": 1, "TIME": -1},
-    "VERTICAL_STIFFNESS": {"FORCE": 1, "LENGTH": -1},
-    "VERTICAL_DAMPING": {"FORCE": 1, "TIME": 1, "LENGTH": -1},
-    "MBELT": {"MASS": 1},
-}
+    "FNOMIN": {"FORCE": 1}, "FZMIN": {"FORCE": 1}, "FZMAX": {"FORCE": 1},
+    "UNLOADED_RADIUS": {"LENGTH": 1}, "WIDTH": {"LENGTH": 1}, "RIM_RADIUS": {"LENGTH": 1},
+    "RIM_WIDTH": {"LENGTH": 1}, "ALPMIN": {"ANGLE": 1}, "ALPMAX": {"ANGLE": 1},
+    "CAMMIN": {"ANGLE": 1}, "CAMMAX": {"ANGLE": 1}, "LONGVL": {"LENGTH": 1, "TIME": -1},
+    "VXLOW": {"LENGTH": 1, "TIME": -1}, "VERTICAL_STIFFNESS": {"FORCE": 1, "LENGTH": -1},
+    "VERTICAL_DAMPING": {"FORCE": 1, "TIME": 1, "LENGTH": -1}, "MBELT": {"MASS": 1},
+}  # fmt: skip
 
 _POUND = 0.45359237  # kg
 _GRAVITY = 9.80665  # m/s², standard
@@ -87,7 +77,6 @@ def _unit_in_si(dimension: str, unit: str) -> float:
 
     Case and a plural s do not matter; from five letters on the beginning of a name will do,
     because some programs cut names after twelve letters.
-
     dimension : "LENGTH", "FORCE", "ANGLE", "MASS" or "TIME".
     """
     known = UNITS[dimension]
@@ -115,11 +104,7 @@ class TirError(TireidError, ValueError):
 
 class Entry(NamedTuple):
     """One `KEY = value` line.
-
-    Attributes
-    ----------
-    value : text without quotes and comment.
-    line : its number, from 1.
+    value : text without quotes and comment.   line : its number, from 1.
     section : the section it stands in, in capitals; empty before the first.
     """
 
@@ -131,7 +116,6 @@ class Entry(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TirFile:
     """The entries of one file.
-
     without_sign : lines that begin with a word but have no "=", by that word in capitals; their
         value is empty.
     """
@@ -145,14 +129,12 @@ class TirFile:
 
     def text(self, key: str, default: str) -> str:
         """The value as text.
-
         default : the answer where the file has no such key, or an empty value.
         """
         return self._text(key, default, self.entries.get(key, ()), self.without_sign.get(key, ()))
 
     def number(self, key: str) -> float | None:
         """The value in SI; None where the file has no such key.
-
         key : in capitals; those of `_DIMENSIONS` are converted from the units of the file.
         """
         if key not in self.entries:
@@ -163,7 +145,6 @@ class TirFile:
         return next(iter(values)) * self._unit(key)
 
     def error(self, reason: str) -> TirError:
-        """A TirError that names this file."""
         return TirError(f"{self.path}: {reason}")
 
     def _parsed(self, key: str, entry: Entry) -> float:
@@ -212,10 +193,7 @@ class TirFile:
 
 
 def read_tir(path: str | PathLike[str]) -> TirFile:
-    """Read a tire property file without judging what it describes.
-
-    path : the `.tir` file.
-    """
+    """Read a tire property file without judging what it describes.   path : the `.tir` file."""
     path = Path(path)
     entries: dict[str, list[Entry]] = {}
     without_sign: dict[str, list[Entry]] = {}
@@ -297,11 +275,8 @@ _SIGNED_AS_FRICTION = ("PDY1", "PDY2", "RVY1", "RVY2", "RVY3")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidRange:
     """What the tire was measured for, as (least, greatest); infinite where the file does not say.
-
     alpha : slip angle, paper's sign [rad]; the file has the ISO sign, so its limits change places.
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
-    F_z : wheel load [N].
+    kappa : longitudinal slip [-].   gamma : camber [rad].   F_z : wheel load [N].
     """
 
     alpha: tuple[float, float]
@@ -312,12 +287,8 @@ class ValidRange:
 
 class _MagicFormulaFile(NamedTuple):
     """What a file tells about its tire.
-
-    Attributes
-    ----------
     coefficients : of the force equations, at the inflation pressure of the file.
-    side : of the car the file is valid for.
-    valid_range : of the measurement.
+    side : of the car the file is valid for.   valid_range : of the measurement.
     name : file name without extension.
     """
 
@@ -328,10 +299,7 @@ class _MagicFormulaFile(NamedTuple):
 
 
 def read_magic_formula(path: str | PathLike[str]) -> _MagicFormulaFile:
-    """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.
-
-    path : the `.tir` file.
-    """
+    """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.   path : the `.tir` file."""
     tir = read_tir(path)
     _require_mf52(tir)
     c = _inflated(_coefficients(tir), tir)

@@ -78,7 +78,6 @@ class Vectors(NamedTuple):
     stride: int
 
     def measurement(self, k: int, horizon: int) -> Measurement:
-        """Return what the tracker is told at a step."""
         rows = np.append(k, k + self.offset + self.stride * np.arange(horizon))
         e_y, e_psi, v_y, r = map(float, self.measured[k])
         kappa, v_x = self.road[rows].T
@@ -90,7 +89,6 @@ def record(tracker: Tracker, steps: int = STEPS) -> Vectors:
 
     Numbers are rounded, and the car is computed without a function of a library: the record does
     not depend on the machine.
-
     tracker : in double; it is reset before, and steers.
     """
     tracker.reset()
@@ -178,10 +176,7 @@ TOLERANCE_DOUBLE, TOLERANCE_SINGLE = 1e-9, 1e-3
 
 class MpcPackage(NamedTuple):
     """A package before it is written.
-
-    name : prefix of every symbol.   tire : of the prediction.   problem : what is minimized.
     params : the numbers that it begins with, of `mpc.realtime.instance.c_types`.
-    files : texts by path.   vectors : of the self-test.   about : title, version, hash, as text.
     """
 
     name: str
@@ -204,7 +199,6 @@ def build_mpc_package(
     caution: float = 0.0,
 ) -> MpcPackage:
     """Return the package of a tracker; the same input gives the same bytes.
-
     period : between two steps [s].   delay : from a measurement until its command acts [s].
     single : whether float is the default precision.
     caution : of the tracker, from 0 to 1; a number of the parameters.
@@ -291,7 +285,6 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
 
 
 def _tables(name: str, params: _Params, about: Values) -> str:
-    """Return the numbers of the export as C."""
     return packaging.header(
         f"{name}_tables.h",
         f"The numbers of the export.\n\n{packaging.generated(about)}",

@@ -33,7 +33,6 @@ class NoHandoverError(TireidError, ValueError):
 
 
 def frozen_start(package: Package) -> TireModel:
-    """Return the model that an exported identifier begins with."""
     specialized = package.specialized
     if specialized.vehicle.has_downforce:
         raise NoHandoverError(
@@ -52,7 +51,6 @@ def frozen_start(package: Package) -> TireModel:
 
 def _handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
     """Return header and source by path.
-
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
     """
     specialized, model = identifier.specialized, frozen_start(identifier)
@@ -136,7 +134,6 @@ def build_pair(
     caution: float = 0.0,
 ) -> Pair:
     """Return the tracker that goes with an identifier, one step a sample, and what joins them.
-
     identifier : package of the identifier; its weights are the tire that is begun with.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.

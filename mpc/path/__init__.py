@@ -7,15 +7,6 @@ from mpc.path.path import Path, Projection
 from mpc.path.speed import grip_speed, steady_speed
 
 __all__ = [
-    "BUILT_IN",
-    "Path",
-    "PathError",
-    "Projection",
-    "constant_radius",
-    "grip_speed",
-    "handling_course",
-    "iso_3888_1",
-    "iso_3888_2",
-    "slalom",
-    "steady_speed",
-]
+    "BUILT_IN", "Path", "PathError", "Projection", "constant_radius", "grip_speed",
+    "handling_course", "iso_3888_1", "iso_3888_2", "slalom", "steady_speed",
+]  # fmt: skip

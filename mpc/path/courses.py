@@ -24,10 +24,7 @@ _SHORTEST_FREE = 1.0  # m, of a straight that closes a course
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straight:
-    """A straight.
-
-    length : [m].
-    """
+    """A straight.   length : [m]."""
 
     length: float
 
@@ -37,7 +34,6 @@ class Straight:
 
     def heading(self, s: Array) -> tuple[Array, Array]:
         """Return ψ [rad] since the start of the section and κ [1/m], (k,) each.
-
         s : since the start of the section [m], (k,).
         """
         return np.zeros_like(s), np.zeros_like(s)
@@ -51,7 +47,6 @@ class Straight:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
     """A turn at constant radius between two easings.
-
     radius : of the constant part [m].
     angle : heading gained over all of it [rad], > 0 to the left.
     easing : length over which the curvature rises, and falls again [m].
@@ -77,7 +72,6 @@ class Turn:
 
     def heading(self, s: Array) -> tuple[Array, Array]:
         """Return ψ [rad] since the start of the section and κ [1/m], (k,) each.
-
         s : since the start of the section [m], (k,).
         """
         peak = math.copysign(1.0 / self.radius, self.angle)
@@ -95,7 +89,6 @@ Section: TypeAlias = Straight | Turn
 
 def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
     """Put sections one after another, from the origin along X.
-
     spacing : longest step of the samples [m].
     """
     if not (spacing > 0.0 and sections):
@@ -115,7 +108,6 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
 
 def close(sections: Sequence[Section], free: tuple[int, int]) -> list[Section]:
     """Choose the lengths of two straights so that the course ends where it starts.
-
     sections : in driving order; they must turn by a multiple of 2 pi altogether.
     free : which two sections are straights of free length; they must not be parallel.
     """
@@ -154,14 +146,8 @@ def constant_radius(
     ----------
     radius : [m].
     turns : how often the car goes round [-].
-    left : whether to the left.
     run_in : straights before and after [m].
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
     """
     if not (radius > 0.0 and turns >= 0.1 and math.isfinite(radius * turns)):
         raise PathError(f"radius must be positive and turns 0.1 at least: {radius} m, {turns}")
@@ -184,11 +170,6 @@ def handling_course(*, spacing: float = 0.25) -> Path:
     Parameters
     ----------
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where spacing is not positive.
 
     Examples
     --------
@@ -223,7 +204,6 @@ def handling_course(*, spacing: float = 0.25) -> Path:
 
 def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Array:
     """Return pairs of cones on both sides of a path, X and Y [m], (k, 2).
-
     gap : about the distance from pair to pair along the path [m].
     half_width : from the path to a cone [m].
     """
@@ -236,10 +216,7 @@ def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Ar
 
 BUILT_IN: Mapping[str, Callable[[], Path]] = MappingProxyType(
     {
-        "iso-3888-1": iso_3888_1,
-        "iso-3888-2": iso_3888_2,
-        "slalom": slalom,
-        "circle": constant_radius,
-        "course": handling_course,
+        "iso-3888-1": iso_3888_1, "iso-3888-2": iso_3888_2, "slalom": slalom,
+        "circle": constant_radius, "course": handling_course,
     }
-)
+)  # fmt: skip

@@ -34,11 +34,8 @@ _OPTIONS: dict[str, Any] = {
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gate:
     """A lane between two rows of cones, or beside one row where a side is infinite.
-
-    start : where it begins along x [m].
-    end : where it ends [m].
-    right : y of the right cones [m].
-    left : y of the left cones [m].
+    start : where it begins along x [m].   end : where it ends [m].
+    right : y of the right cones [m].   left : y of the left cones [m].
     """
 
     start: float
@@ -59,11 +56,6 @@ class Gate:
         return np.vstack([row for row in rows if np.isfinite(row).all()])
 
 
-def _cones_of(gates: Sequence[Gate]) -> Array:
-    """Return X, Y of all cones [m], (k, 2)."""
-    return np.vstack([gate.cones() for gate in gates])
-
-
 def line_through_gates(
     gates: Sequence[Gate],
     *,
@@ -75,7 +67,6 @@ def line_through_gates(
     knots: float = 1.0,
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
-
     start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
@@ -120,7 +111,6 @@ def _coefficients(
     clearance: float,
     easing: float,
 ) -> Array:
-    """Solve for the coefficients of the spline."""
     n = t.size - DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
@@ -194,11 +184,6 @@ def iso_3888_1(
     run_in : lane before the first cones [m].
     run_out : lane after the last cones [m].
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
     """
     first, middle, last = (share * _checked(car_width) + 0.25 for share in (1.1, 1.2, 1.3))
     right = -0.5 * first
@@ -273,7 +258,7 @@ def _path(
         easing=easing,
         spacing=spacing,
     )
-    return Path.from_line(line, name=name, cones=_cones_of(gates))
+    return Path.from_line(line, name=name, cones=np.vstack([gate.cones() for gate in gates]))
 
 
 _EASING = 6.0  # m
@@ -296,17 +281,11 @@ def slalom(
     Parameters
     ----------
     gap : distance of the cones [m].
-    cones : how many there are.
     car_width : width of the car without mirrors [m].
     margin : room between the side of the car and the cones [m].
     run_in : way before the first cone [m].
     run_out : way after the last cone [m].
     spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
     """
     if not (cones >= 1 and gap >= 5.0 and math.isfinite(gap)):
         raise PathError(f"a slalom needs a cone and 5 m between them, got {cones} and {gap} m")

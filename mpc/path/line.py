@@ -30,7 +30,6 @@ class Line(NamedTuple):
 
 def uniform_grid(length: float, spacing: float) -> Array:
     """Return s from 0 to `length` [m] in equal steps of at most `spacing`.
-
     length : of the curve [m].   spacing : longest step [m].
     """
     if not 0.0 < spacing <= length / 4.0:
@@ -49,7 +48,6 @@ def line_from_heading(
     """Integrate a heading that was sampled four times as fine as the line will be.
 
     X and Y by Boole's rule, whose error is of order spacing^6.
-
     psi : heading [rad], (4 n + 1,), at steps of spacing/4.
     kappa : dψ/ds at the same places [1/m], (4 n + 1,).   spacing : step of the line [m].
     start : X, Y of the first sample [m].
@@ -126,7 +124,6 @@ class Ends(NamedTuple):
         self, u: Any, h: float, cos: Callable[[Any], Any], sin: Callable[[Any], Any]
     ) -> tuple[Any, Any, Any, Any]:
         """Return X, Y [m], ψ [rad], κ [1/m] inside the step.
-
         u : place in the step, 0 to 1 [-].   h : length of the step [m].
         """
         (psi_0, psi_1), (kappa_0, kappa_1) = self.psi, self.kappa
@@ -141,7 +138,6 @@ class Ends(NamedTuple):
 
 def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
     """Return the cubic that has values and slopes given at both ends of a step.
-
     u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.
     """
     chord = p[1] - p[0]
@@ -151,7 +147,6 @@ def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
 
 def _quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
     """Return the quintic that has values, slopes and second derivatives given at both ends.
-
     u : place in the step, 0 to 1 [-].   p : values at u = 0 and 1.
     """
     chord = p[1] - p[0]

@@ -91,7 +91,6 @@ class Path:
 
     Parameters
     ----------
-    name : for tables and pictures.
     s : arc length [m], (n,), from 0.
     X : [m], (n,).
     Y : [m], (n,).
@@ -150,7 +149,6 @@ class Path:
         Parameters
         ----------
         line : samples at equal steps of arc length.
-        name : for tables and pictures.
         closed : whether the last sample is the first one again.
         cones : X, Y [m], (k, 2).
         """
@@ -175,7 +173,6 @@ class Path:
         X : of the way-points in driving order [m], (k,).
         Y : of the way-points [m], (k,).
         closed : whether the last way-point leads back to the first; that may be repeated.
-        name : for messages, tables and pictures.
         spacing : longest step of the samples [m].
         smoothing : root mean square distance that the path may keep from the way-points [m]; 0
             passes through them all. Points that were measured need about their noise.
@@ -188,14 +185,9 @@ class Path:
             path turns tighter than minimum_radius.
         """
         line = line_through(
-            X,
-            Y,
-            closed=closed,
-            name=name,
-            spacing=spacing,
-            smoothing=smoothing,
+            X, Y, closed=closed, name=name, spacing=spacing, smoothing=smoothing,
             minimum_radius=minimum_radius,
-        )
+        )  # fmt: skip
         return cls.from_line(line, name=name, closed=closed)
 
     @classmethod
@@ -313,11 +305,6 @@ class Path:
         near : s of the last projection [m], laps included: the search follows the path from there
             and does not jump to another leg. None: the nearest point of the whole path.
         search_distance : how far from `near` to look [m].
-
-        Raises
-        ------
-        PathError
-            Where X, Y or near is not finite.
         """
         if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
             raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")

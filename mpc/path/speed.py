@@ -22,16 +22,10 @@ def grip_speed(
 
     Parameters
     ----------
-    path : what is driven.
     a_y_max : lateral acceleration allowed [m/s²].
     v_max : speed allowed [m/s].
     a_accel : acceleration on the straight [m/s²].
     a_brake : deceleration on the straight, positive [m/s²].
-
-    Raises
-    ------
-    PathError
-        Where a limit is not positive and finite.
     """
     for name, value in (("a_y_max", a_y_max), ("v_max", v_max)):
         require_positive(PathError, **{f"{path.name}: {name}": value})
@@ -58,14 +52,8 @@ def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:
 
     Parameters
     ----------
-    path : what is driven.
     a_y_max : lateral acceleration at the limit of grip [m/s²].
     share : of a_y_max [-].
-
-    Raises
-    ------
-    PathError
-        Where a number is not positive and finite, or the path has no turn.
     """
     for name, value in (("a_y_max", a_y_max), ("share", share)):
         require_positive(PathError, **{f"{path.name}: {name}": value})

@@ -31,7 +31,6 @@ HALVINGS = 40
 
 def smooth(points: Array, *, closed: bool, distance: float) -> Array:
     """Move points so that their third differences get small.
-
     points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
     distance : root mean square of how far they may move [m].
     """
@@ -102,7 +101,6 @@ def line_through(
     minimum_radius: float,
 ) -> Line:
     """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
-
     X : of the way-points [m], (k,).   Y : of the way-points [m], (k,).
     spacing : longest step of the samples [m].
     smoothing : root mean square distance that the line may keep from the way-points [m].
@@ -132,7 +130,6 @@ def line_through(
 
 def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     """Sample a plane curve at equal steps of its arc length.
-
     spline : t -> (X, Y) with `.derivative(order)`, C2, polynomial between its knots.
     knots : rising t, (k,).   spacing : longest step [m].
     """
@@ -230,7 +227,6 @@ _ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
 
 def read_waypoints(file: Path) -> _Waypoints:
     """Read X and Y [m]; other columns, and lines that start with "#" below the header, are ignored.
-
     file : the CSV; names in its header may be of either case, and the header may start with "#".
     """
     rows = _rows(file)

@@ -22,20 +22,12 @@ from mpc.tires.tire import N_DOUBTS, TireStructure
 C = Path(__file__).parents[1] / "c"
 PREFIX = "tireid_mpc"  # of the C as it lies there
 PLACES: Mapping[str, str] = {
-    "tireid_mpc.h": "include",
-    "tireid_mpc_equations.h": "src",
-    "tireid_mpc_qp.h": "src",
-    "tireid_mpc_riccati.h": "src",
-    "tireid_mpc_active.h": "src",
-    "tireid_mpc_iteration.h": "src",
-    "tireid_mpc_caution.h": "src",
-    "tireid_mpc_riccati.c": "src",
-    "tireid_mpc_active.c": "src",
-    "tireid_mpc_qp.c": "src",
-    "tireid_mpc_caution.c": "src",
-    "tireid_mpc_iteration.c": "src",
+    "tireid_mpc.h": "include", "tireid_mpc_equations.h": "src", "tireid_mpc_qp.h": "src",
+    "tireid_mpc_riccati.h": "src", "tireid_mpc_active.h": "src", "tireid_mpc_iteration.h": "src",
+    "tireid_mpc_caution.h": "src", "tireid_mpc_riccati.c": "src", "tireid_mpc_active.c": "src",
+    "tireid_mpc_qp.c": "src", "tireid_mpc_caution.c": "src", "tireid_mpc_iteration.c": "src",
     "tireid_mpc.c": "src",
-}
+}  # fmt: skip
 # Of the tracker as one file, headers first.
 ORDER = (
     *("include/{}_config.h", "include/{}.h"),
@@ -44,25 +36,16 @@ ORDER = (
     *("src/{}_active.c", "src/{}_qp.c", "src/{}_caution.c", "src/{}_iteration.c", "src/{}.c"),
 )
 READ: Mapping[str, str] = {
-    "x": "x[{}]",
-    "u": "u",
-    "kappa": "kappa",
-    "v_x": "v_x",
-    "dt": "params->stage_time",
-    "car": "params->car[{}]",
-    "w": "params->weights[{}]",
-    "max_slip": "params->max_slip[{}]",
-    "rise": "params->rise[{}]",
-    "grip": "grip",
-    "q": "q[{}]",
-}
+    "x": "x[{}]", "u": "u", "kappa": "kappa", "v_x": "v_x", "dt": "params->stage_time",
+    "car": "params->car[{}]", "w": "params->weights[{}]", "max_slip": "params->max_slip[{}]",
+    "rise": "params->rise[{}]", "grip": "grip", "q": "q[{}]",
+}  # fmt: skip
 
 
 def c_sources(
     structure: TireStructure, *, horizon: int, name: str, single: bool = False, about: Values
 ) -> dict[str, str]:
     """Return the C files by their path in a package; they depend on nothing but these arguments.
-
     single : whether float is the default precision.
     """
     counts = c_sizes(structure, horizon)
@@ -108,7 +91,6 @@ def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]
 
 
 def _equations(structure: TireStructure, name: str, sentence: str) -> str:
-    """Return the prediction and its derivatives."""
     real, params = f"{name}_real", f"const {name}_params *params"
     bodies = {
         f"void {name}_linearize({params}, const {real} *q,\n    const {real} *x, {real} u, {real} "

@@ -23,7 +23,6 @@ GRIPS: Array = LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 
 def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> None:
     """Write what the tracker fears of a tire; `max_slip` must have been written.
-
     caution : from 0 to 1.
     """
     if caution > 0.0 and tire.vehicle.has_downforce:
@@ -42,6 +41,5 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
 
 
 def _offers_friction(tire: PredictionTire) -> bool:
-    """Return whether the tire can be told for another friction."""
     numbers = Car(*tire.car)
     return tire.structure.similar(Point(0.0, 0.0, 0.0, 1.0, numbers, tire.weights), 1.0) is not None

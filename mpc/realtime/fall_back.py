@@ -42,7 +42,6 @@ def fall_back(
 
     Minimizes Σ (e_y/`e_y`)² + (a/`acceleration`)² + (u/0.2 rad)², where a [m/s²] is the lateral
     acceleration of the steady turn that u steers: at speed, steering is worth less of it.
-
     period : between two steps [s].   delay : from a measurement until its command acts [s].
     e_y : deviation [m] that is worth as much as `acceleration`.   acceleration : lateral [m/s²].
     """
@@ -64,7 +63,6 @@ def fall_back(
 
 def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
     """Return A (5, 5) and B (5, 1) of ẋ = A x + B u at a speed.
-
     v_x : longitudinal speed [m/s].   lag : of the wheels behind what is told [s].
     """
     m, I_z, l_f, l_r, C_f, C_r = vehicle.bicycle
@@ -79,7 +77,6 @@ def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
 
 def steady_turn(vehicle: Vehicle, v_x: float) -> tuple[float, float]:
     """Return δ [rad m] and v_y [m²/s] of a steady turn, each a curvature.
-
     v_x : longitudinal speed [m/s].
     """
     m, _, l_f, l_r, C_f, C_r = vehicle.bicycle
@@ -93,7 +90,6 @@ def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
 
     By structure-preserving doubling (Chu, Fan, Lin and Wang 2004), which converges quadratically
     and also for cars of which SciPy's Schur form is too ill-conditioned to be ordered.
-
     A : (n, n).   B : (n, m).   Q : (n, n), symmetric, not negative.
     R : (m, m), symmetric, positive.
     """
@@ -119,7 +115,6 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
 
 
 def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
-    """Return A and B of samples with u held."""
     from scipy.linalg import expm  # takes longer to import than the rest of the tracker
 
     n, m = B.shape

@@ -80,7 +80,6 @@ _MACRO = re.compile(r"#define TIREID_MPC_(\w+) (\d+)U\b")
 def c_types(
     structure: TireStructure, horizon: int, *, single: bool
 ) -> dict[str, np.dtype[np.void]]:
-    """Return the types of `params`, `input` and `state`."""
     text = re.sub(r"/\*.*?\*/", "", (C / "tireid_mpc.h").read_text(encoding="utf-8"), flags=re.S)
     sizes = {f"TIREID_MPC_{name}": int(value) for name, value in _MACRO.findall(text)}
     sizes |= {f"TIREID_MPC_{key}": n for key, (n, _) in c_sizes(structure, horizon).items()}
@@ -156,15 +155,9 @@ def _generator() -> str:
 
 # -O3 is twice as fast as -O2 here; the rest as in `codegen.compiler.FLAGS`.
 FLAGS = (
-    "-std=c99",
-    "-O3",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-fno-signed-zeros",
-    "-ffp-contract=off",
-    "-fPIC",
-    "-shared",
-)
+    "-std=c99", "-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros",
+    "-ffp-contract=off", "-fPIC", "-shared",
+)  # fmt: skip
 
 
 class NoCompilerError(TireidError, RuntimeError):
@@ -172,11 +165,7 @@ class NoCompilerError(TireidError, RuntimeError):
 
 
 class Instance:
-    """State, parameters, input and work memory, which the C reads and writes in place.
-
-    horizon : number of stages.
-    single : whether numbers are float.
-    """
+    """State, parameters, input and work memory, which the C reads and writes in place."""
 
     def __init__(self, structure: TireStructure, horizon: int, *, single: bool) -> None:
         library = load_library(tracker_source(structure, horizon, single=single), "tracker", FLAGS)
@@ -215,14 +204,6 @@ class Instance:
         """Do ahead of a measurement what does not ask for it, on the road in `input`."""
         return Status(self._library.mpc_prepare(*self._step[:4]))
 
-    def prepare_from(self, x0: ArrayLike) -> None:
-        """Do ahead of `solve` what does not ask for its state, on the road in `input`.
-
-        x0 : state that is expected (n_x,).
-        """
-        self.start[:] = x0
-        self._library.mpc_prepare_from(*self.solve_arguments)
-
     def solve(self) -> int:
         """Take one iteration from the plan as it is; return the status."""
         return int(self._library.mpc_solve(*self.solve_arguments))
@@ -238,25 +219,16 @@ class Instance:
         self._library.mpc_shift(*self._step[:2])
 
     def guess(self, x0: ArrayLike) -> None:
-        """Set the plan to one without a solution.
-
-        x0 : state at its beginning (n_x,).
-        """
+        """Set the plan to one without a solution.   x0 : state at its beginning (n_x,)."""
         self.start[:] = x0
         self._library.mpc_guess(*self._step[:2], *self.solve_arguments[3:])
 
     def late(self, steering: float) -> None:
-        """Say that the last command came too late.
-
-        steering : what was steered instead [rad].
-        """
+        """Say that the last command came too late.   steering : what was steered instead [rad]."""
         self._library.mpc_late(self._step[0], self._real(steering))
 
     def reset(self, steering: float) -> Status:
-        """Begin anew, with the faults kept.
-
-        steering : angle of the wheels [rad].
-        """
+        """Begin anew, with the faults kept.   steering : angle of the wheels [rad]."""
         return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))
 
 

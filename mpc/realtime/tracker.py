@@ -22,7 +22,6 @@ class Tracker:
 
     The command of a step acts `delay` after its measurement, and is held for a period. What is
     steered is a ramp to the solver, so that it plans from half a period before.
-
     problem : what to minimize; None takes the default.
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
@@ -31,9 +30,8 @@ class Tracker:
     tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
     linearizations : a step; 1 in real time, some 10 to convergence.
-    max_active_sets : sets of active limits that are tried in a row, each at half an iteration
-        of the interior point, before it and once it comes close; 0 takes that alone.
-    single : whether to compute in float.
+    max_active_sets : sets of active limits that are tried in a row, each at half an iteration of
+        the interior point, before it and once it comes close; 0 takes that alone.
     caution : share of what is not known of the tires that is feared, from 0 to 1: see
         `mpc.realtime.caution`.
     clock : of the solve times [s].
@@ -82,12 +80,9 @@ class Tracker:
         guards = guards or Guards()
         set_params(params, problem, guards)
         table = fall_back(
-            tire.vehicle,
-            period=period,
-            delay=delay,
-            e_y=guards.fall_back_e_y,
+            tire.vehicle, period=period, delay=delay, e_y=guards.fall_back_e_y,
             acceleration=guards.fall_back_acceleration,
-        )
+        )  # fmt: skip
         params["speeds"], params["gains"] = table
         solver["max_active_sets"] = max_active_sets
         for name, value in {"period": period, "delay": delay, **solver}.items():
@@ -171,7 +166,6 @@ class Tracker:
 
     def reset(self, steering: float = 0.0) -> None:
         """Forget what was planned and steered; faults are kept.
-
         steering : angle of the wheels now [rad].
         """
         if self.instance.reset(steering) != Status.OK:
@@ -183,7 +177,6 @@ class Tracker:
 
         The step is a sweep then: its `solve_time_s` is the latency from measurement to command. On
         another road than it is told with the measurement, or without a plan, it does all itself.
-
         kappa : curvature [1/m] that the next measurement will tell, at `times`, (N + 1,).
         v_x : speed [m/s] that it will tell, (N + 1,).
         """
@@ -194,7 +187,6 @@ class Tracker:
         return self._clock() - start
 
     def step(self, measurement: Measurement) -> Command:
-        """Return what to steer from `delay` after the measurement on."""
         instance, ports = self.instance, self.instance.input
         ports["e_y"], ports["e_psi"], ports["v_y"], ports["r"] = measurement[:4]
         ports["kappa"], ports["v_x"] = measurement[4:6]

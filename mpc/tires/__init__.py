@@ -5,10 +5,5 @@ from mpc.tires.ladder import CurveFitError, oracle_tire
 from mpc.tires.tire import Car, PredictionTire, TireStructure
 
 __all__ = [
-    "Car",
-    "CurveFitError",
-    "PredictionTire",
-    "TireStructure",
-    "oracle_tire",
-    "prediction_tire",
-]
+    "Car", "CurveFitError", "PredictionTire", "TireStructure", "oracle_tire", "prediction_tire",
+]  # fmt: skip

@@ -34,7 +34,6 @@ class LimitedAxles(TireStructure):
     """A curve by its stiffness and its largest force; w = [C_f, N_f, C_r, N_r].
 
     C [N/rad] and N = μ F_z [N] are of an axle.
-
     fiala : Fiala's brush, full sliding from C |tan α| = 3 N on; else Dugoff's C tan α f(λ),
         f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1.
     """
@@ -73,7 +72,6 @@ class LaggedAxles(TireStructure):
 
     σ [m]: relaxation lengths. δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. The tracker
     reads the same sensors as the identifier did.
-
     lagged : whether the slip lags; else σ does nothing.
     """
 
@@ -82,7 +80,6 @@ class LaggedAxles(TireStructure):
 
     @property
     def n_weights(self) -> int:
-        """Those of the curve and 4."""
         return self.curve.n_weights + 4
 
     def slip(self, at: Point) -> Pair:
@@ -116,7 +113,6 @@ class LinearAxles(SmallSlip):
 
 def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> PredictionTire:
     """Return the tire of the linear bicycle.
-
     stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
     """
     weights = vehicle.bicycle[4:] if stiffness is None else stiffness

@@ -50,7 +50,6 @@ def _curve_tire(model: CurveModel) -> PredictionTire:
 
 
 def _plain_curve(model: CurveModel) -> PredictionTire:
-    """Return the curve without its lag and offsets."""
     q = model.parameters
     if model.curve == "linear":
         return linear_tire(model.vehicle, q[:, 0])
@@ -71,12 +70,9 @@ def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
 
 
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
-    NetworkModel.kind: network_tire,
-    AxleModel.kind: axle_tire,
-    FittedModel.kind: fit_tire,
-    CurveModel.kind: _curve_tire,
-    OnnxModel.kind: onnx_tire,
-}
+    NetworkModel.kind: network_tire, AxleModel.kind: axle_tire, FittedModel.kind: fit_tire,
+    CurveModel.kind: _curve_tire, OnnxModel.kind: onnx_tire,
+}  # fmt: skip
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,
     DugoffTire: _limited,

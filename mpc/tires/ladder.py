@@ -41,10 +41,7 @@ class LadderAxles(TireStructure):
     δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. β [rad]: mounting angle of its sensor.
     g: relative error of the steering. They were learnt as errors of sensors, and the tracker reads
     the same sensors.
-
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
-    pressed : whether the loads of the axles change with speed.
-    mounted : whether v_y is off by more with speed, and the steering by more with its angle.
     """
 
     saturates = True
@@ -133,7 +130,6 @@ def ladder_weights(
     downforce: tuple[float, ...] = (),
 ) -> Array:
     """Return w of `LadderAxles`.
-
     ladder : α_j [rad], (n,).   W : w_j [N], front and rear (2, n).   compliance : s [m/N], (2,).
     least : least lag [m], (2,).   shortest : σ_0 [m].   offset : δ_0 [rad] and b [m/s].
     downforce : κ of front and rear [s²/m²] where pressed, else nothing.
@@ -174,7 +170,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
 
 def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
-
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
     doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
@@ -205,7 +200,6 @@ class Fit(NamedTuple):
 
 def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
-
     largest : end of the grid [rad].
     """
     grid: Array = largest * (np.arange(1, SAMPLES + 1) / SAMPLES) ** 2
@@ -214,7 +208,6 @@ def slip_grid(largest: float) -> Array:
 
 def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     """Return slip scales α_j (n,) for curves of both axles, and w_j [N] (2, n).
-
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
     """
@@ -235,7 +228,6 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
 
 def fitted(alpha: Array, force: Array, ladder: Array) -> Fit:
     """Return the weights of one curve.
-
     alpha : slips [rad], (k,).   force : at these slips [N], (k,).
     ladder : slip scales [rad], (n,).
     """
@@ -261,7 +253,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     Load transfer and camber are quasi-steady; drive forces are left out. With downforce curves are
     those of the static load, and forces in proportion with load. The sedan's Magic
     Formula is fitted to 0.2 % of its peak, a tire with a kink, as Dugoff's, to 1.2 %.
-
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
     """
@@ -277,7 +268,6 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
 
 def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
-
     vehicle : the car; it needs no chassis.
     """
     alpha = slip_grid(LARGEST_SLIP)
@@ -291,7 +281,6 @@ def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
 
 def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: float) -> Array:
     """Return the side force of an axle in steady cornering [N], (k,).
-
     axle : 0 in front, 1 at the rear.   alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].
     """

@@ -19,7 +19,6 @@ class NetworkAxles(SmallSlip):
     """w = [C_f, C_r, U Ŵ by columns (2, n_h), V̂ diag(1/scale) by columns (n_h, n_in)].
 
     The force unit and the scales of the inputs are in the weights: they cost no operation.
-
     hidden : number of hidden units n_h.
     inputs : signals of x̄, of `identifier.paper.network.SIGNALS`.
     """
@@ -29,7 +28,6 @@ class NetworkAxles(SmallSlip):
 
     @property
     def n_weights(self) -> int:
-        """2 + 2 n_h + n_h n_in."""
         return 2 + self.hidden * (2 + len(self.inputs))
 
     def at_friction(self, weights: Array, ratio: float) -> Array | None:
@@ -82,7 +80,6 @@ def network_tire(model: NetworkModel) -> PredictionTire:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _OnnxAxles(SmallSlip):
     """Axle forces of a static network of signals; w: its constants, one after another.
-
     inputs : signals that it reads, of `identifier.paper.network.SIGNALS`.
     slip_sign : 1 where it reads slip angles in the paper's sign, -1 for ISO 8855.
     """
@@ -111,7 +108,6 @@ def _loaded(program: str) -> ca.Function:
 
 
 def onnx_tire(model: OnnxModel) -> PredictionTire:
-    """Return the prediction tire of a user's network."""
     network, weights = _lifted(model.content, model.inputs)
     structure = _OnnxAxles(
         program=network.serialize(),
@@ -163,7 +159,6 @@ def _evaluated(
 
 
 def _nodes(results: Any, operation: int) -> list[Any]:
-    """Return the nodes of an operation in the graph of some results."""
     graph = ca.Function("graph", ca.symvar(ca.veccat(*results)), results)
     return [
         graph.instruction_MX(k)

@@ -49,7 +49,6 @@ class TireStructure:
 
     @property
     def n_weights(self) -> int:
-        """Numbers in w."""
         raise NotImplementedError
 
     @property
@@ -71,7 +70,6 @@ class TireStructure:
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body.
-
         slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
         """
         raise NotImplementedError
@@ -85,7 +83,6 @@ class TireStructure:
         """Return the weights where friction is another; None where that is not offered.
 
         Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and slip of the peak shrink.
-
         weights : (n_weights,).   ratio : friction over the one that the weights have [-].
         """
         del weights, ratio
@@ -120,7 +117,6 @@ RELATIVE, FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire miss
 
 class PredictionTire(NamedTuple):
     """A structure with its weights (n_weights,), and the car that they are of.
-
     doubt : half the band of 90 % of the axle forces at slips 0, 0.02, … 0.5 rad [N], (2, 26); None
         where nobody told.
     """
@@ -159,7 +155,6 @@ SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has d
 
 class ValidSlip(NamedTuple):
     """Slip up to which curves are believed [rad], their slope beyond [N/rad]; (2,) each.
-
     grip : friction over the one that the curves have, by which all of that scales [-].
     """
 
@@ -175,7 +170,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     """Return how far the curves of a tire are believed, and how they go on.
 
     They go on straight, but never with less than 4 % of their slope at zero.
-
     most : slip beyond which no curve is believed [rad], front and rear.
     """
     slopes = curve_slopes(tire)
@@ -186,7 +180,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 
 def curves_at(tire: PredictionTire, slip: Array) -> Array:
     """Return the axle forces at slips, straight ahead, (2, k) [N].
-
     slip : of both axles [rad], (k,).
     """
     x = ca.SX.sym("slip")
@@ -223,7 +216,6 @@ def _extrapolated_force(
     structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).
-
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).

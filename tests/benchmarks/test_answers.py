@@ -15,11 +15,12 @@ from benchmarks.answers import REFUSED, Answer, answer, blind, drawn, is_dead
 from benchmarks.beginnings import Begun
 from benchmarks.documents import complaints
 from benchmarks.fault_cases import Case, StraightOnly, biased, cases
+from benchmarks.faults import Late, Mirrored, Together
 from benchmarks.random_cars import CLASSES, random_beginning
 from benchmarks.targets import Targets
 from benchmarks.verdicts import Judged
 from identifier.doctor import Diagnosis, Finding
-from models.faults import Late, Mirrored, SensorFault, Together
+from models.faults import SensorFault
 from models.recordings import RecordingError, write_recording
 from tireid.cli import main
 

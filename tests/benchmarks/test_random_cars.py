@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.fault_cases import Scale, cases, random_case
+from benchmarks.faults import SensorElsewhere
 from benchmarks.random_cars import (
     BEGINNINGS,
     CLASSES,
@@ -19,7 +20,6 @@ from benchmarks.random_cars import (
     random_car,
     random_drive,
 )
-from models.faults import SensorElsewhere
 from models.maneuvers import StepSteer
 from models.plant import PlantError
 from models.tires import DugoffTire, FialaTire, MagicFormula

@@ -13,13 +13,9 @@ from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
 CAR = Vehicle(
-    mass=1500.0,
-    yaw_inertia=2500.0,
-    l_f=1.15,
-    l_r=1.55,
-    cornering_stiffness_front=1.4e5,
+    mass=1500.0, yaw_inertia=2500.0, l_f=1.15, l_r=1.55, cornering_stiffness_front=1.4e5,
     cornering_stiffness_rear=1.2e5,
-)
+)  # fmt: skip
 
 
 def saturating(alpha, stiffness, peak):
@@ -78,14 +74,9 @@ def the_car():
 def model_car():
     """A car of 1:10."""
     return replace(
-        CAR,
-        mass=1.5,
-        yaw_inertia=0.025,
-        l_f=0.115,
-        l_r=0.155,
-        cornering_stiffness_front=140.0,
+        CAR, mass=1.5, yaw_inertia=0.025, l_f=0.115, l_r=0.155, cornering_stiffness_front=140.0,
         cornering_stiffness_rear=120.0,
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture

@@ -12,12 +12,7 @@ from identifier.paper.network import Network
 from identifier.run import DivergedError, identify
 
 GAINS = Gains(
-    A_d=((-8.0, 1.0), (0.5, -6.0)),
-    forgetting=5.0,
-    eta_W=100.0,
-    eta_V=5.0,
-    rho_W=0.3,
-    rho_V=0.2,
+    A_d=((-8.0, 1.0), (0.5, -6.0)), forgetting=5.0, eta_W=100.0, eta_V=5.0, rho_W=0.3, rho_V=0.2
 )
 
 

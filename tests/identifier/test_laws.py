@@ -27,14 +27,10 @@ def numbers(expression):
 def case(rng):
     """Random values of everything in the laws; A_d is not symmetric, so that transposes matter."""
     return {
-        "xi": rng.normal(size=2),
-        "xi_hat": rng.normal(size=2),
-        "z": rng.normal(size=2),
-        "W": rng.normal(size=(2, N_H)),
-        "V": rng.normal(size=(N_H, N_IN)),
-        "x_bar": rng.normal(size=N_IN),
-        "A_d": np.array([[-6.0, 4.0], [0.5, -3.0]]),
-    }
+        "xi": rng.normal(size=2), "xi_hat": rng.normal(size=2), "z": rng.normal(size=2),
+        "W": rng.normal(size=(2, N_H)), "V": rng.normal(size=(N_H, N_IN)),
+        "x_bar": rng.normal(size=N_IN), "A_d": np.array([[-6.0, 4.0], [0.5, -3.0]]),
+    }  # fmt: skip
 
 
 def rates(case, *, drive, eta=(3.0, 2.0), rho=(0.0, 0.0), laws=weight_rates):

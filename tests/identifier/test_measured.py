@@ -9,19 +9,12 @@ from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value, w
 @pytest.mark.parametrize(
     ("value", "sd", "words"),
     [
-        (0.886, 0.0604, "0.886 ± 0.060"),
-        (127.04, 4.8, "127 ± 5"),
-        (0.4437, 0.153, "0.44 ± 0.15"),
-        (-0.00101, 0.0112, "-0.001 ± 0.011"),
-        (-1e-9, 0.0112, "0.000 ± 0.011"),
-        (127.04, 0.018, "127.04 ± 0.02"),
-        (9.996, None, "10.0"),
-        (126986.0, None, "127000"),
-        (0.0, None, "0"),
-        (float("nan"), 1.0, "nan"),
-        (0.5, float("inf"), "0.500"),
+        (0.886, 0.0604, "0.886 ± 0.060"), (127.04, 4.8, "127 ± 5"), (0.4437, 0.153, "0.44 ± 0.15"),
+        (-0.00101, 0.0112, "-0.001 ± 0.011"), (-1e-9, 0.0112, "0.000 ± 0.011"),
+        (127.04, 0.018, "127.04 ± 0.02"), (9.996, None, "10.0"), (126986.0, None, "127000"),
+        (0.0, None, "0"), (float("nan"), 1.0, "nan"), (0.5, float("inf"), "0.500"),
     ],
-)
+)  # fmt: skip
 def test_a_value_has_three_digits_and_none_that_its_doubt_hides(value, sd, words):
     assert with_doubt(value, sd) == words
 

@@ -38,14 +38,10 @@ def test_output_is_odd(rng):
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"hidden": 0},
-        {"inputs": ("v_y", "speed")},
-        {"inputs": ("v_y", "v_y")},
-        {"inputs": ()},
-        {"scale": (1.0, 2.0)},
-        {"scale": (1.0, 2.0, 0.0, 1.0)},
+        {"hidden": 0}, {"inputs": ("v_y", "speed")}, {"inputs": ("v_y", "v_y")}, {"inputs": ()},
+        {"scale": (1.0, 2.0)}, {"scale": (1.0, 2.0, 0.0, 1.0)},
     ],
-)
+)  # fmt: skip
 def test_impossible_structures_are_refused(wrong):
     with pytest.raises(ValueError, match="must"):
         Network(**wrong)

@@ -129,11 +129,7 @@ def test_no_window_reaches_over_a_gap(cut) -> None:
     assert not over.any() and len(found) > 20
     assert len(Windows.of(glued(cut), 1.0)) > len(found)
     assert windows(cut).r.size < windows(glued(cut)).r.size
-    exact = replace(
-        cut,
-        v_y=np.where(np.arange(len(cut)) < k, 0.0, 5.0),
-        r=np.zeros(len(cut)),
-    )
+    exact = replace(cut, v_y=np.where(np.arange(len(cut)) < k, 0.0, 5.0), r=np.zeros(len(cut)))
     counted = np.ones(len(cut), dtype=bool)
     rest = motion_error(np.zeros((len(cut), 2)), exact, CAR, counted)
     assert rest is not None and rest.lateral == 0.0

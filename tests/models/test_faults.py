@@ -23,15 +23,10 @@ def test_a_fault_lasts_from_its_start_to_its_end():
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [
-        ("stuck", 7.0),
-        ("zero", 0.0),
-        ("flipped", -3.0),
-        ("scaled", 1.5),
-        ("biased", 3.5),
-        ("drifting", 3.25),
-        ("noisy", 4.0),
+        ("stuck", 7.0), ("zero", 0.0), ("flipped", -3.0), ("scaled", 1.5), ("biased", 3.5),
+        ("drifting", 3.25), ("noisy", 4.0),
     ],
-)
+)  # fmt: skip
 def test_each_kind_shows_what_it_says(kind, expected):
     """Half a second into the fault a good sensor shows 3, it began at 7, the noise is 2."""
     assert fault(kind).shown(2.5, 3.0, 7.0, 2.0) == pytest.approx(expected)

@@ -11,7 +11,6 @@ from models.maneuvers import (
     ManeuverError,
     RandomSteer,
     SampledSteer,
-    SineWithDwell,
     Slalom,
     SlowlyIncreasingSteer,
     StepSteer,
@@ -20,14 +19,10 @@ from models.maneuvers import (
 
 COMMON = {"amplitude": 0.1, "onset": 1.003, "rate_limit": 0.7, "duration": 12.0}
 ALL = [
-    StepSteer(**COMMON),
-    TwoStepSteer(**COMMON, second_share=0.5, second_onset=5.0),
-    Slalom(**COMMON, frequency=0.6),
-    DoubleLaneChange(**COMMON, frequency=0.5, pause=1.2),
-    SineWithDwell(**COMMON, frequency=0.7, dwell=0.5),
-    SlowlyIncreasingSteer(**COMMON, rate=0.02),
-    RandomSteer(**COMMON, frequency=1.0, seed=3),
-]
+    StepSteer(**COMMON), TwoStepSteer(**COMMON, second_share=0.5, second_onset=5.0),
+    Slalom(**COMMON, frequency=0.6), DoubleLaneChange(**COMMON, frequency=0.5, pause=1.2),
+    SlowlyIncreasingSteer(**COMMON, rate=0.02), RandomSteer(**COMMON, frequency=1.0, seed=3),
+]  # fmt: skip
 NAMES = [type(m).__name__ for m in ALL]
 every_maneuver = pytest.mark.parametrize("maneuver", ALL, ids=NAMES)
 
@@ -87,7 +82,7 @@ def test_numbers_that_must_be_positive_are(maneuver):
     for key in names & {"frequency", "rate", "rate_limit", "duration"}:
         with pytest.raises(ManeuverError, match=key):
             replace(maneuver, **{key: 0.0})
-    for key in names & {"onset", "dwell", "pause"}:
+    for key in names & {"onset", "pause"}:
         with pytest.raises(ManeuverError, match=key):
             replace(maneuver, **{key: -0.1})
 
@@ -138,16 +133,6 @@ def test_a_double_lane_change_brings_the_steering_integral_back_twice():
     assert abs(heading[-1]) < 1e-6
     assert abs(lane[-1]) < 1e-3 * lane.max()  # back in the first lane
     assert np.all(angle[(t > 3.01) & (t < 4.19)] == 0.0)
-
-
-def test_a_dwell_holds_the_second_peak():
-    sine = SineWithDwell(**COMMON, frequency=0.7, dwell=0.5)
-    t = np.arange(0.0, 12.0, 0.001)
-    held = t[np.abs(sine.steering(t)[:, 0] + 0.1) < 1e-12]
-    peak = 1.003 + 0.75 / 0.7
-    assert held[0] == pytest.approx(peak, abs=0.002)
-    assert held[-1] == pytest.approx(peak + 0.5, abs=0.002)
-    assert np.all(sine.steering(t)[t > 1.003 + 1.0 / 0.7 + 0.501] == 0.0)
 
 
 def test_random_steer_is_its_seed():

@@ -27,14 +27,9 @@ N = 100
 def recording(**change: object) -> Recording:
     t = 0.01 * np.arange(N)
     signals: dict[str, object] = {
-        "name": "made",
-        "t": t,
-        "v_x": np.full(N, 20.0),
-        "v_y": 0.1 * np.sin(t),
-        "r": 0.2 * np.sin(t),
-        "delta_f": 0.03 * np.sin(t),
-        "delta_r": np.zeros(N),
-    }
+        "name": "made", "t": t, "v_x": np.full(N, 20.0), "v_y": 0.1 * np.sin(t),
+        "r": 0.2 * np.sin(t), "delta_f": 0.03 * np.sin(t), "delta_r": np.zeros(N),
+    }  # fmt: skip
     return Recording(**(signals | change))  # type: ignore[arg-type]
 
 
@@ -121,14 +116,11 @@ def test_all_or_an_open_part_of_a_drive_in_segments_may_be_taken() -> None:
 @pytest.mark.parametrize(
     ("kept", "expected", "breaks"),
     [
-        (slice(35, 100), slice(40, 100), (30,)),
-        (slice(0, 75), slice(0, 70), (40,)),
-        (slice(61, 79), None, ()),
-        (np.r_[0:20, 25:30, 30:60], np.r_[0:20, 25:60], (20, 35)),
-        (np.r_[0:5, 10:40, 70:100], np.r_[10:40, 70:100], (30,)),
-        (np.r_[0:9, 50:59], None, ()),
+        (slice(35, 100), slice(40, 100), (30,)), (slice(0, 75), slice(0, 70), (40,)),
+        (slice(61, 79), None, ()), (np.r_[0:20, 25:30, 30:60], np.r_[0:20, 25:60], (20, 35)),
+        (np.r_[0:5, 10:40, 70:100], np.r_[10:40, 70:100], (30,)), (np.r_[0:9, 50:59], None, ()),
     ],
-)
+)  # fmt: skip
 def test_scraps_of_segments_are_left_out_and_told(
     kept: slice | np.ndarray, expected: slice | np.ndarray | None, breaks: tuple[int, ...]
 ) -> None:

@@ -83,15 +83,9 @@ def finely(
         v_y[k + 1] = v_y[k] + dt * v_y_dot[k]
         r[k + 1] = r[k] + dt * (l_f * F[k, 0] - l_r * F[k, 1]) / I_z
     return {
-        "t": t,
-        "v_x": np.full(t.size, v),
-        "v_y": v_y[:-1],
-        "r": r[:-1],
-        "delta_f": delta,
-        "delta_r": 0.0 * t,
-        "a_y": v_y_dot + v * r[:-1],
-        "axle_force": F,
-    }
+        "t": t, "v_x": np.full(t.size, v), "v_y": v_y[:-1], "r": r[:-1], "delta_f": delta,
+        "delta_r": 0.0 * t, "a_y": v_y_dot + v * r[:-1], "axle_force": F,
+    }  # fmt: skip
 
 
 @pytest.fixture(scope="module")

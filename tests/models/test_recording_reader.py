@@ -1,7 +1,6 @@
 """Files: what is read, how it is resampled, and what is refused with which line."""
 
 import gzip
-import sys
 import time
 from pathlib import Path
 
@@ -119,15 +118,6 @@ def test_parquet_gives_the_same_as_csv(tmp_path: Path) -> None:
     assert "r must be finite, 1 of 60" in refusal(path)
 
 
-def test_parquet_without_pyarrow_says_how_to_install_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "log.parquet"
-    path.write_bytes(b"PAR1")
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert "needs pyarrow: pip install pyarrow (" in refusal(path)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "rule"),
     [
@@ -160,11 +150,6 @@ def test_what_is_packed_is_told_by_its_bytes_not_by_its_name(tmp_path: Path) -> 
     packed = write(tmp_path / "a.csv.gz", HEADER, rows()).rename(tmp_path / "a.csv")
     plain = write(tmp_path / "b.csv", HEADER, rows()).rename(tmp_path / "b.csv.gz")
     assert np.array_equal(read_recording(packed).t, read_recording(plain).t)
-
-
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    assert "no such file" in refusal(tmp_path / "nowhere.csv")
-    assert "no such file" in refusal(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.faults import (
+from benchmarks.faults import (
     UNITS,
     Lagging,
     Late,
     Mirrored,
     Misaligned,
     SensorElsewhere,
-    SensorFault,
     ShiftedCenter,
     SwappedAxles,
     Together,
     WrongNumber,
     WrongUnit,
 )
+from models.faults import SensorFault
 from models.recordings import Recording, RecordingError, Repair
 from models.schema import Table
 from models.vehicle import VehicleError, sedan
@@ -58,10 +58,7 @@ REPAIRS = {
         SensorFault(channel="delta_f", kind="scaled", size=16.0),
         Repair(factor={"delta_f": 1.0 / 16.0}),
     ),
-    "sign": (
-        Mirrored(channels=("v_y", "a_y")),
-        Repair(factor={"v_y": -1.0, "a_y": -1.0}),
-    ),
+    "sign": (Mirrored(channels=("v_y", "a_y")), Repair(factor={"v_y": -1.0, "a_y": -1.0})),
     "unit": (WrongUnit(channel="a_y", unit="g"), Repair(factor={"a_y": 1.0 / UNITS["g"]})),
     "misaligned": (Misaligned(angle=0.02), Repair(velocity_sensor_angle=0.02)),
     "ahead": (SensorElsewhere(sensor="velocity", x=0.7), Repair(velocity_sensor_x=0.7)),
@@ -80,14 +77,11 @@ REPAIRS = {
             )
         ),
         Repair(
-            velocity_sensor_x=0.7,
-            velocity_sensor_angle=0.02,
-            delay={"v_y": 0.05},
-            offset={"v_y": 0.2},
-            factor={"v_y": -1.0 / 3.6},
+            velocity_sensor_x=0.7, velocity_sensor_angle=0.02, delay={"v_y": 0.05},
+            offset={"v_y": 0.2}, factor={"v_y": -1.0 / 3.6},
         ),
     ),
-}
+}  # fmt: skip
 
 
 def apart(one, other):
@@ -173,13 +167,9 @@ def test_nothing_repaired_is_nothing_changed(drive):
 
 def test_a_document_holds_a_repair_bit_for_bit():
     repair = Repair(
-        factor={"delta_f": 1.0 / 15.9},
-        offset={"v_y": 0.1},
-        delay={"a_y": 0.09},
-        lag={"r": 0.02},
-        velocity_sensor_x=0.3,
-        vehicle={"l_f": 1.2},
-    )
+        factor={"delta_f": 1.0 / 15.9}, offset={"v_y": 0.1}, delay={"a_y": 0.09}, lag={"r": 0.02},
+        velocity_sensor_x=0.3, vehicle={"l_f": 1.2},
+    )  # fmt: skip
     assert Repair.of_table(Table(repair.tables(), "log.toml: ", RecordingError)) == repair
     assert Repair().tables() == {}
 

@@ -81,13 +81,10 @@ def test_every_sample_has_the_bits_of_plain_python(k, seed):
     record = trust_scan(k)(
         len(rows),
         {
-            "trust": np.array(state),
-            "row": rows,
-            "rates": rates,
-            "rule": np.array([DT, MOST, LIMIT]),
-            "free": free.astype(float),
+            "trust": np.array(state), "row": rows, "rates": rates,
+            "rule": np.array([DT, MOST, LIMIT]), "free": free.astype(float),
         },
-    )
+    )  # fmt: skip
     held = 0
     for n, (row, rate) in enumerate(zip(rows.tolist(), rates.tolist(), strict=True)):
         state = by_hand(state, row, rate, DT, MOST, LIMIT, free.tolist())

@@ -1,7 +1,7 @@
 """The car as data: what is refused, what comes back from a file, and the documented sedan."""
 
 import math
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,16 +38,12 @@ def test_a_number_that_is_not_positive_and_finite_is_refused_by_name(key, value)
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("roll_stiffness_front_share", 1.01),
-        ("drive_front_share", -0.01),
-        ("drive_front_share", math.nan),
-        ("brake_front_share", 1.01),
-        ("roll_center_height_front", 0.6),
-        ("roll_camber_rear", math.nan),
-        ("relaxation_length_rear", 0.0),
-        ("roll_damping", math.nan),
+        ("roll_stiffness_front_share", 1.01), ("drive_front_share", -0.01),
+        ("drive_front_share", math.nan), ("brake_front_share", 1.01),
+        ("roll_center_height_front", 0.6), ("roll_camber_rear", math.nan),
+        ("relaxation_length_rear", 0.0), ("roll_damping", math.nan),
     ],
-)
+)  # fmt: skip
 def test_a_chassis_value_outside_its_range_is_refused_by_name(key, value):
     with pytest.raises(VehicleError, match=key):
         replace(sedan().require_chassis(), **{key: value})
@@ -58,11 +54,6 @@ def test_springs_too_soft_for_the_body_are_refused():
     soft = replace(car.require_chassis(), roll_stiffness=0.99 * car.weight * car.roll_arm)
     with pytest.raises(VehicleError, match="roll_stiffness"):
         replace(car, chassis=soft)
-
-
-def test_a_vehicle_cannot_be_changed():
-    with pytest.raises(FrozenInstanceError):
-        sedan().mass = 1.0  # type: ignore[misc]
 
 
 def test_axle_loads_balance_weight_and_pitch_moment():
@@ -106,11 +97,6 @@ def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):
     assert message.startswith(f"{path}: ")
     assert said in message
     assert "\n" not in message
-
-
-def test_a_missing_file_says_so(tmp_path):
-    with pytest.raises(VehicleError, match="there is no such file"):
-        Vehicle.from_toml(tmp_path / "none.toml")
 
 
 def test_a_vehicle_comes_back_from_its_file_bit_for_bit(tmp_path, rng):
@@ -160,13 +146,10 @@ def test_no_physical_value_of_a_chassis_has_a_default():
 @pytest.mark.parametrize(
     ("key", "factor"),
     [
-        ("yaw_inertia", 1e-3),
-        ("mass", 1e-3),
-        ("cornering_stiffness_front", 1e-3),
-        ("cornering_stiffness_rear", 1 / 57.3),
-        ("cornering_stiffness_rear", 100.0),
+        ("yaw_inertia", 1e-3), ("mass", 1e-3), ("cornering_stiffness_front", 1e-3),
+        ("cornering_stiffness_rear", 1 / 57.3), ("cornering_stiffness_rear", 100.0),
     ],
-)
+)  # fmt: skip
 def test_a_value_in_another_unit_is_refused(key, factor):
     car = sedan()
     with pytest.raises(VehicleError, match="check the units"):
@@ -290,13 +273,10 @@ def test_the_chassis_tells_what_the_car_does_not():
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("cg_height", 2.0),
-        ("cg_height", -0.1),
-        ("drive_front_share", 1.1),
-        ("brake_front_share", math.nan),
-        ("drag_area", 70.0),
+        ("cg_height", 2.0), ("cg_height", -0.1), ("drive_front_share", 1.1),
+        ("brake_front_share", math.nan), ("drag_area", 70.0),
     ],
-)
+)  # fmt: skip
 def test_what_braking_wants_to_know_is_refused_by_name_where_no_car_has_it(key, value):
     with pytest.raises(VehicleError, match=key):
         replace(sedan(), **{key: value})

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.faults import Bank
 from identifier.axle import AxleIdentifier
 from identifier.axle.bank import RoadSlope
 from identifier.prediction import predict
 from identifier.run import OnlineIdentifier, identify
-from models.faults import Bank
 from models.vehicle import GRAVITY
 
 ROLL = 0.05  # rad per g, of the body that carries the sensor

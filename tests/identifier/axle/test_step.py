@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.faults import Bank
 from identifier.axle import AxleIdentifier
 from identifier.axle.covariance import unpacked
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import Sensors
 from identifier.run import identify
-from models.faults import Bank
 
 G = 9.81
 

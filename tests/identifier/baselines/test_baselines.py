@@ -29,13 +29,10 @@ def test_a_similar_model_car_learns_the_same(make, car, drive):
     """Lengths by 1/s, times by sqrt(1/s), masses by 1/s³: forces come out by 1/s³."""
     s, recording = 10.0, drive(n=600)
     small = Vehicle(
-        mass=car.mass / s**3,
-        yaw_inertia=car.yaw_inertia / s**5,
-        l_f=car.l_f / s,
-        l_r=car.l_r / s,
+        mass=car.mass / s**3, yaw_inertia=car.yaw_inertia / s**5, l_f=car.l_f / s, l_r=car.l_r / s,
         cornering_stiffness_front=car.cornering_stiffness_front / s**3,
         cornering_stiffness_rear=car.cornering_stiffness_rear / s**3,
-    )
+    )  # fmt: skip
     dt = 0.01 / np.sqrt(s)
     shrunk = Recording(
         name="small",

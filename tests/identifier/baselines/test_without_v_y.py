@@ -259,22 +259,15 @@ def test_a_similar_model_car_is_told_the_same(name, car, drive):
     """Lengths by 1/s, times and speeds by sqrt(1/s): v_y comes out by sqrt(1/s)."""
     s, recording = 10.0, felt(drive(n=600))
     small = Vehicle(
-        mass=car.mass / s**3,
-        yaw_inertia=car.yaw_inertia / s**5,
-        l_f=car.l_f / s,
-        l_r=car.l_r / s,
+        mass=car.mass / s**3, yaw_inertia=car.yaw_inertia / s**5, l_f=car.l_f / s, l_r=car.l_r / s,
         cornering_stiffness_front=car.cornering_stiffness_front / s**3,
         cornering_stiffness_rear=car.cornering_stiffness_rear / s**3,
-    )
+    )  # fmt: skip
     root = np.sqrt(s)
     shrunk = replace(
-        recording,
-        t=recording.t / root,
-        v_x=recording.v_x / root,
-        v_y=recording.v_y / root,
-        r=recording.r * root,
-        axle_force=recording.axle_force / s**3,
-    )
+        recording, t=recording.t / root, v_x=recording.v_x / root, v_y=recording.v_y / root,
+        r=recording.r * root, axle_force=recording.axle_force / s**3,
+    )  # fmt: skip
     large = identify(recording, car, MAKE[name](car)).outputs["v_y"]
     like = identify(shrunk, small, MAKE[name](small, dt=shrunk.dt)).outputs["v_y"]
     np.testing.assert_allclose(like * root, large, rtol=1e-5, atol=1e-6)

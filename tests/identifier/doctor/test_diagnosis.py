@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import tireid
+from benchmarks.faults import Held, Lagging, Late, Together, WrongUnit
 from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
 from identifier.doctor import Finding, diagnose
 from identifier.doctor.diagnosis import Diagnosis
 from identifier.doctor.screen import combined
 from identifier.run import identify
-from models.faults import Held, Lagging, Late, SensorFault, Together, WrongUnit
+from models.faults import SensorFault
 from models.recordings import Repair
 from models.vehicle import sedan
 

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.answers import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
+from benchmarks.faults import Lagging, Late, Misaligned, Together
 from identifier.doctor import Finding, diagnose, examine
 from identifier.doctor.faults import Candidate, Search, _all_move, prepared
 from identifier.doctor.pieces import segments_of
@@ -16,7 +17,7 @@ from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
 from identifier.estimate.solve import descend, simulate
 from identifier.motion.parameters import INDEX
-from models.faults import Lagging, Late, Misaligned, SensorFault, Together
+from models.faults import SensorFault
 from models.recordings import Repair
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.conftest import areas_of, pressed
@@ -24,20 +25,11 @@ from tireid.diagnoses import NAMES
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
 SIZED = {
-    "offset v_y": 0.008,
-    "offset r": 0.0015,
-    "offset a_y": 0.01,
-    "offset delta_f": 0.0008,
-    "factor v_x": 0.025,
-    "factor delta_f": 0.02,
-    "delay r": 0.003,
-    "delay delta_f": 0.003,
-    "delay a_y": 0.004,
-    "misaligned": 0.0006,
-    "velocity sensor": 0.06,
-    "accelerometer": 0.04,
+    "offset v_y": 0.008, "offset r": 0.0015, "offset a_y": 0.01, "offset delta_f": 0.0008,
+    "factor v_x": 0.025, "factor delta_f": 0.02, "delay r": 0.003, "delay delta_f": 0.003,
+    "delay a_y": 0.004, "misaligned": 0.0006, "velocity sensor": 0.06, "accelerometer": 0.04,
     "bank": 0.003,
-}
+}  # fmt: skip
 
 
 def found_in(log, car):

@@ -7,6 +7,15 @@ import pytest
 
 from benchmarks.doctor_gross import drawn
 from benchmarks.fault_cases import StraightOnly
+from benchmarks.faults import (
+    ClockJump,
+    Held,
+    Jitter,
+    Mirrored,
+    SensorElsewhere,
+    Together,
+    WrongUnit,
+)
 from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
@@ -15,16 +24,7 @@ from identifier.doctor.pieces import PIECE, PIECES, looked_at
 from identifier.doctor.readings import _least, _refined
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import screen, steering_finding
-from models.faults import (
-    ClockJump,
-    Held,
-    Jitter,
-    Mirrored,
-    SensorElsewhere,
-    SensorFault,
-    Together,
-    WrongUnit,
-)
+from models.faults import SensorFault
 from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
 from models.recordings import joined, read_recording, runs
@@ -127,7 +127,7 @@ def test_speeds_in_kmh_and_angles_in_degrees_with_a_steering_wheel_are_all_found
     faults = [scaled("v_x", 3.6), scaled("v_y", 3.6), scaled("r", DEGREES)]
     broken = Together(faults=(*faults, scaled("delta_f", -15.0 * DEGREES))).apply(log)
     assert set(named(broken, car)) == {
-        *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f"),
+        *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f")
     }
 
 

@@ -17,15 +17,9 @@ from models.vehicle import sedan
 from tests.kept import Kept
 
 STRICT = [
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wshadow",
-    "-Wdouble-promotion",
+    "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion",
     "-Werror",
-]
+]  # fmt: skip
 TWO = ("integral", "axle")
 BANKED = "axle, with a_y and band"
 CALIBRATION = BandCalibration(

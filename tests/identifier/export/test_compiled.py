@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export.compiled import (
-    CompiledPackage,
-    PackageFileError,
-    Status,
-    samples_of,
-)
+from identifier.export.compiled import CompiledPackage, PackageFileError, Status, samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
 from identifier.paper.design import with_keeping
@@ -214,8 +209,7 @@ def test_factors_are_taken_where_no_variance_is_negative(learnt, single, rng):
 
 
 @pytest.mark.parametrize(
-    ("law", "name"),
-    [("axle", "errors"), ("axle", "excitation"), ("axle", "watch")],
+    ("law", "name"), [("axle", "errors"), ("axle", "excitation"), ("axle", "watch")]
 )
 def test_amounts_that_are_negative_are_refused(learnt, law, name):
     run = learnt[law, False]

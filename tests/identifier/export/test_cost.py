@@ -5,14 +5,7 @@ import json
 import pytest
 
 from codegen import processor
-from codegen.processor import (
-    PROCESSORS,
-    ReplayError,
-    missing_tools,
-    replay,
-    size_on,
-    with_figures,
-)
+from codegen.processor import PROCESSORS, ReplayError, missing_tools, replay, size_on, with_figures
 from identifier.export.processor import figures_text, measure, recording_program
 
 pytestmark = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")

@@ -32,14 +32,7 @@ def test_the_manifest_gets_the_same_numbers_and_keeps_the_rest():
     first = told["figures"][0]
     del first["precision"]
     assert first == {
-        "processor": "Cortex-M4",
-        "compiler": "gcc 12",
-        "flash_B": 5432,
-        "ram_B": 1204,
-        "static_ram_B": 4,
-        "state_B": 1000,
-        "params_B": 200,
-        "stack_B": 30,
-        "instructions_mean": 77777,
-        "instructions_largest": 88888,
-    }
+        "processor": "Cortex-M4", "compiler": "gcc 12", "flash_B": 5432, "ram_B": 1204,
+        "static_ram_B": 4, "state_B": 1000, "params_B": 200, "stack_B": 30,
+        "instructions_mean": 77777, "instructions_largest": 88888,
+    }  # fmt: skip

@@ -69,12 +69,9 @@ def write_sources(folder, version):
 
 def compiled(folder, *arguments):
     return subprocess.run(
-        [*COMPILER, "-std=c99", "-ffp-contract=off", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        [*COMPILER, "-std=c99", "-ffp-contract=off", *arguments], cwd=folder, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
 
 
 def test_no_sample_is_missed_or_doubled_in_1000_s(tmp_path):

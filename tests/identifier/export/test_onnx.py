@@ -85,14 +85,9 @@ def test_every_port_tells_its_unit(car, rng):
     graph = onnx.load_from_string(onnx_bytes(frozen(car, Network(), rng))).graph
     units = {port.name: port.doc_string.rsplit(" ", 1)[1] for port in (*graph.input, *graph.output)}
     assert units == {
-        "v_x": "[m/s]",
-        "v_y": "[m/s]",
-        "r": "[rad/s]",
-        "delta_f": "[rad]",
-        "delta_r": "[rad]",
-        "F_yf": "[N]",
-        "F_yr": "[N]",
-    }
+        "v_x": "[m/s]", "v_y": "[m/s]", "r": "[rad/s]", "delta_f": "[rad]", "delta_r": "[rad]",
+        "F_yf": "[N]", "F_yr": "[N]",
+    }  # fmt: skip
 
 
 def test_the_same_model_gives_the_same_bytes(car, rng, tmp_path):

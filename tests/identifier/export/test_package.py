@@ -109,16 +109,13 @@ def test_the_same_input_gives_the_same_bytes(law, packages):
 def test_everything_that_goes_in_changes_the_hash(packages):
     design, axle = make_method("integral", CAR), make_method("axle", CAR)
     found = [
-        packages["axle"],
-        build_package(axle, CAR, with_a_y=True),
-        packages["integral"],
-        build_package(design, CAR, single=True),
-        build_package(design, CAR, name="other"),
+        packages["axle"], build_package(axle, CAR, with_a_y=True), packages["integral"],
+        build_package(design, CAR, single=True), build_package(design, CAR, name="other"),
         build_package(replace(design, seed=1), CAR),
         build_package(replace(design, gains=replace(design.gains, rho_W=0.0)), CAR),
         build_package(design, replace(CAR, mass=CAR.mass + 1.0)),
         build_package(replace(design, network=Network(hidden=11)), CAR),
-    ]
+    ]  # fmt: skip
     assert len({package.about["hash"] for package in found}) == len(found)
 
 

@@ -82,18 +82,13 @@ def equations(tires, k, planned):
         pull = SPEED / sigma
         late = (alpha - x) / sigma * (slope + s * bend * p_s)
         return [
-            (F_f + F_r) / CAR.mass - SPEED * r,
-            (CAR.l_f * F_f - CAR.l_r * F_r) / CAR.yaw_inertia,
+            (F_f + F_r) / CAR.mass - SPEED * r, (CAR.l_f * F_f - CAR.l_r * F_r) / CAR.yaw_inertia,
             SPEED * math.cos(psi) - v_y * math.sin(psi),
-            SPEED * math.sin(psi) + v_y * math.cos(psi),
-            r,
-            (planned(t) - delta) / tires.steering_lag[k],
-            rho_dot,
+            SPEED * math.sin(psi) + v_y * math.cos(psi), r,
+            (planned(t) - delta) / tires.steering_lag[k], rho_dot,
             stiffness * ((loads * phi).sum() / CAR.mass - rho) - damping * rho_dot,
-            *(pull * (alpha - x)),
-            *(-pull * (p_s + late)),
-            *(pull * (sway - p_k)),
-        ]
+            *(pull * (alpha - x)), *(-pull * (p_s + late)), *(pull * (sway - p_k)),
+        ]  # fmt: skip
 
     return rates
 

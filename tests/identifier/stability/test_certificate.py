@@ -8,12 +8,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from benchmarks.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.certificate import Property, at_least, at_most
 from identifier.paper.laws import LAWS, Gains, diagonal
-from identifier.stability import (
-    Certificate,
-    Operation,
-    certify,
-    design_gains,
-)
+from identifier.stability import Certificate, Operation, certify, design_gains
 from identifier.stability.sampled_bound import Disturbance
 
 integral, instantaneous, lead_law = (

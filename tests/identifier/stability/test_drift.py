@@ -5,11 +5,7 @@ import pytest
 
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
-from identifier.stability.margins import (
-    drift_frequency,
-    passivity_shortage,
-    sufficient_leakage,
-)
+from identifier.stability.margins import drift_frequency, passivity_shortage, sufficient_leakage
 from tests.identifier.stability.storage import lead_time, pi_lead
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])

@@ -6,11 +6,7 @@ from benchmarks.steady_cornering import jacobian_feedback
 from identifier.paper.network import hidden_layer
 from identifier.stability.loop import INTEGRAL, Loop
 from identifier.stability.margins import gain_margin
-from identifier.stability.operation import (
-    axle_coupling,
-    estimated_input_feedback,
-    minimal_decay,
-)
+from identifier.stability.operation import axle_coupling, estimated_input_feedback, minimal_decay
 from models.bicycle import BicycleParameters, bicycle, slip_angles
 
 CAR = {"m": 1500.0, "I_z": 2500.0, "l_f": 1.15, "l_r": 1.55}

@@ -10,29 +10,17 @@ from identifier.stability.sampled_bound import Disturbance
 from tests.identifier.stability.storage import pi_lead
 
 TASK = {
-    "bandwidth": 0.7,
-    "dt": 0.01,
-    "n_h": 10,
-    "x_bar_max": 2.5,
-    "disturbance": Disturbance(residual=4.0),
-    "needed_force": 4.0,
-    "V_max": 12.0,
-}
+    "bandwidth": 0.7, "dt": 0.01, "n_h": 10, "x_bar_max": 2.5,
+    "disturbance": Disturbance(residual=4.0), "needed_force": 4.0, "V_max": 12.0,
+}  # fmt: skip
 
 
 def operation(**changes):
     settings = {
-        "n_h": 10,
-        "dt": 0.01,
-        "integrator": "euler",
-        "bandwidth": 0.7,
-        "disturbance": Disturbance(residual=4.0),
-        "needed_force": 4.0,
-        "x_bar_max": 2.5,
-        "input_feedback": None,
-        "W_M": 3.0,
-        "w_bar": 0.2,
-    }
+        "n_h": 10, "dt": 0.01, "integrator": "euler", "bandwidth": 0.7,
+        "disturbance": Disturbance(residual=4.0), "needed_force": 4.0, "x_bar_max": 2.5,
+        "input_feedback": None, "W_M": 3.0, "w_bar": 0.2,
+    }  # fmt: skip
     return Operation(**{**settings, **changes})
 
 
@@ -75,13 +63,9 @@ def test_a_design_keeps_its_rules(law):
     lag = 2.0 * np.arctan(2 * np.pi * 0.7 / a)
     assert np.degrees(lag) == pytest.approx(45.0)
     capacity = steady_capacity(
-        gains.matrix,
-        law=law,
-        forgetting=gains.forgetting,
-        eta_W=gains.eta_W,
-        rho_W=gains.rho_W,
+        gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
         n_h=10,
-    )
+    )  # fmt: skip
     assert capacity == pytest.approx(3.0 * 4.0)
     drive, lam = gains.eta_V / a * bounds.W * 2.5, gains.forgetting  # of V, at the bounds
     V = (

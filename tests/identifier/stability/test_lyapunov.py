@@ -63,13 +63,10 @@ def test_the_peak_gain_of_a_symmetric_matrix_is_that_of_its_slowest_pole():
 @pytest.mark.parametrize(
     "A_d",
     [
-        SKEWED,
-        [[-1.0, 50.0], [0.0, -1.5]],
-        [[-1.0, 30.0], [-0.2, -1.0]],
-        [[-3.0, 0.3], [0.0, -3.0001]],
-        [[-3.0, 2.0], [-2.0, -3.5]],
+        SKEWED, [[-1.0, 50.0], [0.0, -1.5]], [[-1.0, 30.0], [-0.2, -1.0]],
+        [[-3.0, 0.3], [0.0, -3.0001]], [[-3.0, 2.0], [-2.0, -3.5]],
     ],
-)
+)  # fmt: skip
 def test_the_peak_gain_is_the_integral_of_the_spectral_norm_and_the_shortcut_is_not(A_d):
     slowest = -np.linalg.eigvals(A_d).real.max()
     t = np.concatenate(([0.0], np.geomspace(1e-4, 40.0 / slowest, 200_000)))

@@ -16,12 +16,7 @@ from identifier.motion.parameters import INDEX
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge, judge_prediction
-from identifier.verdict.motion import (
-    Windows,
-    clean_share,
-    measured_force,
-    noise_variance,
-)
+from identifier.verdict.motion import Windows, clean_share, measured_force, noise_variance
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors, white_noise
@@ -123,9 +118,7 @@ def turned(drive, degrees):
     a = np.radians(degrees)
     v_x, v_y = drive.v_x, drive.v_y
     return replace(
-        drive,
-        v_x=v_x * np.cos(a) + v_y * np.sin(a),
-        v_y=v_y * np.cos(a) - v_x * np.sin(a),
+        drive, v_x=v_x * np.cos(a) + v_y * np.sin(a), v_y=v_y * np.cos(a) - v_x * np.sin(a)
     )
 
 

@@ -9,13 +9,7 @@ import numpy as np
 
 Columns = Mapping[str, np.ndarray]
 # By name of a column: its unit, and the message and field that hold it in a bag.
-UNITS = {
-    "v_x": "m/s",
-    "v_y": "m/s",
-    "r": "rad/s",
-    "delta_f": "rad",
-    "a_y": "m/s^2",
-}
+UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "a_y": "m/s^2"}
 FIRST_NS = 1_700_000_000_000_000_000  # of a bag: ns since 1970
 MAT73_HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: then HDF5 schema 1.00 ."
 

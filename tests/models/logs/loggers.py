@@ -25,8 +25,7 @@ def drive(n: int = N) -> Drive:
     t = np.round(DT * np.arange(n), 3)
     wave = np.sin(2.0 * t)
     return Drive(
-        t,
-        *(np.round(one, 3) for one in (60.0 + 2.0 * wave, 0.1 * wave, 11.3 * wave, -2.5 * wave)),
+        t, *(np.round(one, 3) for one in (60.0 + 2.0 * wave, 0.1 * wave, 11.3 * wave, -2.5 * wave))
     )
 
 

@@ -330,15 +330,11 @@ def test_compressed_bags_are_read_and_unpack_no_further_than_allowed(mode, tmp_p
     [
         "!!python/object/apply:os.system ['touch MARK']",
         "rosbag2_bagfile_information: !!python/object/apply:pathlib.Path.touch [MARK]",
-        "rosbag2_bagfile_information: [1, 2]",
-        "rosbag2_bagfile_information:\n  version: 5\n",
-        "a: &a [x, x]\nb: &b [*a, *a]\nrosbag2_bagfile_information: *b",
-        "[" * 50_000,
-        "- " * 50_000,
-        "\n".join(" " * k + "a:" for k in range(200)),
-        "\0",
+        "rosbag2_bagfile_information: [1, 2]", "rosbag2_bagfile_information:\n  version: 5\n",
+        "a: &a [x, x]\nb: &b [*a, *a]\nrosbag2_bagfile_information: *b", "[" * 50_000,
+        "- " * 50_000, "\n".join(" " * k + "a:" for k in range(200)), "\0",
     ],
-)
+)  # fmt: skip
 def test_metadata_that_is_hostile_is_refused_and_not_executed(text, tmp_path, drive):
     path = write_bag(tmp_path / "bag", *drive)
     mark = tmp_path / "executed"

@@ -117,20 +117,13 @@ def car_log(path, count=30):
 
 @pytest.mark.parametrize("ending", ["asc", "blf", "log"])
 def test_a_dbc_tells_the_signals_their_units_and_which_frames_hold_them(ending, tmp_path):
-    log = open_log(
-        car_log(tmp_path / f"log.{ending}"),
-        dbc(tmp_path),
-    )
+    log = open_log(car_log(tmp_path / f"log.{ending}"), dbc(tmp_path))
     listed = {one.name: (one.unit, one.samples, round(one.rate)) for one in log.listed()}
     assert listed == {
-        "Steering.Angle": ("°", 30, 50),
-        "Steering.Rate": ("deg/s", 30, 50),
-        "Steering.Counter": ("", 30, 50),
-        "Extended.Speed": ("km/h", 30, 50),
-        "Muxed.Page": ("", 30, 50),
-        "Muxed.First": ("m", 15, 25),
-        "Muxed.Second": ("s", 15, 25),
-    }
+        "Steering.Angle": ("°", 30, 50), "Steering.Rate": ("deg/s", 30, 50),
+        "Steering.Counter": ("", 30, 50), "Extended.Speed": ("km/h", 30, 50),
+        "Muxed.Page": ("", 30, 50), "Muxed.First": ("m", 15, 25), "Muxed.Second": ("s", 15, 25),
+    }  # fmt: skip
     assert set(log.notes) == {
         "30 unknown frames are not read",
         "1 cut short frames are not read",

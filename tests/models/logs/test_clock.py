@@ -164,7 +164,3 @@ def test_gaps_of_a_long_clock_are_found_block_by_block(n, rng, monkeypatch):
     assert typical_step(t) == np.median(exact)
     limit = max(0.1 * (1.0 + 1e-6), 2.5 * float(np.median(exact)))
     np.testing.assert_array_equal(gaps(t, 0.1), np.flatnonzero(exact > limit) + 1)
-
-
-def test_one_sample_has_no_gap():
-    assert gaps(np.array([3.0]), 0.1).tolist() == []

@@ -33,12 +33,9 @@ EXTRAS = {
     "CAN MDF4": "can",
 }
 INSTALLED = {
-    "parquet": ["pyarrow"],
-    "mat": ["h5py"],
-    "mdf": ["asammdf"],
-    "ros": ["rosbags"],
+    "parquet": ["pyarrow"], "mat": ["h5py"], "mdf": ["asammdf"], "ros": ["rosbags"],
     "can": ["cantools", "python-can"],
-}
+}  # fmt: skip
 LIBRARIES = ("pyarrow", "h5py", "asammdf", "rosbags", "can", "cantools")
 
 

@@ -131,15 +131,9 @@ def test_a_state_named_among_numbers_is_nan(tmp_path):
     """As "not available" in a signal that is a number else."""
     block = asammdf.blocks.v4_blocks.ChannelConversion
     conversion = block(
-        conversion_type=8,
-        default_addr=0,
-        links_nr=6,
-        ref_param_nr=2,
-        val_param_nr=2,
-        lower_0=89.0,
-        upper_0=89.0,
-        text_0=b"SNA",
-    )
+        conversion_type=8, default_addr=0, links_nr=6, ref_param_nr=2, val_param_nr=2,
+        lower_0=89.0, upper_0=89.0, text_0=b"SNA",
+    )  # fmt: skip
     conversion.referenced_blocks["default_addr"] = block(conversion_type=1, a=0.5, b=1.0)
     path = write(tmp_path / "log.mf4", ("g", [signal("v", RAW, SLOW, conversion=conversion)]))
     log = open_log(path)

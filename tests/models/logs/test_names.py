@@ -145,7 +145,7 @@ def test_units_at_the_end_of_names_hide_no_signal() -> None:
     )
     assert found.unsure() == ()
     assert {one.channel[0].split("_")[0] for one in found.signals().values()} == {
-        *("vehicle", "vy", "yaw", "road", "lat"),
+        *("vehicle", "vy", "yaw", "road", "lat")
     }
 
 
@@ -200,13 +200,9 @@ def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel()
 
 def test_two_wheels_of_an_axle_are_taken_together() -> None:
     found = proposed(
-        ("Car.SteerAngleFL", "rad", 0.1 * WAVE),
-        ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
-        ("FyFL", "N", WAVE),
-        ("FyFR", "N", WAVE),
-        ("FyRL", "N", WAVE),
-        ("FyRR", "N", WAVE),
-    )
+        ("Car.SteerAngleFL", "rad", 0.1 * WAVE), ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
+        ("FyFL", "N", WAVE), ("FyFR", "N", WAVE), ("FyRL", "N", WAVE), ("FyRR", "N", WAVE),
+    )  # fmt: skip
     assert found.guesses["delta_f"].channel == ("Car.SteerAngleFL", "Car.SteerAngleFR")
     assert found.guesses["Fyf"].channel == ("FyFL", "FyFR")
     assert found.guesses["Fyr"].channel == ("FyRL", "FyRR")
@@ -266,20 +262,15 @@ def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none() 
 @pytest.mark.parametrize(
     ("signal", "name", "size", "unit"),
     [
-        ("r", "YawRate", 37.0, "deg/s"),
-        ("r", "YawRate", 2.0, ""),
-        ("v_x", "Speed", 180.0, "km/h"),
-        ("v_x", "Speed", 60.0, ""),
-        ("beta", "Slip_Angle", 9.0, "deg"),
-        ("beta", "Slip_Angle", 0.2, ""),
-        ("delta_f", "RoadWheelAngle", 12.0, "deg"),
-        ("delta_f", "RoadWheelAngle", 0.3, ""),
+        ("r", "YawRate", 37.0, "deg/s"), ("r", "YawRate", 2.0, ""),
+        ("v_x", "Speed", 180.0, "km/h"), ("v_x", "Speed", 60.0, ""),
+        ("beta", "Slip_Angle", 9.0, "deg"), ("beta", "Slip_Angle", 0.2, ""),
+        ("delta_f", "RoadWheelAngle", 12.0, "deg"), ("delta_f", "RoadWheelAngle", 0.3, ""),
         ("delta_f", "SteeringWheelAngle", 102.0, "deg"),
-        ("delta_f", "SteeringWheelAngle", 6.0, ""),
-        ("a_y", "Lat_Acc", 1.05, "g"),
+        ("delta_f", "SteeringWheelAngle", 6.0, ""), ("a_y", "Lat_Acc", 1.05, "g"),
         ("a_y", "Lat_Acc", 8.0, ""),
     ],
-)
+)  # fmt: skip
 def test_without_a_unit_that_is_proposed_which_the_range_allows_and_none_is_sure(
     signal: str, name: str, size: float, unit: str
 ) -> None:
@@ -348,14 +339,10 @@ def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken() -> 
 
 def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
     found = proposed(
-        ("vxCG", "m/s", 20 + WAVE),
-        ("vyCG", "m/s", WAVE),
-        ("ayCG", "m/s2", WAVE),
-        ("axCG", "m/s2", WAVE),
-        ("yawRate", "deg/s", WAVE),
-        ("sideSlip", "deg", WAVE),
+        ("vxCG", "m/s", 20 + WAVE), ("vyCG", "m/s", WAVE), ("ayCG", "m/s2", WAVE),
+        ("axCG", "m/s2", WAVE), ("yawRate", "deg/s", WAVE), ("sideSlip", "deg", WAVE),
         ("handwheelAngle", "deg", 90 * WAVE),
-    )
+    )  # fmt: skip
     assert (
         set(found.signals()) == {"v_x", "v_y", "r", "a_y", "a_x"} and found.guesses["delta_f"].hand
     )

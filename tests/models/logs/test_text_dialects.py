@@ -180,15 +180,6 @@ def test_the_clock_is_found_by_what_it_does_where_no_name_tells(tmp_path):
     )
 
 
-def test_runs_whose_clocks_start_anew_are_listed_and_read(tmp_path):
-    lines = plain().splitlines()
-    rows = [f"{one},{name}" for name in "ab" for one in lines[1:]]
-    log = open_log(written(tmp_path, "\n".join([lines[0] + ",run", *rows])))
-    assert log.listed()[0].samples == 240
-    for name in "ab":
-        np.testing.assert_array_equal(log.read(["vy [m/s]"], run=name)[0].t, drive().t)
-
-
 def test_a_clock_that_is_told_is_taken(tmp_path):
     rows = [f"{k % 7},{10 * k},{DT * k:.2f}" for k in range(60)]
     log = open_log(written(tmp_path, "\n".join(["a,Time,mine", *rows])))
@@ -326,11 +317,6 @@ WRONG = {
 def test_a_wrong_file_is_refused_in_one_line_that_says_where_and_why(tmp_path, wrong):
     data, said = WRONG[wrong]
     assert said in refusal(tmp_path, data)
-
-
-def test_a_channel_that_is_not_there_is_refused_with_those_that_are(tmp_path):
-    said = refusal(tmp_path, plain(), channels=["vx"])
-    assert said.startswith("there is no channel 'vx', there are 'Time [s], Speed [km/h], ")
 
 
 def test_a_header_of_megabytes_or_of_a_million_columns_is_refused(tmp_path):

@@ -9,15 +9,9 @@ import pytest
 from models.tires import MagicFormula, TirError, read_tir
 
 ESSENTIAL = {
-    "FNOMIN": "4000",
-    "PCX1": "1.6",
-    "PDX1": "1.1",
-    "PKX1": "22",
-    "PCY1": "1.3",
-    "PDY1": "1.0",
-    "PKY1": "-19",
-    "PKY2": "1.9",
-}
+    "FNOMIN": "4000", "PCX1": "1.6", "PDX1": "1.1", "PKX1": "22", "PCY1": "1.3", "PDY1": "1.0",
+    "PKY1": "-19", "PKY2": "1.9",
+}  # fmt: skip
 PLAIN = "\n".join(f"{key} = {value}" for key, value in ESSENTIAL.items())
 
 
@@ -129,18 +123,11 @@ $ the end, without a line break"""
 @pytest.mark.parametrize(
     ("unit", "newton"),
     [
-        ("newton", 1.0),
-        ("NEWTONS", 1.0),
-        ("N", 1.0),
-        ("kN", 1000.0),
-        ("kilonewton", 1000.0),
-        ("lbf", 4.4482216152605),
-        ("pound_force", 4.4482216152605),
-        ("pound_for", 4.4482216152605),
-        ("KGF", 9.80665),
-        ("kilogram_for", 9.80665),
+        ("newton", 1.0), ("NEWTONS", 1.0), ("N", 1.0), ("kN", 1000.0), ("kilonewton", 1000.0),
+        ("lbf", 4.4482216152605), ("pound_force", 4.4482216152605), ("pound_for", 4.4482216152605),
+        ("KGF", 9.80665), ("kilogram_for", 9.80665),
     ],
-)
+)  # fmt: skip
 def test_loads_come_in_every_unit(tmp_path: Path, unit: str, newton: float) -> None:
     tire = MagicFormula.from_tir(written(tmp_path, f"[UNITS]\nFORCE = '{unit}'\n{PLAIN}"))
     nominal_load = tire.coefficients.FNOMIN
@@ -204,16 +191,10 @@ def test_other_models_are_refused_because_their_equations_differ(
 @pytest.mark.parametrize(
     "mark",
     [
-        "PKY4 = 2",
-        "PKY6 = -0.9",
-        "PEY5 = -28.4",
-        "PPY5 = -0.6",
-        "RBY4 = 3",
-        "PCY2 = 0.8",
-        "NOMPRES = 220000",
-        "INFLPRES = 2.2D5",
+        "PKY4 = 2", "PKY6 = -0.9", "PEY5 = -28.4", "PPY5 = -0.6", "RBY4 = 3", "PCY2 = 0.8",
+        "NOMPRES = 220000", "INFLPRES = 2.2D5",
     ],
-)
+)  # fmt: skip
 def test_a_file_of_another_version_is_told_by_its_coefficients_whatever_it_calls_itself(
     tmp_path: Path, label: str, called: str, mark: str
 ) -> None:

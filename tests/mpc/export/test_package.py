@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from codegen.package import PackageNameError
 from models.vehicle import sedan
 from mpc.export.package import build_mpc_package, mpc_readme
 from mpc.problem import Cost, Problem
@@ -88,19 +87,6 @@ def test_the_manifest_tells_all_that_went_in(packages):
     np.testing.assert_array_equal(manifest["params"]["weights"], package.tire.weights)
     for path, hashed in manifest["files_sha256"].items():
         assert hashlib.sha256(package.files[path].encode()).hexdigest() == hashed
-
-
-@pytest.mark.parametrize("name", ["Upper_mpc", "1st_mpc", "with-dash", "", "a" * 32])
-def test_names_that_are_not_of_c_are_refused(name):
-    with pytest.raises(PackageNameError, match="name must be"):
-        build_mpc_package(prediction_tire(CAR), SHORT, name=name)
-
-
-def test_nothing_is_left_to_fill_in(pairs):
-    for pair in pairs.values():
-        texts = {**pair.files, **pair.tracker.files, "mpc": mpc_readme(pair.tracker, "none")}
-        for path, text in texts.items():
-            assert "@" not in text, path
 
 
 def self_test(folder, run, compiler="gcc", single=0, flags=("-O2", "-ffp-contract=off")):

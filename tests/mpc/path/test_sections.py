@@ -37,15 +37,9 @@ def test_sections_end_where_quadrature_says():
 def corners(last):
     turn = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
     return [
-        Straight(length=40.0),
-        turn,
-        Straight(length=25.0),
-        turn,
-        Straight(length=10.0),
-        turn,
-        Straight(length=10.0),
-        last,
-    ]
+        Straight(length=40.0), turn, Straight(length=25.0), turn, Straight(length=10.0), turn,
+        Straight(length=10.0), last,
+    ]  # fmt: skip
 
 
 def test_two_straights_close_a_course():
@@ -74,17 +68,12 @@ def test_courses_that_cannot_close_are_refused():
     with pytest.raises(PathError, match="section 6 cannot close"):
         close(
             [
-                Straight(length=4.0),
-                *corners(right)[1:2],
-                Straight(length=2.0),
-                *corners(right)[3:4],
-                Straight(length=99.0),
-                right,
-                Straight(length=9.0),
+                Straight(length=4.0), *corners(right)[1:2], Straight(length=2.0),
+                *corners(right)[3:4], Straight(length=99.0), right, Straight(length=9.0),
                 Turn(radius=50.0, angle=np.pi / 2, easing=6.0),
             ],
             (4, 6),
-        )
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize(

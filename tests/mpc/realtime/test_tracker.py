@@ -235,15 +235,10 @@ def test_the_road_is_asked_for_where_the_plan_will_be(tracker, problem):
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"period": 0.0},
-        {"period": 0.06},
-        {"delay": -0.01},
-        {"delay": 0.5},
-        {"tolerance": 0.0},
-        {"max_iterations": 0},
-        {"linearizations": 0},
+        {"period": 0.0}, {"period": 0.06}, {"delay": -0.01}, {"delay": 0.5}, {"tolerance": 0.0},
+        {"max_iterations": 0}, {"linearizations": 0},
     ],
-)
+)  # fmt: skip
 def test_numbers_out_of_range_are_refused_by_name(linear, wrong):
     (name,) = wrong
     with pytest.raises(ValueError, match=f"{name} must be"):
