@@ -143,7 +143,7 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: boo
     if not v_y:
         return InertialIdentifier.beginning_with(model, vehicle, dt=dt)[0]
     if model.kind not in LEARNERS:
-        raise ValueError(f"no method can go on learning from a {type(model).__name__}")
+        raise ValueError(f"no method can continue a {type(model).__name__}")
     return LEARNERS[model.kind](model, vehicle, dt)
 
 

@@ -69,7 +69,7 @@ def test_a_fault_that_is_none_is_not_noticed_and_leaves_no_error(drive):
 def test_a_plain_fault_is_noticed_soon_and_harms_where_nobody_doubts(drive):
     fault = SensorFault(channel="v_y", kind="biased", start=18.0, duration=2.0, size=3.0)
     design = make_method(LIVE, drive.car)
-    never = replace(design, watch=replace(design.watch, noticed=sensor_faults.NEVER))
+    never = replace(design, change=replace(design.change, fast=sensor_faults.NEVER))
     seen = shown(drive.recording, fault, drive.car)
     watched, unwatched = (identify(seen, drive.car, one) for one in (design, never))
     errors = [

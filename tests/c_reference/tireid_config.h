@@ -20,8 +20,8 @@ typedef double tireid_real;
 #define TIREID_READS_A_Y 0 /* a_y is an input, NaN where there is none */
 #define TIREID_TELLS_V_Y 0 /* v_y is an output, as an input it may be NaN; 2: so is v_y_sd; 3: and whether it is observable */
 #define TIREID_RESTS_FIRST 0 /* the first sample of all is one to rest at before it is taken */
-#define TIREID_SUMS 1 /* equations return the sum of all numbers that they tell */
-#define TIREID_RULES 5U /* of weights that are taken over */
+#define TIREID_SUMS 0 /* equations return the sum of all numbers that they tell */
+#define TIREID_RULES 4U /* of weights that are taken over */
 #define TIREID_COVARIANCE 0U /* rows of a covariance among the weights */
 
 #define TIREID_SAMPLE_TIME (0.01) /* from one sample to the next [s] */
@@ -59,14 +59,12 @@ typedef struct {
     tireid_real own[2][3];
     /* covariance U D U' of W and own: D, and U above it, by rows; front and rear [of W and own] */
     tireid_real UD[2][28];
-    /* fast and slow mean squared error, peak of the measured force, per axle [-; -; static axle loads] */
-    tireid_real errors[2][3];
+    /* fast mean, trend and slow mean of squared errors, peak of the measured force, per axle [-; -; -; static axle loads] */
+    tireid_real errors[2][4];
     /* largest slip, then time of learning above each edge, per axle [rad; s] */
     tireid_real excitation[2][9];
-    /* time in doubt, and in which kept explained again; mean squared error of W and of kept, front and rear; time for which W explained forces [s; s; -; s] */
-    tireid_real watch[7];
-    /* W and own that are gone back to after a fault, front and rear [of W and own] */
-    tireid_real kept[2][7];
+    /* evidence of another friction: precision, mean times it, squared errors; ln of the friction over that at the start [-] */
+    tireid_real change[4];
 } tireid_weights;
 
 /* Other states. */
@@ -80,6 +78,8 @@ typedef struct {
     tireid_real sensitivity[2][3];
     /* filters of the regressors and of the target; mean force; per axle [static axle loads] */
     tireid_real filters[2][9];
+    /* errors that a fit found, which stay: angle and place of v_y, share of the steering [rad; m; -] */
+    tireid_real sensors[3];
 } tireid_signals;
 
 /* The state. */

@@ -369,7 +369,7 @@ def test_an_amount_whose_sign_is_elsewhere_is_refused(column: str) -> None:
     with pytest.raises(RecordingError, match=f"{column} must be negative to the right, it never"):
         check_physics(amount)
     if column == "delta_f":
-        with pytest.raises(RecordingError, match="an amount whose sign"):
+        with pytest.raises(RecordingError, match="an amount with its sign"):
             check_physics(replace(amount, a_y=None))
 
 

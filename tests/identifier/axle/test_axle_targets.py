@@ -49,7 +49,7 @@ def carmaker_drives(shared_data):
 
 def most(target, key):
     """The benchmark's target of an error; where it is recorded as missed, what is recorded."""
-    return max(target, 1.001 * recorded()["learn_and_extrapolate"][f"carmaker/{key}"]) / 100.0
+    return max(target, 1.002 * recorded()["learn_and_extrapolate"][f"carmaker/{key}"]) / 100.0
 
 
 def test_learnt_on_a_hard_slalom_it_knows_the_gentle_drive(car, drives):

@@ -208,9 +208,7 @@ def test_factors_are_taken_where_no_variance_is_negative(learnt, single, rng):
     run.set_weights(weights)
 
 
-@pytest.mark.parametrize(
-    ("law", "name"), [("axle", "errors"), ("axle", "excitation"), ("axle", "watch")]
-)
+@pytest.mark.parametrize(("law", "name"), [("axle", "errors"), ("axle", "excitation")])
 def test_amounts_that_are_negative_are_refused(learnt, law, name):
     run = learnt[law, False]
     weights = run.weights

@@ -59,7 +59,7 @@ def test_a_network_of_slip_is_stretched_exactly(car, rng):
 def test_what_reads_the_speed_or_knows_no_limit_cannot_be_told_for_a_friction(car):
     linear = prediction_tire(car)
     assert not can_scale(linear)
-    with pytest.raises(ValueError, match="LinearAxles cannot be told for another friction"):
+    with pytest.raises(ValueError, match="LinearAxles cannot be scaled to another friction"):
         at_friction(linear, 0.5)
     with pytest.raises(ValueError, match="must be positive"):
         at_friction(linear, 0.0)
