@@ -233,13 +233,13 @@ class RoadChange:
     """
 
     evidence: float = 6.0
-    explains: float = 0.7
+    explains: float = 0.8
     time: float = 1.0
     correlation_time: float = 0.5
     spread: float = 0.7
     step: float = 0.3
     fast: float = 0.2
-    trend: float = 5.0
+    trend: float = 10.0
     slow: float = 20.0
 
     def __post_init__(self) -> None:
