@@ -112,3 +112,13 @@ def test_a_log_without_a_sample_that_counts_is_refused_by_its_name():
     slow = replace(driven(3), v_x=np.full(len(driven(3)), 0.5))
     with pytest.raises(ValueError, match="drive3: no sample is fast enough to learn from"):
         fit([slow], sedan())
+
+
+def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
+    """What a dead zone would have the curve do, fall at zero slip, no tire does."""
+    log = driven(3)
+    play = replace(log, delta_f=log.delta_f + 0.03 * np.tanh(log.delta_f / 0.001))
+    model = fit([play], sedan()).model
+    assert (model.force_at(np.array([0.001, 0.02])) > 0.0).all()
+    stiffness = learnt.model.cornering_stiffness
+    np.testing.assert_allclose(model.cornering_stiffness, stiffness, rtol=0.5)
