@@ -112,7 +112,7 @@ def worst(
     at : axle and slip.
     """
     i, m = at
-    g, begin, told_ = reach.g[:, i, m], reach.begin[i, m], taught.told[:, i]
+    g, begin, told_ = reach.g[:, i, m], reach.begin[i, m], taught.declared[:, i]
     by_begin, by_told = float(begin_error(taught, reach)[i, m]), float(np.abs(g) @ told_)
     most = by_begin + by_told + abs(float(reach.moved[i, m]))
     side = 1.0 if reach.moved[i, m] >= 0.0 else -1.0
@@ -121,7 +121,7 @@ def worst(
     units = np.tanh(SLIPS[m] / np.array(case.design.ladder))
     ends = []
     for share in (1.0, 1.05):
-        noise = np.zeros_like(taught.told)
+        noise = np.zeros_like(taught.declared)
         noise[:, i] = share * side * np.sign(g) * told_
         ends.append(abs(float(units @ forward(taught, error, noise)[i, : units.size])))
     return most, ends[0], ends[1], by_told > 0.01 * most

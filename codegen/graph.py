@@ -259,7 +259,7 @@ _ALL_BUILDERS = {name: _as_casadi(number) for number, name in OPERATIONS.items()
 
 @simplifying(False)
 def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function, Array]:
-    """Return a function that is told its constants, and the constants.
+    """Return a function that is given its constants, and the constants.
 
     It computes the same bits, operation by operation; functions that differ in their constants
     alone become the same function.

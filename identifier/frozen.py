@@ -35,8 +35,8 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
     if vehicle.has_downforce:
         numbers |= {key: getattr(vehicle, key) for key in AREAS}
-    told = {key: value for key in LENGTHWISE if (value := getattr(vehicle, key)) is not None}
-    return numbers | told | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
+    given = {key: value for key in LENGTHWISE if (value := getattr(vehicle, key)) is not None}
+    return numbers | given | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
 
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:

@@ -22,8 +22,8 @@ def with_doubt(value: float, sd: float | None = None) -> str:
     places = _places(max(abs(value), known), DIGITS)
     if known:
         places = min(max(places, _places(known, 1)), _places(known, 2))
-    told = [value, known] if known else [value]
-    return " ± ".join(f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in told)
+    given = [value, known] if known else [value]
+    return " ± ".join(f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in given)
 
 
 def _places(size: float, digits: int) -> int:

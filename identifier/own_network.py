@@ -234,8 +234,8 @@ class OnnxModel(StaticModel):
             reason = (error.strerror or "cannot be read").lower()
             raise UnusableNetworkError(f"{path}: {reason}") from error
         except ValueError as error:
-            told = str(error).removeprefix(f"{path}: ")
-            raise UnusableNetworkError(f"{path}: {told}") from error
+            given = str(error).removeprefix(f"{path}: ")
+            raise UnusableNetworkError(f"{path}: {given}") from error
 
     @property
     def step(self) -> ca.Function:

@@ -185,7 +185,8 @@ STEPS = 1 + 2 * len(LAWS)  # of `run_study`: the drives, and each law on both ma
 
 def run_study(seeds: int, progress: Callable[[str], None]) -> Study:
     """Run every law with every seed on both maneuvers.
-    seeds : number of seeds, counted from 0.   progress : told what is being done, `STEPS` times.
+    seeds : number of seeds, counted from 0.
+    progress : called with what is being done, `STEPS` times.
     """
     progress("driving step steer and slalom with the sedan at 20 m/s")
     recordings = drive_maneuvers()

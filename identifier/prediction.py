@@ -33,8 +33,8 @@ class Prediction:
     def __repr__(self) -> str:
         name, error, size = self.recording.name, self.against_truth, self.true_force
         if error is None or size is None:
-            told = "" if self.motion is None else f"; {self.motion_text()}"
-            return f"<Prediction of {name!r}: no true forces to compare with{told}>"
+            given = "" if self.motion is None else f"; {self.motion_text()}"
+            return f"<Prediction of {name!r}: no true forces to compare with{given}>"
         front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
         return (
             f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms error, "

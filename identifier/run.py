@@ -145,7 +145,10 @@ class History:
         t : time of the freeze in this recording's own clock [s]; None is the end.
         """
         if self.online:
-            raise ValueError("an online run cannot be compared with another drive of identify")
+            raise ValueError(
+                "a run that learns sample by sample cannot be asked about another drive: "
+                "freeze it and predict"
+            )
         model = self.freeze(t)
         known = self.design.reads(recording.as_logged(), self.vehicle)
         recording, outputs = _with_v_y(known, model)

@@ -131,10 +131,10 @@ class Setup(NamedTuple):
         """Return an output that is a column, over a recording, (n, size).
         recording : its signals are the input; its forces are not looked at.
         """
-        told = large((len(recording), self.scan.step.numel_out(port)))
+        given = large((len(recording), self.scan.step.numel_out(port)))
         for block in self.run(recording, ports=(port,)):
-            told[block.part] = block.outputs[port]
-        return told
+            given[block.part] = block.outputs[port]
+        return given
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.

@@ -653,8 +653,8 @@ class TireModel(ABC):
         ----------
         valid : the verdict on it, stored in the file; None where there is none.
         """
-        told = {} if valid is None else {"valid": valid}
-        write_atomically(path, json.dumps(self.to_dict() | told, indent=2) + "\n")
+        given = {} if valid is None else {"valid": valid}
+        write_atomically(path, json.dumps(self.to_dict() | given, indent=2) + "\n")
 
     @staticmethod
     def load(path: str | PathLike[str]) -> "TireModel":

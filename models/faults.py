@@ -94,7 +94,7 @@ class SensorFault:
         recording : the drive without it; the fault's times are on its clock.
         """
         if self.kind == "lost":
-            raise FaultError("a recording holds numbers only: a lost channel is `Held` in a log")
+            raise FaultError("a recording holds numbers only: no channel of it can be lost")
         good, broken = channel_of(recording, self.channel), self.active(recording.t)
         noise = np.random.default_rng(self.seed).standard_normal(good.size)
         shown = self.shown(recording.t, good, float(good[np.argmax(broken)]), noise)

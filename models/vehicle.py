@@ -145,7 +145,7 @@ UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 
 # Downforce of an axle grows with the square of speed, ½ ρ A v_x², and adds to its static load.
 #
-# What a car may have is told over its static axle load at a speed: Formula cars have 0.4 of it at
+# What a car may have is given over its static axle load at a speed: Formula cars have 0.4 of it at
 # 30 m/s, the lightest of Formula Student about 2; lift takes off a few hundredths on road cars.
 
 _AIR_DENSITY = 1.2  # ρ [kg/m³]: dry air at 20 °C, 100 m above the sea
@@ -311,10 +311,10 @@ class Vehicle:
 
     def lengthwise(self, name: str) -> float | None:
         """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, or None."""
-        told: float | None = getattr(self, name)
-        if told is None and self.chassis is not None:
-            told = getattr(self.chassis, name)
-        return told
+        given: float | None = getattr(self, name)
+        if given is None and self.chassis is not None:
+            given = getattr(self.chassis, name)
+        return given
 
     def moves_as(self, other: "Vehicle") -> bool:
         """Return whether another file declares the same car: its bicycle and its downforce."""
@@ -322,8 +322,8 @@ class Vehicle:
 
     def without_chassis(self) -> "Vehicle":
         """Return the car alone, with the numbers of `OF_CHASSIS` that its chassis tells."""
-        told: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}
-        return replace(self, chassis=None, **told)
+        given: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}
+        return replace(self, chassis=None, **given)
 
     @property
     def drag(self) -> float:

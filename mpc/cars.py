@@ -43,11 +43,11 @@ class Car(Protocol):
 
     @property
     def vehicle(self) -> Vehicle:
-        """The car as a controller is told of it."""
+        """The car as a controller knows it."""
 
     @property
     def tire(self) -> Tire:
-        """What is mounted on its wheels: what only an oracle is told."""
+        """What is mounted on its wheels: what only an oracle is given."""
 
     @property
     def friction(self) -> Friction:

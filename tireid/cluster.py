@@ -1,7 +1,7 @@
 """Work spread over a Dask cluster: the same functions, on as many machines as have workers.
 
 Every worker must have this very version of tireid, which is checked. Results come in any order. A
-worker that is lost is made good for by the scheduler; what several workers died of is told of. Of
+worker that is lost is made good for by the scheduler; what several workers died of is reported. Of
 the threads of a worker one works: CasADi's graphs must not be built by two at once. Which workers
 have more is said, and how to start processes instead.
 """
@@ -86,7 +86,7 @@ def _map(
     *,
     lost: Callable[[Any], None] | None = None,
 ) -> Iterator[Any]:
-    """Yield results; `lost` is told items that several workers died of, None ends with an error."""
+    """Yield results; `lost` gets items that several workers died of, None ends with an error."""
     shared = client.scatter(work, broadcast=True, hash=False)  # once to each worker
     futures = {client.submit(_work_alone, shared, item, pure=False): item for item in items}
     try:

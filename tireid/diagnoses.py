@@ -211,8 +211,8 @@ def write_doctor_report(
     page.write_report(folder / REPORT, report)
 
 
-def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:
+def write_repair(path: Path, given: LogMap, diagnosis: Diagnosis) -> LogMap:
     """Write how a log is read with what is sure taken out of it, and return it."""
-    repaired = replace(told, repair=told.repair.then(diagnosis.repair))
+    repaired = replace(given, repair=given.repair.then(diagnosis.repair))
     repaired.to_toml(path)
     return repaired

@@ -56,8 +56,8 @@ class Exported:
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += "; v_y is an output" if step.tells_v_y else ""
-        told = [UNCALIBRATED] if step.tells_band and step.band is None else []
-        return "\n".join([*lines, *self.notes, reads, *told, wrote])
+        warnings = [UNCALIBRATED] if step.tells_band and step.band is None else []
+        return "\n".join([*lines, *self.notes, reads, *warnings, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -139,10 +139,10 @@ def export(
         costs = measure(package, progress.begin(_COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
-        told = []
+        notes = []
         if mpc:
             progress.begin(_TRACKING)
-            told = write_tracker(scratch, package, single=single, caution=caution)
+            notes = write_tracker(scratch, package, single=single, caution=caution)
         if fmu:
             progress.begin(UNITS)
             from identifier.export.fmu import export_fmu
@@ -154,7 +154,7 @@ def export(
                     version,
                 )
                 progress.step(2)
-    return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(told))
+    return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(notes))
 
 
 def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:

@@ -123,7 +123,7 @@ class Stopwatch:
 # then; in a program that only uses the library nothing at all.
 
 QUIET, PLAIN, LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
-_TELLING = 0.02  # share from which the time left is told
+_TELLING = 0.02  # share from which the time left is given
 _listening = False
 _live = False  # whether such a line stands on the terminal
 
@@ -147,7 +147,7 @@ class Progress:
 
     parts : names of its parts in order, and about how long each takes beside the others; None has
         one.
-    long : whether it is known to last, so that the beginning of each part is told at once.
+    long : whether it is known to last, so that the beginning of each part is given at once.
     """
 
     def __init__(
@@ -185,7 +185,7 @@ class Progress:
         self(min(self._done / max(of, 1), 1.0), text)
 
     def within(self, first: float, last: float) -> Callable[[float], None]:
-        """Return who is told the share that is done of a piece of the part.
+        """Return who is given the share that is done of a piece of the part.
 
         first, last : shares of the part at which the piece begins and ends, 0 to 1.
         """
@@ -202,10 +202,10 @@ class Progress:
             return
         self._told = now
         done = min(self._before + self._weight * share, 1.0)
-        told = [text or self._name, f"{100.0 * done:.0f} %"]
+        parts = [text or self._name, f"{100.0 * done:.0f} %"]
         if done > _TELLING:
-            told.append(f"{_time_text((now - self._begun) * (1.0 - done) / done)} left")
-        line = f"{self._what}: {', '.join(one for one in told if one)}"
+            parts.append(f"{_time_text((now - self._begun) * (1.0 - done) / done)} left")
+        line = f"{self._what}: {', '.join(one for one in parts if one)}"
         if live:
             _show(line)
         else:
@@ -218,9 +218,9 @@ def _time_text(seconds: float) -> str:
 
 def _columns() -> int:
     """Return how wide the terminal is."""
-    told = os.environ.get("COLUMNS", "")
-    if told.isdecimal() and int(told) > 0:
-        return int(told)
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given) > 0:
+        return int(given)
     try:
         found = os.get_terminal_size(sys.stderr.fileno()).columns
     except (OSError, ValueError):

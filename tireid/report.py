@@ -225,8 +225,8 @@ def _numbers(numbers: Sequence[Headline]) -> list[str]:
     for value, meaning, tone in numbers:
         parts = [Marked(value)] if isinstance(value, str) else value
         pair = ' class="pair"' if len(parts) > 1 else ""
-        told = "".join(f"<dd{pair}>{_marked(one)}</dd>" for one in parts)
-        cards.append(f"<div{_class(tone)}><dt>{_inline(meaning)}</dt>{told}</div>")
+        given = "".join(f"<dd{pair}>{_marked(one)}</dd>" for one in parts)
+        cards.append(f"<div{_class(tone)}><dt>{_inline(meaning)}</dt>{given}</div>")
     return ['<dl class="numbers">', *cards, "</dl>"]
 
 

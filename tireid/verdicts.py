@@ -63,8 +63,8 @@ def asked_text(asked: Mapping[str, Verdict]) -> str:
 def _each(verdicts: Mapping[str, Verdict], what: str) -> str:
     lines = []
     for name, verdict in verdicts.items():
-        told = "; ".join(line for line in (verdict.headline, verdict.missed_line) if line)
-        lines.append(f"{what} {visible(name)}: {told}")
+        given = "; ".join(line for line in (verdict.headline, verdict.missed_line) if line)
+        lines.append(f"{what} {visible(name)}: {given}")
         lines += [f"  {finding.line}" for finding in verdict.findings]
     return "\n".join(lines)
 

@@ -61,7 +61,7 @@ class Lessons(NamedTuple):
     e: Array
     counts: Array
     gains: Array
-    told: Array
+    declared: Array
     theta: Array
     moved: Array
     begin: Array
@@ -96,11 +96,13 @@ def lessons(design: Learner, history: Run) -> Lessons:
         parts.append(_taught(step, {**setup.constants, **block.before, **signals}, setup.constants))
         theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
         begin.append(block.state["UD"][0])
-    h, e, counts, gains, told = (np.concatenate([part[name] for part in parts]) for name in LESSON)
+    h, e, counts, gains, declared = (
+        np.concatenate([part[name] for part in parts]) for name in LESSON
+    )
     path = np.concatenate([*(one[:-1] for one in theta), theta[-1][-1:]])
     learnt = path[:-1] + gains * (counts * e)[:, :, None]
     P = unpacked(begin[0], len(design.ladder) + 3)
-    return Lessons(h, e, counts, gains, told, path, path[1:] - learnt, P)
+    return Lessons(h, e, counts, gains, declared, path, path[1:] - learnt, P)
 
 
 def _taught(
@@ -114,13 +116,13 @@ def _taught(
     """
     N, names = len(values["v_x"]), step.name_in()
     alike = [i for i, name in enumerate(names) if name in constants]
-    told = []
+    declared = []
     for name in names:
         value, (rows, columns) = np.asarray(values[name]), step.size_in(name)
         if name not in constants:
             value = value.reshape(N, rows, columns).transpose(1, 0, 2).reshape(rows, -1)
-        told.append(value)
-    found = step.map("lessons", "serial", N, alike, [])(*told)
+        declared.append(value)
+    found = step.map("lessons", "serial", N, alike, [])(*declared)
     return {name: _by_sample(np.array(value), N) for name, value in zip(LESSON, found, strict=True)}
 
 
@@ -197,13 +199,13 @@ def _of_axle(
     possible = np.abs((box - model.W[i]) @ at_slips.T).max(axis=0)
     g, sizes = reach.g[:, i], np.abs(reach.g[:, i])
     by_begin, by_bounds = begin_error(taught, reach)[i], np.abs(reach.moved[i])
-    by_told, by_left = taught.told[:, i] @ sizes, np.abs(taught.left[:, i]) @ sizes
+    by_told, by_left = taught.declared[:, i] @ sizes, np.abs(taught.left[:, i]) @ sizes
     error = by_begin + by_told + by_bounds
     k = int(np.argmax(error / possible))
     span = f"{axle} axle, slip up to {known:.3g} rad"
     noise = np.sqrt((g**2).sum(axis=0))
     part = [
-        ("told", "of that by the declared errors", by_told, "static loads"),
+        ("declared", "of that by the declared errors", by_told, "static loads"),
         ("begin", "of that by the beginning", by_begin, "static loads"),
         ("moved", "of that by bounds", by_bounds, "static loads"),
         ("error_gain", "force error per largest error of y", sizes.sum(axis=0), "-"),

@@ -4,11 +4,11 @@ Half the width at a slip x and a speed v_x, in static axle loads: z sqrt((m² s�
 max(f, 1)² ρ)).
 z: of the level.   v = h'P h, h = [t, 0, 0, φ'/v_x or φ']: variance that learning left of weights
 t = tanh(x/α_j) and of the zero of the slip.   m² = (0.04 φ)² + 0.01²: errors of the model, as
-learning is told of them.   s: mean speed of the drive that taught over v_x: an error of a lateral
+declared.   s: mean speed of the drive that taught over v_x: an error of a lateral
 velocity is one of slip by 1/v_x.   f: factor of a range of slip times one of a range of speed, by
-which errors on stretches that did not teach the model are larger or smaller than that.   ρ: v over
+which errors on segments that did not teach the model are larger or smaller than that.   ρ: v over
 that from which on a slip is not known, at most 1; there nothing is narrowed.
-Learning takes errors to be correlated over a time that is told; where they are over a longer one,
+Learning takes errors to be correlated over a time that is given; where they are over a longer one,
 as many samples tell less by `color`, the ratio c of both: P' = (P₀⁻¹ + (P⁻¹ - P₀⁻¹)/c)⁻¹, which
 ends at the prior P₀ where nothing was learnt. With v₀ = h'P₀ h and p = v/v₀, v₀ p c/(1 + p (c - 1))
 is never below h'P' h: along the axes that P and P₀ share it is a mean of a concave function, here
@@ -32,7 +32,7 @@ CENTERS = (0.005, 0.015, 0.03, 0.06, 0.12, 0.24)  # rad: where the factor of a r
 SPEEDS = (2.0, 3.0, 4.0)  # sqrt(g L): ends of the ranges of speed, first and last are open
 AT_SPEEDS = (1.5, 2.5, 3.5, 4.5)  # sqrt(g L): where the factor of a range of speed holds
 STRETCH = (0.5, 2.0)  # s at most and least
-LEVEL = 0.9  # at which factors are found, and which is asked for if no other is told
+LEVEL = 0.9  # at which factors are found, and which is asked for if no other is given
 RELATIVE = Regression().relative_error  # of the force
 FLOOR = 0.5 * Regression().error  # static axle loads
 LEAST, MOST = 0.1, 100.0  # factors
@@ -49,7 +49,7 @@ class BandCalibration:
     ----------
     factors : of the errors of each range of slip, (2, 6).
     speeds : of the errors of each range of speed, over all, (2, 4).
-    color : variance of a mean of errors over that of errors as told, at least 1, (2,).
+    color : variance of a mean of errors over that of errors as declared, at least 1, (2,).
     speed : root mean square of v_x there [m/s], positive.
     noise : standard deviation of the white noise that sensors made: of the lateral velocity of
         front and rear axle [m/s], and of the steering in front [rad], (3,).
@@ -86,7 +86,7 @@ class BandCalibration:
 
     @classmethod
     def declared(cls, speed: float) -> Self:
-        """Return that of a model whose errors are as learning is told, of a speed.
+        """Return that of a model whose errors are as declared, of a speed.
 
         Parameters
         ----------
@@ -184,7 +184,7 @@ def normal_quantile(level: float) -> float:
 
 
 def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
-    """Return a covariance as errors leave it that are correlated longer than learning was told.
+    """Return a covariance as errors leave it that are correlated longer than declared.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ class SpreadByRange(NamedTuple):
 
 
 class BandSpread(NamedTuple):
-    """Variances of the force of an axle [static axle loads²], as errors are told to be.
+    """Variances of the force of an axle [static axle loads²], as errors are declared.
 
     scaled : (1 - ρ) (m² s² + v), by the factor.   held : ρ (m² s² + v), which no factor narrows.
     """

@@ -1,4 +1,4 @@
-"""The side force of the road, told by an accelerometer: what pushes the car and is no tire.
+"""The side force of the road, by an accelerometer: what pushes the car and is no tire.
 
 An accelerometer feels what tires (and wind) push: a_y = dv_y/dt + v_x r - g sin β on a road that
 falls to the left by β. Motion alone has all of it. In static axle loads the road pushes both axles

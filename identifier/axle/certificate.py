@@ -199,7 +199,7 @@ class FrictionDrop:
     noise : largest error of the measured force [static axle loads].
     unsure : standard deviation that weights, lag and offsets leave in it [static axle loads].
     slope : of the curves in the corner [static axle loads/rad].
-    errors : slow mean of the squared error over what is told, when it drops [-].
+    errors : slow mean of the squared error over what is given, when it drops [-].
     """
 
     to: float = 0.5
@@ -214,7 +214,7 @@ class FrictionDrop:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
         While both are, evidence of the drop grows at least as fast as here, where errors are the
-        least, are told the largest and are cut; what is then believed takes that off the error.
+        least, are given the largest and are cut; what is then believed takes that off the error.
         That is of errors that are one change of ln μ at both axles, but for `RoadChange.explains`
         of their squares. inf where it does not end within a minute.
 
@@ -223,20 +223,23 @@ class FrictionDrop:
         friction : before the drop [-].
         v_x : speed [m/s].
         """
-        r, at, dt = design.regression, design.change.at(design.dt), design.dt
+        r, dt = design.regression, design.dt
+        at = design.change.at(dt, r.rate)
         error = friction * (1.0 - self.to)
         wrong = self.left * error
-        told = r.error + r.relative_error * friction + r.noise * self.slope / v_x
+        declared = r.error + r.relative_error * friction + r.noise * self.slope / v_x
         A, b, slow = 0.0, 0.0, self.errors
         for k in range(1, math.ceil(LONGEST / dt) + 1):
             slow = min(slow * (1.0 + (SLOW_Q - 1.0) * at.slow), MOST_SLOW)
-            weight = 2.0 * at.per_sample / (told**2 * slow + self.unsure**2)
-            e = min(wrong - self.noise, r.clip * told)
+            weight = 2.0 * at.per_sample / (declared**2 * slow + self.unsure**2)
+            e = min(wrong - self.noise, r.clip * declared)
             A, b = at.keep * A + weight * self.seen**2, at.keep * b + weight * self.seen * e
             precision = A + at.before
             if b > 0.0 and b * b > at.twice_evidence * precision:
-                error -= self.seen * min(b / precision, at.step)
-                A, b = 0.0, 0.0
+                change = min(b / precision, at.most)
+                error -= self.seen * change
+                cut = change >= at.most < at.step
+                A, b = (A, b - change * A) if cut else (0.0, 0.0)
             if error <= wrong:
                 return k * dt
         return math.inf

@@ -199,7 +199,7 @@ class AxleIdentifier(Method):
                 "plausibility": np.array(self.plausibility.numbers()),
                 "roll": np.array(self.sway.numbers()),
                 "regression": np.array(self.regression.at(self.dt)),
-                "changing": np.array(self.change.at(self.dt)),
+                "changing": np.array(self.change.at(self.dt, self.regression.rate)),
                 "road": np.array(self.road.at(self.dt)),
                 "bounds": np.array(self.bounds.of_ladder(self.ladder, self.rising_until)),
                 "friction_direction": friction_direction(self.ladder),
@@ -228,9 +228,9 @@ class AxleIdentifier(Method):
         """
         setup = self.setup(vehicle, start)
         stored = None if start is None else self._resumed(start).calibration
-        told = BandCalibration.declared(brisk_speed(vehicle, self.min_speed))
+        given = BandCalibration.declared(brisk_speed(vehicle, self.min_speed))
         noise = np.array([self.regression.noise, self.regression.noise, 0.0])
-        calibration = stored or replace(told, noise=noise)
+        calibration = stored or replace(given, noise=noise)
         return setup._replace(
             scan=self._scan(vehicle, bands=True),
             constants={

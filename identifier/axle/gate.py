@@ -133,7 +133,7 @@ class GateState(NamedTuple):
 class Gate(NamedTuple):
     """What the gate lets through.
 
-    v_x, v_y, r and delta (2,): the sample to go on with.   on : whether forces are told.
+    v_x, v_y, r and delta (2,): the sample to go on with.   on : whether forces are given.
     first : 1 at a (re)start, else 0.   learns : whether learning runs.   state : to carry.
     """
 

@@ -45,7 +45,7 @@ class Regression:
         [`error`]: a smaller one could be theirs.
     moment : over which that force is meant [s]: noise is no force.
     sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
-    clip : largest error that counts in full, over the standard deviation that y is told to have
+    clip : largest error that counts in full, over the standard deviation that y is declared to have
         times `ErrorState.slow` [-].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
     rate : by which learning may change the force of a curve [static axle loads/s]; three times
@@ -214,7 +214,7 @@ def update(
 
 LARGEST_Q = 25.0  # of one outlier
 SLOW_Q = 4.0  # the slow mean does not follow a change
-MOST_SLOW = 4.0  # squared errors: above twice what is told they are no noise to get used to
+MOST_SLOW = 4.0  # squared errors: above twice the declared they are no noise to get used to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,7 +224,7 @@ class RoadChange:
     Parameters
     ----------
     evidence : from which another road is believed [nats].
-    explains : share of the squared errors that it must take off [-].
+    explains : share of the squared errors that it must take off, without its prior [-].
     time : over which evidence is collected [s].
     correlation_time : of errors that a friction could be taken for [s].
     spread : standard deviation of ln μ of another road.
@@ -245,12 +245,13 @@ class RoadChange:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def at(self, dt: float) -> "RoadNumbers":
+    def at(self, dt: float, rate: float) -> "RoadNumbers":
         """Return the numbers of a step.
 
         Parameters
         ----------
         dt : sampling interval [s].
+        rate : by which learning may change a force, and so ln μ at a grip of one [1/s].
         """
         return RoadNumbers(
             twice_evidence=2.0 * self.evidence,
@@ -259,6 +260,7 @@ class RoadChange:
             before=self.spread**-2,
             explains=self.explains,
             step=self.step,
+            most=min(self.step, rate * dt),
             fast=min(dt / self.fast, 1.0),
             trend=min(dt / self.trend, 1.0),
             slow=min(dt / self.slow, 1.0),
@@ -267,7 +269,7 @@ class RoadChange:
 
 class RoadNumbers(NamedTuple):
     """Twice the evidence; share that a sample keeps; share of it that is new; 1/s²; share that must
-    be explained; largest step; gains of the means.
+    be explained; largest step, and of it in a sample; gains of the means.
     """
 
     twice_evidence: Any
@@ -276,6 +278,7 @@ class RoadNumbers(NamedTuple):
     before: Any
     explains: Any
     step: Any
+    most: Any
     fast: Any
     trend: Any
     slow: Any
@@ -292,8 +295,8 @@ class RoadState(NamedTuple):
 
 class ErrorState(NamedTuple):
     """Columns (2,): fast mean of q and its trend [-]; slow mean of e²/σ², by which the variance of
-    y is larger than told, from 1 to 4 [-]; recent peak of the measured force, which is a mean of y
-    over a moment [static axle loads].
+    y is larger than declared, from 1 to 4 [-]; recent peak of the measured force, which is a mean
+    of y over a moment [static axle loads].
     """
 
     fast: Any
@@ -306,9 +309,10 @@ def believed(numbers: RoadNumbers, state: RoadState) -> tuple[Any, Any]:
     """Return by how much ln μ is believed to have changed, 0 where it has not, and its variance."""
     precision = state.A + numbers.before
     per_precision = reciprocal(precision)
-    least = larger(numbers.twice_evidence, numbers.explains * state.E)
-    sure = state.b * state.b > least * precision
-    change = within(state.b * per_precision, -numbers.step, numbers.step)
+    square = state.b * state.b
+    explains = square > numbers.explains * state.E * state.A
+    sure = ca.logic_and(square > numbers.twice_evidence * precision, explains)
+    change = within(state.b * per_precision, -numbers.most, numbers.most)
     return ca.if_else(sure, change, 0), ca.if_else(sure, per_precision, 0)
 
 
@@ -323,20 +327,24 @@ def evidence(
     holds: Any,
     learns: Any,
 ) -> Any:
-    """Return the next state (4,); what was believed is asked no more.
+    """Return the next state (4,); what was believed is asked no more, but for what the limit of a
+    sample left of a step.
 
     Parameters
     ----------
-    change : of ln μ that this sample was told to believe.
+    change : of ln μ that this sample is to accept.
     g, e, V : of both axles (2,).   holds : whether an axle carries a force (2,).
     learns : whether to take the sample.
     """
-    keep = ca.if_else(change == 0, numbers.keep, 0)
+    cut = ca.logic_and(ca.fabs(change) >= numbers.most, numbers.most < numbers.step)
+    keep = ca.if_else(ca.logic_or(change == 0, cut), numbers.keep, 0)
     weight = holds * numbers.per_sample / V
+    b = state.b - change * state.A  # of the errors that are left
+    E = state.E - change * (state.b + b)
     taken = ca.vertcat(
         keep * state.A + ca.dot(weight, g * g),
-        keep * state.b + ca.dot(weight, g * e),
-        keep * state.E + ca.dot(weight, e * e),
+        keep * b + ca.dot(weight, g * e),
+        keep * E + ca.dot(weight, e * e),
         state.ln_friction + change,
     )
     return ca.if_else(learns, taken, ca.vertcat(*state))
@@ -601,7 +609,7 @@ def towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None)
 
 
 def limited(numbers: BoundNumbers, per_step: Any, last: list[Any], w: list[Any]) -> list[Any]:
-    """Return weights on the way to others, so that no force of the curve changes by more than told.
+    """Return weights on the way to others; no force of the curve changes by more than a limit.
 
     φ changes by Σ T_j Δw_j with 1 >= T_1 >= ... >= T_n >= 0 at any slip, the narrowest unit first:
     by no more than the largest partial sum |Σ_(j<=k) Δw_j| (Abel). What is within is not moved; a

@@ -67,7 +67,7 @@ class AxleModel(TireModel):
 
     Odd in slip up to the sensor offsets, saturating at Σ w_j. Rows are axles, front and rear.
     Where the car has downforce, forces are those times λ = 1 + κ v_x² (`Vehicle.load_ratio`); what
-    is told without a speed is of the static loads.
+    is given without a speed is of the static loads.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class AxleModel(TireModel):
     ) -> Array:
         """Return half the width of the band around the steady forces, (k, 2) [N].
 
-        Without a calibration errors are taken to be as learning is told.
+        Without a calibration errors are taken to be as declared.
 
         Raises
         ------
@@ -308,7 +308,7 @@ class AxleModel(TireModel):
 
     @property
     def effective_calibration(self) -> BandCalibration:
-        """Calibration of the band; where there is none, of errors as learning is told of them."""
+        """Calibration of the band; where there is none, of the declared errors."""
         return self.calibration or BandCalibration.declared(self.reference_speed)
 
     def band_spread(self, alpha: Array, v_x: Array, pressed: Array | float = 1.0) -> BandSpread:
@@ -428,7 +428,8 @@ class AxleModel(TireModel):
             rate=rate,
             lost=grip_lost(along[:, None] * self.vehicle.mass / self._loads, carried),
         )
-        T *= np.cos(np.column_stack([recording.delta_f, recording.delta_r]))[..., None]
+        delta = self.sensors.steering(recording.delta_f)
+        T *= np.cos(np.column_stack([delta, recording.delta_r]))[..., None]
         return T, doubt
 
     @property
@@ -500,13 +501,13 @@ class AxleModel(TireModel):
         lag, zero = np.eye(n + 3)[n], np.eye(n + 3)[n + 2]
         slope = (self.W / scales).sum(axis=1)
         bends = self._slope_at_known() < BENT * slope
-        told = self.vehicle.bicycle[4:]
+        given = self.vehicle.bicycle[4:]
         offset = (("zero of the steering", "deg", np.degrees(1.0)), ("bias of v_y", "m/s", 1.0))
         listed = []
         for i, (axle, load) in enumerate(zip(AXLES, self._loads, strict=True)):
             name, unit, scale = offset[i]
             rows = (
-                (STIFFNESS, steep, slope[i] * load, load, "N/rad", told[i], True),
+                (STIFFNESS, steep, slope[i] * load, load, "N/rad", given[i], True),
                 (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
                 (RELAXATION, lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
                  None, True),
@@ -553,7 +554,7 @@ class AxleModel(TireModel):
         return replace(self, vehicle=vehicle, guarantee=None, force_missed=None)
 
     def beside_v_y(self) -> "AxleModel":
-        """Return the model as one that the axle identifier goes on learning, which is told v_y."""
+        """Return the model as one that the axle identifier goes on learning, which is given v_y."""
         return replace(self, tells_v_y=False)
 
     def at_friction(self, ratio: float) -> "AxleModel":

@@ -1,4 +1,4 @@
-"""What is believed before the car drives: a brush tire of the told stiffness, and how sure.
+"""What is believed before the car drives: a brush tire of the declared stiffness, and how sure.
 
 Weights are those of a Fiala tire (R. Rajamani, Vehicle Dynamics and Control, section 13.5)
 projected on the units. Their covariance is wide along the changes that cars differ in: stiffness,

@@ -6,7 +6,7 @@ factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, 
 another friction; bank (4,), of the accelerometer.
 Of a car with downforce every force, slope and regressor is that of the load at v_x (`Curve.under`).
 Sampled: x, u, v_x, and a_y [m/s²] of an accelerometer, NaN where there is none. Everything else is
-a number that stays an input. Forces are told with the weights before the sample.
+a number that stays an input. Forces are given with the weights before the sample.
 """
 
 from typing import Any, NamedTuple
@@ -279,7 +279,7 @@ class RegressionSample(NamedTuple):
 
     h : regressor (2, q), zero but for the offset where there is no force to learn from.
     e : y - h'w (2,), w after what is believed of the road.   innovation : that, clipped (2,).
-    R : its variance (2,).   sigma : standard deviation that y is told to have (2,).
+    R : its variance (2,).   sigma : standard deviation that y is declared to have (2,).
     learns : 1 or 0.   force : mean of y over a moment (2,).   holds : whether there is a force to
     learn from (2,).   W : weights to begin with (2, n).   direction : change of weights by ln μ.
     change, inflation : of ln μ that is believed, and its variance.
@@ -307,7 +307,7 @@ def build_step(
     Parameters
     ----------
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
-    bands : whether half the width of the band is told, too; adds the output `half_band` (2,) [N]
+    bands : whether half the width of the band is given, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
     """
     n = len(steps) + 1
@@ -369,23 +369,25 @@ def _half_band(f: Forward, ports: dict[str, Any]) -> Any:
     return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * f.car.load, 0)
 
 
-LESSON = ("h", "e", "counts", "gains", "told")
+LESSON = ("h", "e", "counts", "gains", "declared")
 
 
 def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
 
-    Its outputs are the regressors h (2, q); e = y - h'w (2,), w after what is believed of the road;
+    Its outputs are the regressors h (2, q); e = y - h'w (2,), w before a change of the road;
     which share of e counts, after clipping; the gains K (2, q), 0 where nothing is learnt; and the
-    standard deviation that y is given (2,), without what the means of squared errors add.
+    declared standard deviation of y (2,), without what the means of squared errors add.
     """
     f, ports = _symbols(steps, pressed=pressed)
     h, y, _ = _regression(f, ports)
     y, _ = _without_bank(f, ports, y)
     sample, _ = _sample_of(f, ports, h, y)
     gains = [ca.horzcat(*_learn(ports, sample, i).gains) for i in (0, 1)]
-    counts = ca.if_else(sample.e == 0, 1, sample.innovation / sample.e)
-    outputs = (sample.h, sample.e, counts, ca.vertcat(*gains), sample.sigma)
+    n = ports["W"].shape[1]
+    e = sample.e + ca.sum2(sample.h[:, :n] * (sample.W - ports["W"]))
+    counts = ca.if_else(e == 0, 1, sample.innovation / e)
+    outputs = (sample.h, e, counts, ca.vertcat(*gains), sample.sigma)
     name = _name("axle_lesson", steps, pressed=pressed)
     return ca.Function(name, list(ports.values()), list(outputs), list(ports), list(LESSON))
 
@@ -492,7 +494,7 @@ def _recent_force(
 
 
 def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:
-    """Return the standard deviation that y is told to have (2,).
+    """Return the standard deviation that y is declared to have (2,).
 
     What the force is wrong by, and what slip is: by a force that is late, whose y changes by
     κ (φ cos δ - ŷ) a second, and by noise of v_y (effective variance, errors in variables).
@@ -513,10 +515,10 @@ def _errors(
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     numbers = RoadNumbers(*ca.vertsplit(ports["changing"]))
     fast, trend, slow, _ = ca.horzsplit(ports["errors"])
-    learns, told = sample.learns, sample.sigma**2
-    V = told * slow + unsure
+    learns, declared = sample.learns, sample.sigma**2
+    V = declared * slow + unsure
     q = smaller(sample.e**2 / V, LARGEST_Q)
-    of_noise = smaller(sample.e**2 / told, SLOW_Q * slow)
+    of_noise = smaller(sample.e**2 / declared, SLOW_Q * slow)
     means = fast + learns * numbers.fast * (q - fast)
     lasting = trend + learns * numbers.trend * (larger(q, 1) - trend)
     noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, MOST_SLOW)

@@ -23,7 +23,7 @@ from models.vehicle import GRAVITY, Vehicle
 
 # Numbers without limits for parameters that have some: what a filter may add noise to.
 #
-# θ = 0 is the prior: the stiffness told, a friction, a usual shape. Logarithms keep stiffness and
+# θ = 0 is the prior: declared stiffness, usual friction and shape. Logarithms keep stiffness and
 # friction positive; a logistic keeps the Magic Formula's shape C between 1 and 2, where the force
 # has a peak and keeps its sign.
 

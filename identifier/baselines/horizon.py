@@ -60,7 +60,7 @@ class Sampled(NamedTuple):
     """A column of the window: 1 where it counts, 1 where a_y is there, then what was measured."""
 
     counts: Any
-    hears: Any
+    has_a_y: Any
     delta_f: Any
     delta_r: Any
     v_x: Any
@@ -92,26 +92,26 @@ def build_stage() -> ca.Function:
     P = ca.SX.sym("P", Z, Z)
     before, now = (ca.SX.sym(name, len(Sampled._fields)) for name in ("before", "now"))
     numbers = ca.SX.sym("numbers", len(Numbers._fields))
-    told, p, dt = Numbers(*ca.vertsplit(numbers)), s.parameters, s.sampling[0]
+    output, p, dt = Numbers(*ca.vertsplit(numbers)), s.parameters, s.sampling[0]
     last, here = Sampled(*ca.vertsplit(before)), Sampled(*ca.vertsplit(now))
-    v_mean = ca.fmax((last.v_x + here.v_x) / 2, told.learning_speed)
+    v_mean = ca.fmax((last.v_x + here.v_x) / 2, output.learning_speed)
     u_mean = ca.vertcat(last.delta_f + here.delta_f, last.delta_r + here.delta_r) / 2
-    u, speed = ca.vertcat(here.delta_f, here.delta_r), ca.fmax(here.v_x, told.learning_speed)
+    u, speed = ca.vertcat(here.delta_f, here.delta_r), ca.fmax(here.v_x, output.learning_speed)
 
-    reached = predicted(TIRE, p, told.friction, at_before, v_mean, u_mean, dt)
+    reached = predicted(TIRE, p, output.friction, at_before, v_mean, u_mean, dt)
     F = ca.jacobian(reached, at_before)
     disturbances = ca.vertcat(
-        told.v_y_disturbance, told.r_disturbance, ca.repmat(told.walk, Z - 2, 1)
+        output.v_y_disturbance, output.r_disturbance, ca.repmat(output.walk, Z - 2, 1)
     )
     ahead = ca.if_else(here.counts, reached + F @ (z - at_before), z)
     F = ca.if_else(here.counts, F, ca.SX.eye(Z))
     ahead_P = F @ P @ F.T + here.counts * dt * ca.diag(disturbances**2)
-    shows = expected(TIRE, p, told.friction, at, speed, u)
-    heard = ca.vertcat(here.counts, here.counts * here.hears)
-    H = ca.diag(heard) @ ca.jacobian(shows, at)
-    innovation = heard * (ca.vertcat(here.r, here.a_y) - shows) - H @ (ahead - at)
-    R = ca.diag(ca.vertcat(told.r_noise, told.a_y_noise) ** 2)
-    found = corrected(ahead_P, H, R, innovation, told.outlier)
+    shows = expected(TIRE, p, output.friction, at, speed, u)
+    measured = ca.vertcat(here.counts, here.counts * here.has_a_y)
+    H = ca.diag(measured) @ ca.jacobian(shows, at)
+    innovation = measured * (ca.vertcat(here.r, here.a_y) - shows) - H @ (ahead - at)
+    R = ca.diag(ca.vertcat(output.r_noise, output.a_y_noise) ** 2)
+    found = corrected(ahead_P, H, R, innovation, output.outlier)
     stage = Stage(ahead + found.move, found.P, ahead, ahead_P, found.pull, found.keep, F)
     return ca.Function(
         "horizon_stage",
@@ -152,33 +152,33 @@ class Begun(NamedTuple):
 
 def _build_beginning() -> ca.Function:
     """Return `Begun` of estimate, P, running, the last column, the sample and the constants."""
-    heard = given_ports()
-    s, p = heard.sample, heard.sample.parameters
+    given = given_ports()
+    s, p = given.sample, given.sample.parameters
     estimate, P, running = ca.SX.sym("estimate", Z), ca.SX.sym("P", Z, Z), ca.SX.sym("running")
     last, numbers = (
         ca.SX.sym("last", len(Sampled._fields)),
         ca.SX.sym("numbers", len(Numbers._fields)),
     )
-    told, before = Numbers(*ca.vertsplit(numbers)), Sampled(*ca.vertsplit(last))
-    speed = ca.fmax(s.v_x, told.learning_speed)
-    fast = s.v_x >= told.learning_speed
+    output, before = Numbers(*ca.vertsplit(numbers)), Sampled(*ca.vertsplit(last))
+    speed = ca.fmax(s.v_x, output.learning_speed)
+    fast = s.v_x >= output.learning_speed
     going = ca.logic_and(fast, running > 0.5)
-    v_mean = ca.fmax((before.v_x + s.v_x) / 2, told.learning_speed)
+    v_mean = ca.fmax((before.v_x + s.v_x) / 2, output.learning_speed)
     u_mean = (ca.vertcat(before.delta_f, before.delta_r) + s.u) / 2
-    column = Sampled(going, heard.hears, s.u[0], s.u[1], s.v_x, heard.r, heard.a_y)
-    first = ca.diag(ca.vertcat(told.start_slip * s.speed, told.r_noise) ** 2)
+    column = Sampled(going, given.has_a_y, s.u[0], s.u[1], s.v_x, given.r, given.a_y)
+    first = ca.diag(ca.vertcat(output.start_slip * s.speed, output.r_noise) ** 2)
     begun = Begun(
         going=going,
         fast=fast,
         speed=speed,
         column=ca.vertcat(*column),
-        start=ca.vertcat(steady_v_y(p, s.speed, heard.r, s.u), heard.r, estimate[2:]),
+        start=ca.vertcat(steady_v_y(p, s.speed, given.r, s.u), given.r, estimate[2:]),
         start_P=ca.diagcat(first, P[2:, 2:]),
-        ahead=predicted(TIRE, p, told.friction, estimate, v_mean, u_mean, s.sampling[0]),
+        ahead=predicted(TIRE, p, output.friction, estimate, v_mean, u_mean, s.sampling[0]),
     )
     return ca.Function(
         "horizon_beginning",
-        [estimate, P, running, last, *heard.ports, numbers],
+        [estimate, P, running, last, *given.ports, numbers],
         [ca.densify(one) for one in begun],
     )
 
@@ -248,11 +248,11 @@ def build_step(samples: int, iterations: int) -> ca.Function:
         "window": ca.horzcat(*columns),
         "running": ca.logic_and(begun.fast, sane),
     }
-    told = _build_told()(estimate, port["estimate"], port["u"], port["v_x"], *known)
+    output = _build_told()(estimate, port["estimate"], port["u"], port["v_x"], *known)
     return ca.Function(
         f"horizon_{samples}_{iterations}",
         list(port.values()),
-        [*(ca.densify(following[name]) for name in CARRY), *told, ca.sqrt(now.P[0, 0])],
+        [*(ca.densify(following[name]) for name in CARRY), *output, ca.sqrt(now.P[0, 0])],
         names,
         [*(f"{name}_next" for name in CARRY), "axle_force", "v_y", "v_y_sd"],
     )

@@ -45,7 +45,7 @@ class FilteredTire(NamedTuple):
     force(bicycle parameters, prior, θ, slip (2,), u) -> axle forces (2,) [N].
     lag(prior, θ) -> σ (2,) [m]; None: the force reads α, nothing lags.
     unknowns, prior : sizes of θ and of whatever else it reads.
-    The force told is that of the θ carried into the sample, to which a model freezes.
+    The output force is that of the θ carried into the sample, to which a model freezes.
     """
 
     slip: Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
@@ -64,7 +64,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
     Carried: estimate (n,) = [v_y, r, α' where it lags, θ], its covariance P, before (3,) = δ_f, δ_r
     and v_x of the last sample, running (1 after a sample in motion); for a tire that lags also the
-    `LaggedSlip` of what is measured, which the force told reads as the frozen model does. Constant:
+    `LaggedSlip` of what is measured, which the output force reads as the frozen model does. Held:
     noise in the order of `NOISE` (standard deviations [m/s], [rad/s]; disturbances per root of time
     [m/s/√s], [rad/s/√s]), walk of θ [1/√s], limit of |θ|, learning_speed [m/s], prior: whatever
     the tire needs. Below that speed θ and its covariance are kept, and x and α' begin anew from

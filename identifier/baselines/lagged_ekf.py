@@ -2,7 +2,7 @@
 
 State [v_y, r, α' (2,), ln C (2,), ln μ (2,), δ₀, b_a]: C in static axle loads per radian, μ in
 static axle loads, of a Magic Formula with one shape for all; δ₀ the zero of the front steering,
-b_a the bias of the accelerometer. The motion is that of `identifier.baselines.kalman`; heard are
+b_a the bias of the accelerometer. The motion is that of `identifier.baselines.kalman`; measured are
 v_y, r and, where a log has it, a_y = (F_f + F_r)/m + b_a. No gate, no alarm, and the stiffness of
 the vehicle file is not looked at.
 """
@@ -45,7 +45,7 @@ _NO_GATE = 1e6  # standard deviations
 
 
 class Numbers(NamedTuple):
-    """What the filter is told, in the order of its constant.
+    """What the filter is given, in the order of its constant.
 
     Standard deviations of v_y [m/s], r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and
     r [rad/s/√s]; walk of ln C and ln μ [1/√s]; relaxation length of both axles [m]; learning
@@ -73,14 +73,14 @@ def _curve_parameters(theta: Any, loads: Any) -> Any:
 
 def build_step(name: str) -> ca.Function:
     """Return the filter's step; carried are the ports of a `kalman` filter whose tire lags."""
-    heard, last = given_ports(), lag_symbols()
-    s, p = heard.sample, heard.sample.parameters
+    ports, last = given_ports(), lag_symbols()
+    s, p = ports.sample, ports.sample.parameters
     estimate, P = ca.SX.sym("estimate", STATES), ca.SX.sym("P", STATES, STATES)
     before, running = ca.SX.sym("before", 3), ca.SX.sym("running")
     numbers = ca.SX.sym("numbers", len(Numbers._fields))
-    told, dt, loads = Numbers(*ca.vertsplit(numbers)), s.sampling[0], axle_loads(p, GRAVITY)
-    sigma = ca.vertcat(told.relaxation_length, told.relaxation_length)
-    learning = s.v_x >= told.learning_speed
+    given, dt, loads = Numbers(*ca.vertsplit(numbers)), s.sampling[0], axle_loads(p, GRAVITY)
+    sigma = ca.vertcat(given.relaxation_length, given.relaxation_length)
+    learning = s.v_x >= given.learning_speed
     going = ca.logic_and(learning, running > 0.5)
 
     def force(z: Any, slip: Any, u: Any) -> Any:
@@ -89,7 +89,7 @@ def build_step(name: str) -> ca.Function:
     def slip_of(z: Any, v_x: Any, x: Any, u: Any) -> Any:
         return measured_slip(CURVE, p, ca.vertcat(z[8], 0), v_x, x, u)
 
-    v_mean = ca.fmax((before[2] + s.v_x) / 2, told.learning_speed)
+    v_mean = ca.fmax((before[2] + s.v_x) / 2, given.learning_speed)
     u_mean = (before[:2] + s.u) / 2
     alpha = slip_of(estimate, v_mean, estimate[:2], u_mean)
     motion = motion_rate(p, v_mean, estimate[:2], force(estimate, estimate[2:4], u_mean))
@@ -97,14 +97,14 @@ def build_step(name: str) -> ca.Function:
     ahead = ca.vertcat(midpoint(estimate, rate, dt), estimate[4:])
     F = ca.jacobian(ahead, estimate)
     walks = ca.vertcat(
-        *(told.v_y_disturbance, told.r_disturbance, 0, 0), *[told.walk] * 4, ca.SX(2, 1)
+        *(given.v_y_disturbance, given.r_disturbance, 0, 0), *[given.walk] * 4, ca.SX(2, 1)
     )
     at = ca.SX.sym("at", STATES)
     shows = ca.vertcat(at[:2], ca.sum1(force(at, at[2:4], s.u)) / p.m + at[9])
     shows, H = ca.substitute([shows, ca.jacobian(shows, at)], [at], [ahead])
-    H[2, :] *= heard.hears
-    missed = ca.vertcat(s.x - shows[:2], heard.hears * (heard.a_y - shows[2]))
-    R = ca.diag(ca.vertcat(*told[:3]) ** 2)
+    H[2, :] *= ports.has_a_y
+    missed = ca.vertcat(s.x - shows[:2], ports.has_a_y * (ports.a_y - shows[2]))
+    R = ca.diag(ca.vertcat(*given[:3]) ** 2)
     found = corrected(F @ P @ F.T + ca.diag(walks**2 * dt), H, R, missed, _NO_GATE)
 
     after = ahead + found.move
@@ -112,13 +112,13 @@ def build_step(name: str) -> ca.Function:
     after[TIRE] = ca.fmin(ca.fmax(after[TIRE], low), high)
     alpha_now = slip_of(estimate, s.speed, s.x, s.u)
     afresh = ca.vertcat(s.x, alpha_now, estimate[4:])
-    unsure = ca.vertcat(told.v_y_noise, told.r_noise, *[told.v_y_noise / s.speed] * 2)
+    unsure = ca.vertcat(given.v_y_noise, given.r_noise, *[given.v_y_noise / s.speed] * 2)
     P_next = ca.if_else(going, found.P, ca.diagcat(ca.diag(unsure**2), P[4:, 4:]))
     told_slip = lagged_slip(last, alpha_now, s.speed * dt, sigma)
     axle_force = force(estimate, told_slip, s.u)
     return ca.Function(
         name,
-        [estimate, P, before, running, *last, *heard.ports, numbers],
+        [estimate, P, before, running, *last, *ports.ports, numbers],
         [
             ca.if_else(going, after, afresh),
             ca.densify(P_next),
@@ -140,7 +140,7 @@ def _scan() -> Scan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaggedEkf(Method):
-    """Stiffness and friction of each axle behind a fixed lag, with a_y heard where there is one.
+    """Stiffness and friction of each axle behind a fixed lag, with a_y where there is one.
     v_y_noise, r_noise : standard deviations of what is measured [m/s], [rad/s].
     v_y_disturbance, r_disturbance : what the tires miss, as random change [m/s/√s], [rad/s/√s].
     relaxation_length : of both axles [m].

@@ -54,7 +54,7 @@ LIMITS = (2.0, 2.0, 1.5, 1.5)  # of |θ|: stiffness within a factor of 7.4, fric
 
 
 class Numbers(NamedTuple):
-    """What a filter is told, in the order of its constant.
+    """What a filter is given, in the order of its constant.
 
     Standard deviations of r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and r [rad/s/√s];
     walk of θ [1/√s]; standard deviation of the rear slip at a start [rad]; outlier; friction;
@@ -104,41 +104,41 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     speed, and after an estimate that slides by more than `MOST_SLIDING`, x begins anew in a steady
     turn; θ and its covariance are kept.
     """
-    heard, n = given_ports(), 2 + tire.unknowns
-    s, estimate, P = heard.sample, ca.SX.sym("estimate", n), ca.SX.sym("P", n, n)
+    ports, n = given_ports(), 2 + tire.unknowns
+    s, estimate, P = ports.sample, ca.SX.sym("estimate", n), ca.SX.sym("P", n, n)
     before, running = ca.SX.sym("before", 3), ca.SX.sym("running")
     numbers = ca.SX.sym("numbers", len(Numbers._fields))
-    told, p, dt = Numbers(*ca.vertsplit(numbers)), s.parameters, s.sampling[0]
-    fast = s.v_x >= told.learning_speed
+    given, p, dt = Numbers(*ca.vertsplit(numbers)), s.parameters, s.sampling[0]
+    fast = s.v_x >= given.learning_speed
     going = ca.logic_and(fast, running > 0.5)
 
-    v_mean = ca.fmax((before[2] + s.v_x) / 2, told.learning_speed)
-    ahead = predicted(tire, p, told.friction, estimate, v_mean, (before[:2] + s.u) / 2, dt)
+    v_mean = ca.fmax((before[2] + s.v_x) / 2, given.learning_speed)
+    ahead = predicted(tire, p, given.friction, estimate, v_mean, (before[:2] + s.u) / 2, dt)
     F = ca.jacobian(ahead, estimate)
-    walks = ca.repmat(told.walk, tire.unknowns, 1)
-    Q = ca.diag(ca.vertcat(told.v_y_disturbance, told.r_disturbance, walks) ** 2 * dt)
+    walks = ca.repmat(given.walk, tire.unknowns, 1)
+    Q = ca.diag(ca.vertcat(given.v_y_disturbance, given.r_disturbance, walks) ** 2 * dt)
     at = ca.SX.sym("at", n)
-    shows = expected(tire, p, told.friction, at, s.speed, s.u)
+    shows = expected(tire, p, given.friction, at, s.speed, s.u)
     shows, H = ca.substitute([shows, ca.jacobian(shows, at)], [at], [ahead])
-    H[1, :] *= heard.hears
-    missed = ca.vertcat(heard.r - shows[0], heard.hears * (heard.a_y - shows[1]))
-    R = ca.diag(ca.vertcat(told.r_noise, told.a_y_noise) ** 2)
-    found = corrected(F @ P @ F.T + Q, H, R, missed, told.outlier)
+    H[1, :] *= ports.has_a_y
+    missed = ca.vertcat(ports.r - shows[0], ports.has_a_y * (ports.a_y - shows[1]))
+    R = ca.diag(ca.vertcat(given.r_noise, given.a_y_noise) ** 2)
+    found = corrected(F @ P @ F.T + Q, H, R, missed, given.outlier)
 
     limit = ca.DM(LIMITS[: tire.unknowns])
     theta = ca.fmin(ca.fmax((ahead + found.move)[2:], -limit), limit)
-    afresh = ca.vertcat(steady_v_y(p, s.speed, heard.r, s.u), heard.r, estimate[2:])
-    first = ca.diag(ca.vertcat(told.start_slip * s.speed, told.r_noise) ** 2)
+    afresh = ca.vertcat(steady_v_y(p, s.speed, ports.r, s.u), ports.r, estimate[2:])
+    first = ca.diag(ca.vertcat(given.start_slip * s.speed, given.r_noise) ** 2)
     after = ca.vertcat((ahead + found.move)[:2], theta)
     following = ca.if_else(going, after, afresh)
     P_next = ca.if_else(going, found.P, ca.diagcat(first, P[2:, 2:]))
     sane = ca.fabs(following[0]) < MOST_SLIDING * s.speed
     told_force = axle_force(
-        tire, p, told.friction, ca.vertcat(following[:2], estimate[2:]), s.speed, s.u
+        tire, p, given.friction, ca.vertcat(following[:2], estimate[2:]), s.speed, s.u
     )
     return ca.Function(
         name,
-        [estimate, P, before, running, *heard.ports, numbers],
+        [estimate, P, before, running, *ports.ports, numbers],
         [
             following,
             ca.densify(P_next),
@@ -161,7 +161,7 @@ def _scan(tire: str) -> Scan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipFilter(Method):
-    """Lateral velocity by a Kalman filter that hears r and a_y; a recording's v_y is not read.
+    """Lateral velocity by a Kalman filter of r and a_y; a recording's v_y is not read.
     tire : "linear", that of the vehicle file, or "dugoff", which is learnt.
     r_noise : standard deviation of the measured yaw rate [rad/s].
     a_y_noise : standard deviation of the measured a_y [m/s²].

@@ -37,20 +37,20 @@ def build_step() -> ca.Function:
     Carried: washed, rate, running. Constant: cutoff ω [1/s]. Where a_y is not there, the
     last rate holds. The forces are those of the linear tires of the vehicle at that v_y.
     """
-    heard = given_ports()
-    s, washed, rate, running = heard.sample, *(ca.SX.sym(name) for name in CARRY)
+    given = given_ports()
+    s, washed, rate, running = given.sample, *(ca.SX.sym(name) for name in CARRY)
     p, dt, cutoff = s.parameters, s.sampling[0], ca.SX.sym("cutoff")
-    steady = steady_v_y(p, s.speed, heard.r, s.u)
-    now = ca.if_else(heard.hears, heard.a_y - s.v_x * heard.r, rate)
+    steady = steady_v_y(p, s.speed, given.r, s.u)
+    now = ca.if_else(given.has_a_y, given.a_y - s.v_x * given.r, rate)
     keep = ca.exp(-cutoff * dt)
     moved = keep * washed + (1 - keep) * (steady + (rate + now) / (2 * cutoff))
     v_y = ca.if_else(ca.logic_and(s.moving, running > 0.5), moved, steady)
     linear = CURVES["linear"]
-    alpha = linear.slip(p, s.speed, ca.vertcat(v_y, heard.r), s.u)
+    alpha = linear.slip(p, s.speed, ca.vertcat(v_y, given.r), s.u)
     force = linear.force(ca.vertcat(p.C_f, p.C_r), None, alpha, s.u)
     return ca.Function(
         "washout",
-        [washed, rate, running, *heard.ports, cutoff],
+        [washed, rate, running, *given.ports, cutoff],
         [
             v_y,
             now,

@@ -22,14 +22,14 @@ _MOST_FELT = 98.0  # m/s²: no car feels more
 MOST_SLIDING = 0.7  # |v_y|/v_x beyond which an estimate is none
 
 
-class _Heard(NamedTuple):
+class _Given(NamedTuple):
     """A sample without v_y: the ports of it, and a_y [m/s²], 0 where there is none.
-    hears : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
+    has_a_y : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
     """
 
     sample: Sample
     a_y: Any
-    hears: Any
+    has_a_y: Any
     a_y_port: Any
 
     @property
@@ -44,10 +44,10 @@ class _Heard(NamedTuple):
         return self.sample.x[1]
 
 
-def given_ports() -> _Heard:
+def given_ports() -> _Given:
     a_y = ca.SX.sym("a_y")
-    hears = ca.fabs(a_y) < _MOST_FELT  # NaN is not
-    return _Heard(sample_ports(), ca.if_else(hears, a_y, 0), hears, a_y)
+    has_a_y = ca.fabs(a_y) < _MOST_FELT  # NaN is not
+    return _Given(sample_ports(), ca.if_else(has_a_y, a_y, 0), has_a_y, a_y)
 
 
 def steady_v_y(p: BicycleParameters, v_x: Any, r: Any, u: Any) -> Any:
@@ -103,7 +103,7 @@ class _Corrected(NamedTuple):
 def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> _Corrected:
     """Return what a measurement of two numbers makes of an estimate, in Joseph's form.
     P : covariance before (n, n).
-    H : what the numbers are of the estimate (2, n); a row of zeros hears nothing.
+    H : what the numbers are of the estimate (2, n); a row of zeros measures nothing.
     R : covariance of the numbers (2, 2).   innovation : (2,).
     """
     S = H @ P @ H.T + R

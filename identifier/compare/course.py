@@ -115,7 +115,7 @@ class Trial:
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
     diverged_at : by recording on which the method diverged, when [s].
-    side_slip : by recording, what was told of lateral velocity; empty for a method that reads it.
+    side_slip : by recording, what was given of lateral velocity; empty for a method that reads it.
     """
 
     online: Mapping[str, AxleRmse]
@@ -144,7 +144,7 @@ def cross_replay(
     all are asked at the same slip.
     """
     online, frozen, diverged_at, freezes = {}, {}, {}, True
-    told: dict[str, SideSlip] = {}
+    estimated: dict[str, SideSlip] = {}
     for recording in course.recordings:
         history = identify(
             recording if method.needs_v_y else replace(recording, v_y=None), course.vehicle, method
@@ -154,7 +154,7 @@ def cross_replay(
             seen(history)
         online[recording.name] = course.error(recording, history.axle_force)
         found = side_slip(history, course.min_speed, recording.v_y)
-        told |= {} if found is None else {recording.name: found}
+        estimated |= {} if found is None else {recording.name: found}
         if history.diverged_at is not None:
             diverged_at[recording.name] = history.diverged_at
             continue
@@ -165,7 +165,10 @@ def cross_replay(
         except ValueError:  # the last update left weights that are not finite
             diverged_at[recording.name] = end
     return Trial(
-        online=online, frozen=frozen if freezes else None, diverged_at=diverged_at, side_slip=told
+        online=online,
+        frozen=frozen if freezes else None,
+        diverged_at=diverged_at,
+        side_slip=estimated,
     )
 
 
@@ -174,8 +177,8 @@ SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SideSlip:
-    """What a method told of lateral velocity over a recording, and how far it was off.
-    v_y : told at each sample (n,) [m/s].
+    """The lateral velocity that a method estimated over a recording, and how far it was off.
+    v_y : of each sample (n,) [m/s].
     v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.
     rms : of the error of side slip, from the first sample at a speed that counts [deg], infinite
         where not finite; None where the recording has no v_y.
@@ -189,7 +192,7 @@ class SideSlip:
 
 
 def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSlip | None:
-    """Return what a run told of lateral velocity; None of a method that reads it.
+    """Return the lateral velocity that a run estimated; None of a method that reads it.
     min_speed : samples below this speed [m/s] do not count.
     truth : v_y that it is judged by (n,) [m/s], or None.
     """

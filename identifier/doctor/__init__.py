@@ -1,4 +1,4 @@
-"""The doctor: what is wrong with a log, or with what is told of its car, from the log alone."""
+"""The doctor: what is wrong with a log, or with the declaration of its car, from the log alone."""
 
 from identifier.doctor.diagnosis import Diagnosis, diagnose
 from identifier.doctor.faults import Examination, examine

@@ -28,8 +28,8 @@ STIFFNESS = _FINENESS ** np.arange(_STIFFNESSES)  # c [1/rad], 1 to 100
 FRICTION = 0.3 * _FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], 0.3 to 3.3
 RATIOS = _FINENESS ** np.arange(1 - FRICTIONS, _STIFFNESSES)[:, None] / 0.3  # c/μ [1/rad]
 _RATIO_OF = np.arange(_STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS - 1  # of μ and c
-# A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
-_DISBELIEF = 0.3  # per square of the logarithm of c over the told one
+# A stiffness that is twice the declared one costs as much as 14 % of what is left unexplained.
+_DISBELIEF = 0.3  # per square of the logarithm of c over the declared one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
 EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
 CLEAR = 2.5  # times its noise that a channel must swing for its unit to be told
@@ -40,7 +40,7 @@ class Reading(NamedTuple):
     """What logged values must be multiplied by to be SI and ISO, and the size of the car.
 
     sideslip: v_y is the sideslip angle, its factor makes it rad.   size: lengths of the car over
-    the told ones, and so the root of its yaw inertia over its mass.   inertia: yaw inertia over
+    the declared ones, and so the root of its yaw inertia over its mass.   inertia: yaw inertia over
     what it then is.   arm: how far ahead of the center of gravity v_y is measured [m].
     """
 
@@ -144,8 +144,8 @@ def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:
 
 def front_leaves(one: "AxleMotion", vehicle: Vehicle) -> float:
     """Return what is left of the front axle, the only equation that the steering is in."""
-    told = vehicle.cornering_stiffness_front / vehicle.axle_loads[0]
-    return _curve_leaves(one.force[0], one.slip[0], told)
+    declared = vehicle.cornering_stiffness_front / vehicle.axle_loads[0]
+    return _curve_leaves(one.force[0], one.slip[0], declared)
 
 
 def but_front_leaves(
@@ -153,9 +153,9 @@ def but_front_leaves(
 ) -> float:
     """Return what is left of all other equations."""
     froude = abs(reading.v_x) * motion.speed / (math.sqrt(reading.size) * vehicle.froude_speed)
-    told = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
+    declared = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
     total = max(math.log(froude / FAST), 0.0) ** 2
-    total += _curve_leaves(one.force[1], one.slip[1], told)
+    total += _curve_leaves(one.force[1], one.slip[1], declared)
     if motion.a_y is not None:
         total += _accelerometer_leaves(reading.a_y * motion.a_y, one.acceleration)
     return total
@@ -188,8 +188,8 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> Axle
     return AxleMotion(force, np.stack([front, rear]), acceleration)
 
 
-def _curve_leaves(force: Array, slip: Array, told: float) -> float:
-    disbelief = _DISBELIEF * np.log(STIFFNESS / told) ** 2
+def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
+    disbelief = _DISBELIEF * np.log(STIFFNESS / declared) ** 2
     force = force - force.mean()
     size = float(force @ force) + 1e-12
     bent = RATIOS * slip

@@ -105,8 +105,8 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
         return Diagnosis(name=recording.name, findings=(finding,), unobservable=NEVER)
     if recording.logged_v_y is None:
-        told = (*_contradictions(recording, vehicle), *_samples(recording))
-        return Diagnosis(name=recording.name, findings=told, unobservable=(WITHOUT_V_Y, *NEVER))
+        given = (*_contradictions(recording, vehicle), *_samples(recording))
+        return Diagnosis(name=recording.name, findings=given, unobservable=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
     found, fine = list(gross.findings), Examination()

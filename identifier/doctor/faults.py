@@ -1,4 +1,4 @@
-"""Sizes of faults of a log and of what is told of its car, by the estimate of tires and motion.
+"""Sizes of faults of a log and of the declaration of its car, by the estimate of tires and motion.
 
 Each suspect is believed wide, one at a time, beside the nominal estimate (`estimate.solve`): it
 gains ΔJ, the misfit of the balance at its scale and memory, the prior's cost, and where there is
@@ -31,7 +31,7 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 _Widths = Mapping[str, float]  # standard deviation of what is believed wide, by suspect's parameter
-BESIDE = {"ln_inertia": 0.1}  # believed of any car: what is told of it is an estimate
+BESIDE = {"ln_inertia": 0.1}  # believed of any car: a declared one is an estimate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -352,17 +352,17 @@ class Search:
         if best.post is None:  # of the accelerometer: it changes no tire
             return True
         parts = self.problem.halves()
-        told = self.left_out(best.post, wide, parts)
+        given = self.left_out(best.post, wide, parts)
         if best.gain < RULES.gain:  # the nominal estimate has it as a state
             plain = self.left_out(best.post, wide, parts, zero=suspect)
         else:
             plain = self.left_out(base, self.wide, parts)
-        if not (told < (1.0 - RULES.better) * plain).any() or (told > 1.01 * plain).any():
+        if not (given < (1.0 - RULES.better) * plain).any() or (given > 1.01 * plain).any():
             return False
         if rival is None or rival.post is None:
             return True
         other = self.left_out(rival.post, self.widened(rival.suspect), parts)
-        return bool(np.hypot(*other) > (1.0 + RULES.better) * np.hypot(*told))
+        return bool(np.hypot(*other) > (1.0 + RULES.better) * np.hypot(*given))
 
     def left_out(
         self,
@@ -460,10 +460,10 @@ def _all_move(priors: Priors) -> Priors:
 
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
-    """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
+    """Return the faults of a log and of its declared car, and what this drive cannot tell.
     recording : as it was logged, of one drive or of several joined; of a long one lively segments
         are looked at.
-    vehicle : as it was told; its cornering stiffnesses are not looked at.
+    vehicle : as given; its cornering stiffnesses are not looked at.
     """
     search = prepared(recording, vehicle)
     if search is None:

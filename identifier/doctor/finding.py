@@ -6,13 +6,13 @@ from typing import Any
 
 from models.recordings.repair import Repair
 
-MOST = 0.99  # confidence that is told
-_MATTERS = 0.5  # confidence that something is wrong, from which it is told as such
+MOST = 0.99  # confidence that is given
+_MATTERS = 0.5  # confidence that something is wrong, from which it is given as such
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """A fault of a log or of what is told of its car, or something that the log cannot tell.
+    """A fault of a log or of the declaration of its car, or something that the log cannot tell.
 
     code : for machines, as "delay" or "velocity_sensor_x".
     channel : that is concerned, "" where it is the car, the road or the whole log.

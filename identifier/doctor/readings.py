@@ -1,4 +1,4 @@
-"""Which reading of a log makes it the motion of the told car: units, signs, wheel angles, size.
+"""Which reading of a log makes it the motion of the declared car: units, signs, wheel angles, size.
 
 What may be wrong grossly is a short list of changes; each is tried, alone and then together, and
 that reading is taken which leaves least unexplained, where every change must earn its place. Two
@@ -49,7 +49,7 @@ _ALONE, _UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one tha
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """One thing that may be wrong with a log, or with what is told of its car.
+    """One thing that may be wrong with a log, or with the declaration of its car.
     code : for machines: "unit", "sign", "sideslip", or one of `FREE`.
     channels : concerned; none where it is the car.
     unit : in which they are logged, "" where that is right.
@@ -234,12 +234,12 @@ def _longer(
 
 def _steerings(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     """Return the factor of the steering angle that leaves least, where it is a gross one."""
-    told = one.reading.delta
+    given = one.reading.delta
     as_it_is = forces_and_slips(motion, vehicle, one.reading._replace(delta=0.0))
     rest = but_front_leaves(as_it_is, motion, vehicle, one.reading)
 
     def left(factor: float) -> float:
-        steering = told * factor * motion.delta_f
+        steering = given * factor * motion.delta_f
         front = as_it_is.slip + np.stack([steering, 0.0 * steering])
         return rest + front_leaves(as_it_is._replace(slip=front), vehicle)
 
@@ -263,8 +263,8 @@ def _scaled(
     before = Reading() if one is None else one.reading
 
     def left(size: float) -> float:
-        told = before._replace(**{name: size})  # type: ignore[arg-type]  # name is of a number
-        return unexplained(motion, vehicle, told)
+        given = before._replace(**{name: size})  # type: ignore[arg-type]  # name is of a number
+        return unexplained(motion, vehicle, given)
 
     size = min(map(float, sizes), key=left)
     if abs(math.log(size)) < same:

@@ -36,7 +36,7 @@ SLOW = 1.0  # s between samples, from which a clock is in ms
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
     """What is grossly wrong.
-    repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
+    repair : of samples and of what is read otherwise than it was given, sure or not, to go on with;
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
     without : the same if the velocity sensor is where it should be, where that alone makes gross
@@ -51,12 +51,12 @@ class Screened:
 
 
 def screen(recording: Recording, vehicle: Vehicle) -> Screened:
-    """Return what is grossly wrong with a log or with what is told of its car."""
+    """Return what is grossly wrong with a log or with the declaration of its car."""
     clock = clock_findings(recording)
     if clock:
         return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
     samples = sample_findings(recording)
-    told = unlike(vehicle)
+    given = unlike(vehicle)
     missing = [
         one.channel
         for one in samples
@@ -66,19 +66,19 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     ]
     if missing:
         return Screened(
-            findings=(*samples, *told),
+            findings=(*samples, *given),
             repair=Repair(),
             blind=f"{' and '.join(missing)} was not measured",
         )
     quiet = _quiet_finding(recording)
     if quiet is not None:
         return Screened(
-            findings=(quiet, *samples, *told), repair=Repair(), blind="the car hardly corners"
+            findings=(quiet, *samples, *given), repair=Repair(), blind="the car hardly corners"
         )
     mended, _ = before_sizes(samples).apply(recording, vehicle)
     motion = Motion.of(mended)
     if motion is None:
-        return Screened(findings=(*samples, *told), repair=Repair(), blind="too little is driven")
+        return Screened(findings=(*samples, *given), repair=Repair(), blind="too little is driven")
     some = looked_at(mended)[0]
 
     def possible(changes: tuple[Change, ...]) -> bool:
@@ -92,7 +92,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         gross = _gross_findings(found, vehicle)
         other = any(change.code == "other_car" for change in found.best.changes)
         return Screened(
-            findings=(*gross, *samples, *told),
+            findings=(*gross, *samples, *given),
             repair=before_sizes((*samples, *gross)),
             blind="the car is another one" if other else "",
             unobservable=tuple(
@@ -140,7 +140,7 @@ def combined(findings: Iterable[Finding]) -> Repair:
 def before_sizes(findings: Iterable[Finding]) -> Repair:
     """Return what is taken out of a log before sizes are asked, sure or not.
 
-    That is what is found of its samples and how it is read. Numbers of the car stay as told.
+    That is what is found of its samples and how it is read. Numbers of the car stay as declared.
     """
     return replace(combined(findings), vehicle={})
 

@@ -233,3 +233,16 @@ def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], d
     share = np.clip((np.abs(gap) / GRAVITY - LEVEL) / LEVEL, 0.0, 1.0)
     bank: Array = np.where(on, gap * share, 0.0)
     return bank
+
+
+def hardest(recording: Recording, seconds: float) -> slice:
+    """Return which samples are the time of hardest cornering, of all that are not longer.
+
+    Parameters
+    ----------
+    seconds : how long it is at most [s].
+    """
+    n = min(round(seconds / recording.dt), len(recording))
+    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
+    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
+    return slice(first, first + n)

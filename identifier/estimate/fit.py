@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.drive import FASTEST, Drive
+from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import Information
-from identifier.estimate.latent import Learnt, hardest, lateness, latent_priors, learn_latent
+from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel, Segment
-from identifier.estimate.nodes import Nodes
+from identifier.estimate.nodes import Nodes, TooShortError
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
@@ -104,8 +104,13 @@ def fit(
         went_on(sum(len(one.signals) * one.dt for one in drives))
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
-        own = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-        nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=own)
+        try:
+            own = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+            nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=own)
+        except TooShortError:
+            if len(recordings) == 1:
+                raise
+            continue
         late = max(late, own, key=abs)
         if nodes.counts.any():
             learnt = learn_latent(nodes, vehicle, beliefs, late=own != 0.0)
@@ -136,8 +141,7 @@ def fit(
         if not force > 0.0 and before.moves[INDEX[f"residual{j}_{axle}"]]
     ]
     if falling:  # as where a servo has play: such a curve is no tire, the formula alone is one
-        fewer = before.without(falling)
-        return fit(recordings, vehicle, fewer, block=block, coarse=coarse, progress=progress)
+        return fit(recordings, vehicle, before.without(falling), block=block, coarse=coarse)
     return Fit(model, found, parts)
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, low_passed
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
@@ -520,19 +521,6 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
         best.z,
         parted,
     )
-
-
-def hardest(recording: Recording, seconds: float) -> slice:
-    """Return which samples are the time of hardest cornering, of all that are not longer.
-
-    Parameters
-    ----------
-    seconds : how long it is at most [s].
-    """
-    n = min(round(seconds / recording.dt), len(recording))
-    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
-    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
-    return slice(first, first + n)
 
 
 def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:

@@ -307,11 +307,12 @@ class FittedModel(TireModel):
             *(log.t, log.v_x, log.r, log.a_y, log.a_x, log.delta_f, log.delta_r),
             *(self.p, self.covariance, self.vehicle),
         )
-        for known, found in _LAST:
-            if all(one is other for one, other in zip(known, key, strict=True)):
+        for known, breaks, found in _LAST:
+            same = all(one is other for one, other in zip(known, key, strict=True))
+            if same and breaks == log.breaks:
                 return found
         found = estimate_v_y(recording, self.vehicle, self.p, self.covariance)
-        _LAST.append((key, found))
+        _LAST.append((key, log.breaks, found))
         return found
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
@@ -863,7 +864,7 @@ class FittedModel(TireModel):
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
-_LAST: deque[tuple[tuple[Any, ...], LateralVelocity]] = deque(maxlen=4)
+_LAST: deque[tuple[tuple[Any, ...], tuple[int, ...], LateralVelocity]] = deque(maxlen=4)
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 
 

@@ -31,6 +31,10 @@ ROLLS, JERKS = 5.0, 3.0  # Hz of a sedan, below which a_y rolls the body and is 
 FEWEST = 3  # nodes of a segment
 
 
+class TooShortError(ValueError):
+    """A log has too few samples for states of its own."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Nodes:
     """Signals at n nodes.
@@ -84,7 +88,7 @@ class Nodes:
                 felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
                 pieces.append(_piece(recording, some, vehicle, every, felt))
         if not pieces:
-            raise ValueError(f"{recording.name}: too short to learn from without v_y")
+            raise TooShortError(f"{recording.name}: too short to learn from without v_y")
         t, given, measured, counts, goes = (
             np.concatenate(parts) for parts in zip(*pieces, strict=True)
         )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.drive import SMOOTHED
+from identifier.estimate.drive import SMOOTHED, hardest
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.sensors import white_noise
@@ -70,7 +70,9 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     if recording.a_y is None:
         shown = shown._replace(push=float(PUSHES[-1]))
     else:
-        problem = _hardest(recording, new)
+        part = hardest(recording, min(ASKED, MOST * recording.dt))
+        inside = new[(new >= part.start) & (new < part.stop)] - part.start
+        problem = Kinematics(recording.taken(part), inside)
         white = white_noise(problem.shown) if problem.shown.size > FEWEST else 0.0
         if not rare and not white * np.sqrt(shown.interval / SMOOTHED) > NOISY * scale:
             return recording
@@ -140,8 +142,13 @@ class Kinematics:
     def _piece(self) -> NDArray[np.intp]:
         return np.searchsorted(np.array(self.recording.breaks), np.arange(self.n), side="right")
 
-    def _solved(self, s: Shown, weights: Array) -> tuple[Array, Array, float]:
-        """Return v_y (n,), what it misses of what was shown (m,), and -ln of the likelihood."""
+    def _solved(
+        self, s: Shown, weights: Array, late: float | None = None
+    ) -> tuple[Array, Array, float]:
+        """Return v_y (n,), what it misses of what was shown (m,), and -ln of the likelihood.
+
+        late : delay up to which values must have a past to count [s]; None takes that of `s`.
+        """
         from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
 
         n, dt = self.n, self.dt
@@ -163,7 +170,11 @@ class Kinematics:
         at = np.maximum(self.new - s.late / dt, 0.0)
         i = np.minimum(at.astype(np.intp), n - 2)
         share = at - i
-        there = (self.new * dt >= s.late) & (self._piece[i] == self._piece[self.new])
+        latest = s.late if late is None else late
+        there = (self.new * dt >= latest) & (self._piece[i] == self._piece[self.new])
+        if late is not None:
+            first = np.maximum(self.new - round(late / dt), 0)
+            there &= self._piece[first] == self._piece[self.new]
         there &= self._piece[i + 1] == self._piece[self.new]
         w = np.where(there, weights, 0.0) / s.noise**2
         for place, value in (
@@ -201,17 +212,11 @@ class Kinematics:
         return v_y, missed
 
     def cost(self, shown: Shown) -> float:
-        """Return -ln of the likelihood of how a sensor shows v_y [nats], but for a constant."""
-        return self._solved(shown, np.ones(len(self.new)))[2]
+        """Return -ln of the likelihood of how a sensor shows v_y [nats], but for a constant.
 
-
-def _hardest(recording: Recording, new: NDArray[np.intp]) -> Kinematics:
-    """Return the problem of the hardest cornering."""
-    n = min(round(ASKED / recording.dt), MOST, len(recording))
-    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
-    begin = int(np.argmax(power[n:] - power[:-n]))
-    inside = new[(new >= begin) & (new < begin + n)] - begin
-    return Kinematics(recording.taken(slice(begin, begin + n)), inside)
+        The same values count for each delay.
+        """
+        return self._solved(shown, np.ones(len(self.new)), float(DELAYS[-1]))[2]
 
 
 def _likeliest(problem: Kinematics, best: Shown, scale: float) -> Shown:

@@ -181,12 +181,12 @@ class CompiledPackage:
         if rows.ndim != 2 or rows.shape[1] != len(self.inputs):
             wanted = len(self.inputs)
             raise ValueError(f"samples must have shape (n, {wanted}), not {rows.shape}")
-        told = np.empty((len(rows), sum(self._outputs.values())))
+        given = np.empty((len(rows), sum(self._outputs.values())))
         status = np.empty(len(rows), dtype=np.int32)
-        pointers = (ctypes.c_void_p(array.ctypes.data) for array in (rows, told, status))
+        pointers = (ctypes.c_void_p(array.ctypes.data) for array in (rows, given, status))
         self._call("instance_run")(self._instance, ctypes.c_long(len(rows)), *pointers)
         ends = np.cumsum(list(self._outputs.values()))[:-1]
-        outputs = dict(zip(self._outputs, np.split(told, ends, axis=1), strict=True))
+        outputs = dict(zip(self._outputs, np.split(given, ends, axis=1), strict=True))
         return ShippedRun(outputs["axle_force"], outputs, status)
 
     @property

@@ -74,8 +74,8 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
     if port < len(state):
         part = "learnt" if state[port].learnt else "next"
         return f"{part}->{state[port].signal.name}{state[port].element(entry)}"
-    told = output_members(specialized)[port - len(state)]
-    return f"out->{told.signal.name}{told.element(entry)}"
+    given = output_members(specialized)[port - len(state)]
+    return f"out->{given.signal.name}{given.element(entry)}"
 
 
 def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:

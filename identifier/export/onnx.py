@@ -183,7 +183,7 @@ def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
 # The axle model's static force curve as ONNX: F_i = load_i Σ_j w_ij tanh(α_i/α_j).
 #
 # What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
-# So does downforce, which needs a speed: its κ are told as metadata, F times 1 + κ v_x².
+# So does downforce, which needs a speed: its κ are given as metadata, F times 1 + κ v_x².
 
 FROZEN_INPUTS = (
     Signal("alpha_f", "rad", "slip angle of the front axle, paper's sign"),
@@ -301,8 +301,8 @@ def _band_of_axle(model: AxleModel, graph: Graph, axle: int, units: str, force: 
     before = node("Max", before, number(LEAST_BEFORE))
     share = node("Min", node("Div", left, before), number(1.0))
     c = float(calibration.color[axle])
-    told = node("Add", number(1.0), node("Mul", share, number(c - 1.0)))
-    colored = node("Div", node("Mul", node("Mul", before, share), number(c)), told)
+    given = node("Add", number(1.0), node("Mul", share, number(c - 1.0)))
+    colored = node("Div", node("Mul", node("Mul", before, share), number(c)), given)
     left = node("Max", colored, left)
     relative = node("Mul", force, number(RELATIVE / load))
     total = node("Add", node("Add", nodes.square(relative), number(FLOOR**2)), left)

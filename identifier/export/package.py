@@ -83,8 +83,8 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
         verdict = f"judged by {method.judged_by}"
         return {"verdict": verdict, "properties": {}, "limits": {}}
     found = method.certify(vehicle)
-    told = found.to_dict()
-    return {name: told[name] for name in ("verdict", "properties", "limits")}
+    table = found.to_dict()
+    return {name: table[name] for name in ("verdict", "properties", "limits")}
 
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
@@ -156,7 +156,7 @@ class Vectors(NamedTuple):
 def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
 
-    Where v_y is told it is measured at the end alone; a_y is that of the motion, with a gap.
+    Where v_y is given it is measured at the end alone; a_y is that of the motion, with a gap.
     n : number of samples.
     """
     k = np.arange(n, dtype=np.float64)
@@ -193,7 +193,7 @@ def run_in_virtual_machine(
         array[:] = np.ravel(value, order="F")
     x, delta, *scalars = arguments[n:]
     now, missed, started = np.zeros(sum(port.size for port in specialized.outputs)), 0, False
-    told = []
+    table = []
 
     def step(sample: Array) -> Array:
         v_x, v_y, r, delta_f, delta_r, *a_y = sample
@@ -222,9 +222,9 @@ def run_in_virtual_machine(
                 now = step(nowhere)
             if missed >= stale_samples(STALE_TIME, specialized.dt):
                 now = np.zeros_like(now)
-        told.append(now)
+        table.append(now)
     last = [array.reshape(function.size_in(i), order="F") for i, array in enumerate(arguments[:n])]
-    return np.array(told), dict(zip(specialized.carry, last, strict=True))
+    return np.array(table), dict(zip(specialized.carry, last, strict=True))
 
 
 class _InPlace:

@@ -100,8 +100,8 @@ class SpecializedStep(NamedTuple):
     @property
     def side_slip(self) -> tuple[str, ...]:
         """Outputs that tell v_y: the first one, two or all of `SIDE_SLIP`, or none of them."""
-        told = {port.name for port in self.outputs} if self.tells_v_y else set()
-        return tuple(takewhile(told.__contains__, SIDE_SLIP))
+        given = {port.name for port in self.outputs} if self.tells_v_y else set()
+        return tuple(takewhile(given.__contains__, SIDE_SLIP))
 
 
 def _described(port: Port, size: int) -> Signal:

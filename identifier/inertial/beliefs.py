@@ -102,7 +102,7 @@ class Trust:
     alarm_time : of that mean [s].
     step, step_time : change of ln μ that may happen in that time then [-], [s].
     surge : largest acceleration [m/s²].
-    observable : largest standard deviation of side slip that is told for observed [rad].
+    observable : largest standard deviation of side slip that counts as observed [rad].
     """
 
     v_y: float = 0.017

@@ -16,9 +16,9 @@ from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
-from identifier.axle.model import AxleModel
+from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
-from identifier.axle.slip import FASTEST, SHORTEST, Sway
+from identifier.axle.slip import FASTEST, SHORTEST, Sensors, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
@@ -59,6 +59,7 @@ class InertialIdentifier(Method):
         and of the force [-].
     a_y_late : by which a_y is later than the yaw rate [s].
     along : how a_x changes lateral forces of tires that are held, as of `motion.Along`.
+    sensors : errors of sensors that were known before; that of the steering is taken out.
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
 
@@ -80,6 +81,7 @@ class InertialIdentifier(Method):
     doubt: tuple[float, float] = (0.0, 0.0)
     a_y_late: float = 0.0
     along: tuple[float, ...] = (0.0,) * len(Along._fields)
+    sensors: Sensors = EXACT
     ladder: tuple[float, ...] = LADDER
     dt: float = 0.01
 
@@ -147,6 +149,7 @@ class InertialIdentifier(Method):
                 drive_r=model["driving_r"],
                 drag=vehicle.drag,
             ),
+            sensors=tires.sensors,
         )
 
     @classmethod
@@ -163,7 +166,10 @@ class InertialIdentifier(Method):
         if isinstance(model, FittedModel):
             return cls.holding(model, vehicle, dt=dt), model
         usual = cls.for_vehicle(vehicle, dt=dt)
-        return usual, model if model is not None and usual.resumes(model) else None
+        tires = None if model is None else model.in_units(usual.ladder)
+        if model is None or not isinstance(tires, AxleModel) or not usual.resumes(model):
+            return usual, None
+        return replace(usual, sensors=tires.sensors), model
 
     @property
     def min_speed(self) -> float:
@@ -253,7 +259,7 @@ class InertialIdentifier(Method):
                 "motion_UD": np.zeros(rest),  # begins with the first sample
                 "gate": np.zeros(len(GateState._fields)),
                 "body": np.zeros(2),
-                "heard": np.concatenate(
+                "readings": np.concatenate(
                     [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
                 "running": np.zeros(3),
@@ -297,6 +303,7 @@ class InertialIdentifier(Method):
             ahead=ahead,
             aside=aside,
             late=self.a_y_late,
+            steering_gain=self.sensors.steering_gain,
         )
 
     def _sway(self, vehicle: Vehicle) -> Sway:
@@ -395,7 +402,7 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        state : sensors (n + 1, 5) and body (n + 1, 2).
+        state : sensors (n + 1, 4) and body (n + 1, 2).
         """
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
         tilt = state["body"].reshape(-1, 2)[1:, 0]
@@ -408,7 +415,7 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
+        state : W (2, n), own (2,), sensors (4,), UD of both and excitation (2, 9).
         """
         prior = self._prior_covariance(vehicle)
         own = np.zeros((2, 3))
@@ -432,6 +439,7 @@ class InertialIdentifier(Method):
             covariance=after,
             prior_covariance=prior,
             excitation=state["excitation"].copy(),
+            sensors=self.sensors,
             tells_v_y=True,
         )
 

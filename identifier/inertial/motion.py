@@ -9,7 +9,7 @@ a few directions (`Learnt`).
 
 f = λ φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s λ C(x),   λ = 1 + κ v_x² where the car has
 downforce (its own κ, of `Vehicle`), else 1,
-α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
+α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k given,
 dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (l_f F_f - l_r F_r)/I_z.
 Shown: r + b_r  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
 rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
@@ -176,10 +176,10 @@ class Sample(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """What the motion obeys beside the car: decay of e over a step [-], stiffness and damping of
-    the bank [1/s²], [1/s]; stiffness and damping of the roll [1/s²], [1/s]; share of its rate that
+    """What the motion obeys beside the car: decay of e and of the bank over a step [-];
+    stiffness and damping of the roll [1/s²], [1/s]; share of its rate that
     moves the contact patches, over the stiffness [s²]; place of the accelerometer before and left
-    of the center of gravity [m]; by how much a_y is late [s].
+    of the center of gravity [m]; by how much a_y is late [s]; share by which δ_f reads too little.
     """
 
     forgets: Any
@@ -190,6 +190,7 @@ class Laws(NamedTuple):
     ahead: Any
     aside: Any
     late: Any
+    steering_gain: Any
 
 
 class Way:
@@ -237,7 +238,7 @@ class Way:
         Parameters
         ----------
         z : symbols (q,).
-        moving : what moves (8,), an expression of z and of symbols on the way.
+        moving : what moves (7,), an expression of z and of symbols on the way.
         """
         symbols, values = zip(*self._on_the_way, strict=True)
         numbers = ca.vertcat(*values, moving)
@@ -245,7 +246,7 @@ class Way:
 
 
 class Predicted(NamedTuple):
-    """After a step: what moves (8,) of z, the slip α (2,) [rad] and the rolling body.
+    """After a step: what moves (7,) of z, the slip α (2,) [rad] and the rolling body.
 
     by_way : how the step leads to `moving`, and that as an expression of the numbers on the way.
     tilt, tilt_rate : ä [m/s²] and its rate [m/s³].   curve : at the slip before the step.

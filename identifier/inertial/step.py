@@ -3,9 +3,9 @@
 An extended Kalman filter of everything at once: what moves and what is learnt, whose errors are
 correlated, so that v_y is corrected by what the curves are found to be and the other way round.
 Its covariance is that of what moves and of steps along the directions of `motion.Learnt`.
-Carried: motion (8,), W (2, n), own (2,) the compliances, sensors (5,) and UD the factors of the
+Carried: motion (7,), W (2, n), own (2,) the compliances, sensors (4,) and UD the factors of the
 covariance of what is learnt, motion_UD those of what moves; gate as of the axle identifier; body
-(2,), heard (10,), running (2,), excitation (2, 9).
+(2,), readings (10,), running (3,), excitation (2, 9).
 Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
 """
 
@@ -46,7 +46,7 @@ from models.vehicle import GRAVITY, load_ratio
 
 OVER = ("x", "u", "v_x", "a_y")
 LEARNT = ("W", "own", "sensors")
-KEPT = ("UD", "motion_UD", "gate", "body", "heard", "running", "excitation")
+KEPT = ("UD", "motion_UD", "gate", "body", "readings", "running", "excitation")
 CARRY = ("motion", *LEARNT, *KEPT)
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
@@ -95,15 +95,16 @@ PORTS = (
     ),
     Port("body", "m/s^2; m/s^3", "motion of the rolling body and its rate"),
     Port(
-        "heard",
+        "readings",
         "rad/s, m/s^2; squares; -; rad/s, m/s^2",
         "newest r and a_y, those before, variances of their noise, how many numbers wait, "
         "and the innovation of those",
     ),
     Port(
         "running",
-        "-",
-        "1 while the filter runs; mean square of the missed force over its deviation",
+        "-; -; m/s",
+        "1 while the filter runs; mean square of the missed force over its deviation; slow mean "
+        "of v_x, by which a_x is found",
     ),
     Port(
         "excitation",
@@ -132,7 +133,7 @@ class Noise(NamedTuple):
     turns : 1 where a channel has its turn (2,).   share : 1 over the numbers that waited for it,
     (2,) [-]: of errors that one in a row repeats of another, the sum counts.
     fresh : 1 where a number is new, (2,).   left : innovations of those that wait (2,).
-    variance : of noise [rad²/s², m²/s⁴], (2,).   heard : next state (8,), without those.
+    variance : of noise [rad²/s², m²/s⁴], (2,).   readings : next state (8,), without those.
     """
 
     first: Any
@@ -142,7 +143,7 @@ class Noise(NamedTuple):
     fresh: list[Any]
     left: list[Any]
     variance: list[Any]
-    heard: Any
+    readings: Any
 
 
 def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = False) -> ca.Function:
@@ -166,7 +167,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
         "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
     }
     ports["gate"], last = named_port(GateState, "gate")
-    sizes = {"body": 2, "heard": 10, "running": 3}
+    sizes = {"body": 2, "readings": 10, "running": 3}
     ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
@@ -202,8 +203,10 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     z = ca.vertcat(
         ports["motion"], ports["W"][0, :].T, ports["W"][1, :].T, ports["own"], ports["sensors"]
     )
+    turned = ca.vertcat(1 + laws.steering_gain, 1)
+    gated = gated._replace(delta=turned * gated.delta)
     now = Sample(larger(gated.v_x, slowest), gated.delta)
-    before = Sample(larger(last.v_x, slowest), ca.vertcat(last.delta_f, last.delta_r))
+    before = Sample(larger(last.v_x, slowest), turned * ca.vertcat(last.delta_f, last.delta_r))
     ahead = predicted(
         car,
         laws,
@@ -225,7 +228,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     factors = propagated(factors, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
     noise = _noise(ports, trust, gated, goes_on)
-    step, factors, heard = _corrected(
+    step, factors, readings = _corrected(
         (car, laws, trust),
         ahead,
         ahead_z,
@@ -256,26 +259,26 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     factors = Factors(factors.U, [*variances, *factors.D[MOVING:]])
     after = row_of(factors)
     moving = ports["motion_UD"].numel()
-    told = unknowns(ca.vertcat(*kept), n)
+    given = unknowns(ca.vertcat(*kept), n)
     tilt = ca.if_else(
-        goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * told.r, 0)
+        goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * given.r, 0)
     )
-    curves = curve(told.slip, told.W, scales, steps).under(load(now.v_x))
-    force = curves.force * cosine(now.delta) + told.error
+    curves = curve(given.slip, given.W, scales, steps).under(load(now.v_x))
+    force = curves.force * cosine(now.delta) + given.error
     variance = larger(entry(factors, 0, 0), 0)
     doubt = ports["doubt"][0] + ports["doubt"][1] * ca.fabs(curves.force[1])
     variance = variance + (now.v_x * doubt / curves.carcass_slope[1]) ** 2
-    size_of_slip = larger(ca.fabs(told.slip), ca.fabs(ahead.alpha))
+    size_of_slip = larger(ca.fabs(given.slip), ca.fabs(ahead.alpha))
     next_state = {
         "motion": ca.vertcat(*kept[:MOVING]),
-        "W": told.W,
-        "own": told.compliance,
+        "W": given.W,
+        "own": given.compliance,
         "sensors": ca.vertcat(*kept[-len(SENSORS) :]),
         "UD": ca.horzcat(*after[moving:]),
         "motion_UD": ca.horzcat(*after[:moving]),
         "gate": gated.state,
         "body": tilt,
-        "heard": heard,
+        "readings": readings,
         "running": ca.vertcat(
             ca.logic_and(runs, sane),
             ca.if_else(goes_on, fast, 0),
@@ -296,7 +299,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
         [
             *(ca.densify(next_state[name]) for name in CARRY),
             ca.if_else(gated.on, force * car.load, 0),
-            ca.if_else(gated.on, told.v_y, 0),
+            ca.if_else(gated.on, given.v_y, 0),
             ca.sqrt(variance),
             ca.logic_and(runs, variance < trust.observable * now.v_x**2),
         ],
@@ -315,22 +318,22 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
     One channel is taken at a sample, that of which more numbers wait: a second update would cost as
     much as the first and tell what the next sample does.
     """
-    heard, a_y = ports["heard"], ports["a_y"]
+    readings, a_y = ports["readings"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
-    newest = [gated.r, ca.if_else(there, a_y, heard[1])]
+    newest = [gated.r, ca.if_else(there, a_y, readings[1])]
     fresh, waiting, variance, state = [], [], [], []
     for i, y in enumerate(newest):
-        old = heard[4 + i]
-        differs = (y - heard[i]) ** 2 > SAME * (heard[i] - heard[2 + i]) ** 2
+        old = readings[4 + i]
+        differs = (y - readings[i]) ** 2 > SAME * (readings[i] - readings[2 + i]) ** 2
         news = ca.logic_and(ca.logic_and(differs, goes_on), _is_good(gated))
-        second = y - 2 * heard[i] + heard[2 + i]
+        second = y - 2 * readings[i] + readings[2 + i]
         shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
         variance.append(ca.if_else(news, old + trust.noise_gain * (shows - old), old))
         fresh.append(news)
-        waiting.append(goes_on * smaller(heard[6 + i] + news, MOST_WAITING))
-        before = ca.if_else(news, heard[i], heard[2 + i])
+        waiting.append(goes_on * smaller(readings[6 + i] + news, MOST_WAITING))
+        before = ca.if_else(news, readings[i], readings[2 + i])
         holds = ca.logic_and(goes_on, ca.logic_not(news))
-        state.append((ca.if_else(holds, heard[i], y), ca.if_else(goes_on, before, y)))
+        state.append((ca.if_else(holds, readings[i], y), ca.if_else(goes_on, before, y)))
     now, before = zip(*state, strict=True)
     of_r, of_a_y = waiting
     first = of_r >= of_a_y
@@ -339,7 +342,7 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
     share = [1 / larger(one, 1) for one in waiting]
     counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
     waits = ca.vertcat(*now, *before, *variance, *left)
-    return Noise(first, counts, turns, share, fresh, [heard[8], heard[9]], variance, waits)
+    return Noise(first, counts, turns, share, fresh, [readings[8], readings[9]], variance, waits)
 
 
 def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
@@ -354,7 +357,7 @@ def _process_noise(trust: TrustNumbers, ahead: Predicted) -> list[Any]:
 
 
 def _corrected(
-    told: tuple[Car, Laws, TrustNumbers],
+    given: tuple[Car, Laws, TrustNumbers],
     ahead: Predicted,
     z: Any,
     into: Any,
@@ -370,7 +373,7 @@ def _corrected(
     Innovations of what waits are kept: its turn comes at a next sample, where its number may be a
     new one, or none.
     """
-    car, laws, trust = told
+    car, laws, trust = given
     n = len(steps) + 1
     symbol = ca.SX.sym("z", z.numel())
     tilt = ca.SX.sym("tilt")
@@ -386,7 +389,7 @@ def _corrected(
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
     nu = [
-        ca.if_else(fresh, noise.heard[i] - y[i], left)
+        ca.if_else(fresh, noise.readings[i] - y[i], left)
         for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
     ]
     R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
@@ -400,7 +403,7 @@ def _corrected(
         ca.if_else(turn, 0, one - ca.dot(H[i, :].T, moved))
         for i, (turn, one) in enumerate(zip(noise.turns, nu, strict=True))
     ]
-    return moved, factors, ca.vertcat(noise.heard, *left)
+    return moved, factors, ca.vertcat(noise.readings, *left)
 
 
 def _is_good(gated: Gate) -> Any:

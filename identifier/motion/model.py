@@ -44,7 +44,7 @@ RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
 
 Columns = tuple[str, ...]
 SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_x", "bank", "road", "on")
-RATES = ("v_y_rate", "r_rate", "delta_rate")  # of late signals, by which a delay is told
+RATES = ("v_y_rate", "r_rate", "delta_rate")  # of late signals, by which a delay is estimated
 SENSED = ("v_x", "v_y", "r", "delta_f", *RATES)
 SENSORS = (
     "v_x_factor", "v_y_bias", "v_y_angle", "v_y_lever", "v_y_delay", "v_y_lag",

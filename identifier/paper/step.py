@@ -66,7 +66,7 @@ class Structure:
 def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return whether a car can be in this state: its axles slide less than 63°, its wheels turn.
 
-    A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is told:
+    A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is given:
     one of 1000 m/s would carry the weights beyond any number.
     v_x : longitudinal speed, at least the minimum speed [m/s].   x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).

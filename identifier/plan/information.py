@@ -18,7 +18,7 @@ from identifier.axle.curve import unit_matrix
 from identifier.plan.motion import Motion, time_step
 from identifier.plan.tires import FLAT, PlausibleTires
 
-COLOR = 5.0  # times the correlation time that learning is told: half a second, as errors of models
+COLOR = 5.0  # times the correlation time that learning is given: half a second, as errors of models
 EVERY = 2  # step of the simulation that counts: 54 ms in a sedan, the regressor is low-passed
 _MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 

@@ -205,10 +205,10 @@ def _too_small(tires: PlausibleTires, space: Space, longest: float, needed: floa
     body = body_of(tires)
     own = 2.0 * space.margin + body.ahead + body.behind
     slower = max(space.length - own, 0.0) / needed
-    told = f", or drive at {slower:.3g} m/s" if slower > 3.0 * tires.vehicle.lowest_speed else ""
+    given = f", or drive at {slower:.3g} m/s" if slower > 3.0 * tires.vehicle.lowest_speed else ""
     return (
         f"at {space.speed:g} m/s a pass lasts {longest:.2g} s, and {needed:.2g} s are needed to "
-        f"steer three times: the area must be {own + needed * space.speed:.3g} m long{told}"
+        f"steer three times: the area must be {own + needed * space.speed:.3g} m long{given}"
     )
 
 

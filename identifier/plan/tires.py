@@ -1,13 +1,13 @@
 """Tires and steering that a car may have, as far as is known before it drives: a plan stands all.
 
-Of a car that was never identified: brush tires (as in the prior of the axle identifier) of the told
-stiffness and friction, and those that are softer, stiffer, more slippery or grippier by a share;
-the least stable of them steers neutrally on a slippery road. No car is believed to oversteer at
-small slip: where the told rear axle is softer for its load than the front one, both are taken to be
-alike. Of a model that was learnt: its own curve, and curves drawn from what learning left open.
-The steering follows what is asked of it over the lag of the vehicle file, quicker and slower ones
-by the same share: the slow one drives on the least stable tires. A mass that is wrong is tires of
-another stiffness per load; it does not count on its own.
+Of a car that was never identified: brush tires (as in the prior of the axle identifier) of the
+declared stiffness and friction, and those that are softer, stiffer, more slippery or grippier by a
+share; the least stable of them steers neutrally on a slippery road. No car is believed to oversteer
+at small slip: where the declared rear axle is softer for its load than the front one, both are
+taken to be alike. Of a model that was learnt: its own curve, and curves drawn from what learning
+left open. The steering follows what is asked of it over the lag of the vehicle file, quicker and
+slower ones by the same share: the slow one drives on the least stable tires. A mass that is wrong
+is tires of another stiffness per load; it does not count on its own.
 """
 
 from dataclasses import dataclass, replace
@@ -28,12 +28,12 @@ SLIPS = np.linspace(0.0, 0.5, 501)[1:]  # rad, where curves are looked at
 FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it is reached
 
 
-def _steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
+def _steering_lag_of(vehicle: Vehicle, given: float | None) -> float:
     """Return the time constant from the angle asked for to that of the front wheels [s].
-    told : of the steering that drives it; None takes that of its chassis, or else 0.04.
+    given : of the steering that drives it; None takes that of its chassis, or else 0.04.
     """
-    if told is not None:
-        return told
+    if given is not None:
+        return given
     return STEERING_LAG if vehicle.chassis is None else vehicle.chassis.steering_lag
 
 

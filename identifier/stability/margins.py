@@ -168,7 +168,7 @@ def drift_frequency(
     """
 
     def relative(frequency: ArrayLike) -> Array:
-        """λ_min He H with the decay of H taken out, so that round-off is told from a sign."""
+        """λ_min He H with the decay of H taken out, so that round-off is no sign."""
         lowest = passivity(frequency, A_d=A_d, forgetting=forgetting, law=law, direction=direction)
         return lowest * (size + np.atleast_1d(np.asarray(frequency))) / reference
 

@@ -49,7 +49,7 @@ class Disturbance:
         add to A_ξ ξ + B_ξ u [U].
     noise : sup of the sensors' error of ξ, which is in every measured ξ̃ [U s].
     rate : sup|ξ'| of the car [U]; RK4 adds dt (1 - φ) ξ' to the error.
-    known : sup|A_ξ ξ + B_ξ u| as measured, which the observer is told [U].
+    known : sup|A_ξ ξ + B_ξ u| as measured, which the observer is given [U].
     """
 
     residual: float

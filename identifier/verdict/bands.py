@@ -109,17 +109,17 @@ def calibrated(
     within = np.searchsorted(SPEEDS, speeds / model.vehicle.froude_speed, side="right")
     empty = np.zeros((3, *each))
     missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
-    told = BandCalibration.declared(speed)
+    given = BandCalibration.declared(speed)
     for mine, other in taught_elsewhere(teach, recording, found):
         if other is None:
             continue
-        asked_of = _missed(other.with_calibration(told), recording, found)
+        asked_of = _missed(other.with_calibration(given), recording, found)
         for into, values in zip(missed[:-1], asked_of, strict=True):
             into[..., mine, :] = values[..., mine, :]
-    told = replace(told, noise=sensor_noise(recording, model.vehicle))
+    given = replace(given, noise=sensor_noise(recording, model.vehicle))
     judged, _ = found.but_a_segment()
     return model.with_calibration(
-        calibration(missed, found.noise, found.windows, told), judged.missed
+        calibration(missed, found.noise, found.windows, given), judged.missed
     )
 
 
@@ -130,7 +130,7 @@ def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Ar
 
 
 def calibration(
-    missed: Missed, noise: Array, windows: Windows, told: BandCalibration
+    missed: Missed, noise: Array, windows: Windows, given: BandCalibration
 ) -> BandCalibration | None:
     """Return factors and color of errors on segments that did not teach; None: too few windows.
     noise : variance of the sensors' white noise in them (2,).
@@ -153,7 +153,7 @@ def calibration(
         return None
     color = [color_of(missed.error[:, i], windows) for i in range(2)]
     return replace(
-        told,
+        given,
         factors=np.clip(factors, LEAST, MOST),
         speeds=np.clip(speeds, LEAST, MOST),
         color=np.array(color),
@@ -181,7 +181,7 @@ def quantile(values: Array, share: Array) -> float:
 
 
 def color_of(error: Array, windows: Windows) -> float:
-    """Return how much longer errors are correlated than learning is told, at least 1.
+    """Return how much longer errors are correlated than learning is given, at least 1.
 
     The sum of their autocorrelation, over windows that do not overlap, until it is first not
     positive.

@@ -11,7 +11,7 @@ scaled to a sum of one: a road goes on, or another begins, as likely as p₀ has
 its friction makes the force that was shown. The slip of each axle may be off by a zero, which each
 friction estimates for itself and a road that begins takes over (interacting multiple models; Blom
 and Bar-Shalom, IEEE Trans. Automatic Control 33, 1988): where tires do not slide, a friction tells
-itself from a wrong zero by nothing. A time is told by what came until then, not after.
+itself from a wrong zero by nothing. The answer at a time is from what came until then.
 """
 
 import math
@@ -40,14 +40,14 @@ _ZERO = 0.015  # rad: by so much the slip of another drive is off, as the zero o
 _ANYTHING = 0.3  # static axle loads: of forces that no friction explains
 _OVERLAP = 0.5  # of a window is new
 _ANOTHER = 0.25  # |ln μ| from which a road counts as another
-SURE, LIKELY = 0.99, 0.5  # probability from which that is told, and as long as it goes on
-_TWO_SIGMA = 2.0  # of its doubt: a friction nearer to that which taught is not told
+SURE, LIKELY = 0.99, 0.5  # probability from which that is reported, and as long as it goes on
+_TWO_SIGMA = 2.0  # of its doubt: a friction nearer to that which taught is not reported
 _SIMILAR = 0.1  # of ln μ: by so much roads of a tire are not similar
 
 
 class Road(NamedTuple):
     """A segment of another friction than that of the drive that taught.
-    first, last : from when to when it was told, in the recording's own clock [s].
+    first, last : from when to when it was reported, in the recording's own clock [s].
     ratio : friction over that of the drive that taught [-].   sd : standard deviation of it [-].
     """
 
@@ -109,7 +109,7 @@ def road_friction(
     """Return the friction of a drive's road; None where nobody can tell.
 
     Nobody can of a model without a calibrated band, and of a drive of fewer than eight brisk
-    windows. More friction is told of a model alone that learnt its grip. Of a long drive those
+    windows. More friction is reported only for a model that learnt its grip. Of a long drive those
     parts are asked that the verdict asks.
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
@@ -159,9 +159,9 @@ def filtered(t: Array, grid: Array, away: Array, slope: Array, variance: Array) 
         zero, doubt = _mixed(now, zero, doubt, (stays / before)[:-1, None])
         off, wide = away[:, k] - slope[:, k] * zero, slope[:, k] ** 2 * doubt + variance[k]
         anything = variance[k] + _ANYTHING**2
-        told = off**2 / wide + np.log(wide)
+        given = off**2 / wide + np.log(wide)
         chance = away[same, k] ** 2 / anything + np.log(anything)
-        log = -0.5 * _OVERLAP * np.append(told.sum(axis=1), chance.sum())
+        log = -0.5 * _OVERLAP * np.append(given.sum(axis=1), chance.sum())
         now = before * np.exp(log - log.max())
         now = now / now.sum()
         p[k] = now

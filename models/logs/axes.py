@@ -63,7 +63,7 @@ class Found(NamedTuple):
 
 def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z.
-    words : of each channel's name.   units : of each channel, "" where none is told.
+    words : of each channel's name.   units : of each channel, "" where none is given.
     """
     found: dict[tuple[str, ...], dict[str, str]] = {}
     quantity_of: dict[tuple[str, ...], str] = {}
@@ -75,8 +75,8 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
         stems = {word for word in rest if word != "?"}
         likely = [one for one in (RATE, ACCELERATION, SPEED) if stems & set(_STEMS[one].split())]
         if is_given(units[name]):
-            told = quantities(units[name])
-            likely = [one for one in (RATE, ACCELERATION, SPEED) if one in told]
+            given = quantities(units[name])
+            likely = [one for one in (RATE, ACCELERATION, SPEED) if one in given]
         if likely:
             found.setdefault(rest, {}).setdefault(letter, name)
             quantity_of[rest] = likely[0]
@@ -181,9 +181,9 @@ def along_axes(
             if up[0] == "?":
                 oblique |= channels
                 continue
-            told = _of_a_box(grid, one, gyro, up, v, yaw_rate, steering)
-            misled |= channels if told is not None else set()
-            axes += told or []
+            given = _of_a_box(grid, one, gyro, up, v, yaw_rate, steering)
+            misled |= channels if given is not None else set()
+            axes += given or []
     known = {one.signal: one.factor * grid[one.name] for one in axes}
     known |= {k: grid[one] for k, one in (("r", yaw_rate), ("a_y", lateral)) if one}
     if across and {"r", "a_y"} <= set(known):

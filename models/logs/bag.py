@@ -336,7 +336,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
         except CdrError:
             if not received:
                 raise
-            break  # which is told where it is read
+            break  # which is given where it is read
         received.append(time)
         if topic.stamp is not None:
             stamps.append(int(_stamps(layout, _rows([raw]), topic.stamp)[0]))

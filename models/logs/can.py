@@ -98,7 +98,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             f"{path}: has frames of a bus; give the DBC file of their signals, "
             'in the [file] of log.toml: dbc = "car.dbc"'
         )
-    told = _read_dbc(dbc)
+    given = _read_dbc(dbc)
     with one_line(path, "a CAN log"):
         with path.open("rb") as file:
             kind = frames_in(file.read(HEAD))
@@ -106,12 +106,12 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             raise RecordingError(
                 f"{path}: is no CAN log: neither ASC, BLF, candump, TRC, a table of frames nor MDF4"
             )
-        log = gather(path, kind, told.known)
-        senders = Counter((bus, told.known.named(one)) for bus, one in log.frames)
+        log = gather(path, kind, given.known)
+        senders = Counter((bus, given.known.named(one)) for bus, one in log.frames)
         found = [
-            (_group(bus, identifier, senders[bus, told.known.named(identifier)]), listed, place)
+            (_group(bus, identifier, senders[bus, given.known.named(identifier)]), listed, place)
             for (bus, identifier), frames in log.frames.items()
-            for listed, place in _channels(told, identifier, frames)
+            for listed, place in _channels(given, identifier, frames)
         ]
     said = tuple(
         f"{count} {what} frames are not read" for what, count in log.others.items() if count
@@ -133,16 +133,16 @@ def _group(bus: str, identifier: int, senders: int) -> str:
     return f"bus {bus}" + f" from {identifier & 0xFF:02X}" * (senders > 1)
 
 
-def _channels(told: _Dbc, identifier: int, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
+def _channels(given: _Dbc, identifier: int, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
     """Yield the signals that are sent in the frames of a message."""
-    named = told.known.named(identifier)
+    named = given.known.named(identifier)
     assert named is not None
-    message = told.messages[named]
+    message = given.messages[named]
     groups: dict[tuple[tuple[str, tuple[int, ...]], ...], _Group] = {}
     for signal in message.signals:
         selectors = _selectors(message, signal)
         key = tuple((one.name, ids) for one, ids in selectors)
-        faults = [told.faults.get((message.name, one.name), "") for one, _ in selectors]
+        faults = [given.faults.get((message.name, one.name), "") for one, _ in selectors]
         if any(faults):
             raise RecordingError(next(filter(None, faults)))
         if key not in groups:
@@ -157,7 +157,7 @@ def _channels(told: _Dbc, identifier: int, frames: Frames) -> Iterator[tuple[Lis
                 samples=group.t.size,
                 rate=typical_rate(group.t),
             )
-            yield listed, _Place(group, signal, told.faults.get((message.name, signal.name), ""))
+            yield listed, _Place(group, signal, given.faults.get((message.name, signal.name), ""))
 
 
 def _read_dbc(path: Path) -> _Dbc:

@@ -17,7 +17,7 @@ from models.limits import limits
 
 PREFIX = 4  # bytes
 ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
-# numpy's kind and bytes of what has a fixed size; no signals are what is told by a bool, or words.
+# numpy's kind and bytes of what has a fixed size; no signals are what is given by a bool, or words.
 NUMBERS = {
     **{f"int{8 * size}": f"i{size}" for size in (1, 2, 4, 8)},
     **{f"uint{8 * size}": f"u{size}" for size in (1, 2, 4, 8)},

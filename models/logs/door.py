@@ -1,7 +1,7 @@
 """The door that every log comes in by: its first bytes tell the format, not its name.
 
 A format is a line here, the function that opens it; it is imported only when such a file comes, so
-that the libraries it needs stay optional. How its first bytes look is told in `magic`.
+that the libraries it needs stay optional. How its first bytes look is given in `magic`.
 """
 
 import zlib
@@ -42,7 +42,7 @@ def open_log(
     path : of a file; of a folder, where a format keeps a log in one.
     mend : whether stamps that do not rise are mended, and not refused.
     clock, clock_unit : channel that is the time, where it is not what the format takes for it.
-    rate : of the samples [Hz], where no channel is a time; 0 where none is told.
+    rate : of the samples [Hz], where no channel is a time; 0 where none is given.
     """
     path = Path(path)
     if not path.exists():
@@ -51,8 +51,8 @@ def open_log(
         head = _head(path)
         packed = head.startswith(GZIP)
         format = format_of(path, _unpacked(head) if packed else head)
-        told: tuple[Any, ...] = () if dbc is None else (Path(dbc),)
-        if packed and (told or format != "text"):
+        given: tuple[Any, ...] = () if dbc is None else (Path(dbc),)
+        if packed and (given or format != "text"):
             raise RecordingError(
                 f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
             )
@@ -63,11 +63,11 @@ def open_log(
                     inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
             joined: LogFile = _function(_JOINED)(path, inside)
             return joined
-        format = "can" if told else format
+        format = "can" if given else format
         if rate and format not in _RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
-        told += (rate,) * (format == "matlab")
-        opened: Any = _function(OPENERS[format])(path, *told)
+        given += (rate,) * (format == "matlab")
+        opened: Any = _function(OPENERS[format])(path, *given)
         if isinstance(opened, TableLog) and opened.may_be_long:
             opened = _function(LONG)(opened.table) or opened
         more = {"rate": rate} if isinstance(opened, TableLog) else {}

@@ -43,7 +43,7 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
 def one_line(path: Path, format: str) -> Iterator[None]:
     """Let a library read a file: what it raises is a refusal, what it warns of is not said.
 
-    What is no fault of the file is not told of it: a full disk is said to be full, and MemoryError
+    What is no fault of the file is not reported as one: a full disk is one, and MemoryError
     stays what it is.
     """
     with _quiet():

@@ -258,8 +258,8 @@ def _of_table(path: Path) -> Iterator[_Frame]:
                 data = bytes.fromhex("".join(one.strip().removeprefix("0x") for one in rest))
                 # SavvyCAN counts whole microseconds, all others seconds.
                 time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
-                told = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
-                extended = told in ("true", "1") if told else identifier > SHORT
+                given = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
+                extended = given in ("true", "1") if given else identifier > SHORT
                 bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"
             except (ValueError, IndexError):
                 raise RecordingError(
@@ -275,9 +275,9 @@ def _require_whole_blf(path: Path) -> None:
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(144)
-        told = _FILE_SIZE.unpack_from(head, 16)[0]
-        if told > size:
-            raise RecordingError(f"{path}: is cut off, it has {size} of {told} bytes")
+        given = _FILE_SIZE.unpack_from(head, 16)[0]
+        if given > size:
+            raise RecordingError(f"{path}: is cut off, it has {size} of {given} bytes")
         file.seek(struct.unpack_from("<I", head, 4)[0])
         while len(mark := file.read(OBJECT.size)) == OBJECT.size:
             signature, _, _, length, kind = OBJECT.unpack(mark)

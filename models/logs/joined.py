@@ -84,8 +84,8 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     )
     if clock is None or clock.column in (name, value) or len(set(words)) == len(words):
         return None
-    told = table.first_rows(bare.index("unit")) if "unit" in bare else []
-    units = dict(zip(table.first_rows(name), told, strict=False))
+    given = table.first_rows(bare.index("unit")) if "unit" in bare else []
+    units = dict(zip(table.first_rows(name), given, strict=False))
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
     cells = table.cells(kinds)
     require_few(RecordingError, str(table.path), len(cells.words[name].names), "columns", "names")

@@ -1,7 +1,7 @@
 """What a logger wrote, before anything of it is understood: named channels, each on its own clock.
 
 A format reads a file and gives a `LogFile`; what the channels mean (which is v_y, in which unit,
-from which sensor) is told by a map, and only then a `Recording` in SI is made of them.
+from which sensor) is given by a map, and only then a `Recording` in SI is made of them.
 """
 
 import difflib

@@ -1,6 +1,6 @@
 """The first bytes by which a file tells its format, whatever its name; no library is needed for it.
 
-What is told here is which reader is asked; it judges the rest of the file.
+What is given here is which reader is asked; it judges the rest of the file.
 """
 
 import re

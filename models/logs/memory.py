@@ -26,7 +26,7 @@ class ArrayLog:
         from the first; empty takes the one called t or time.
     clock_unit : of it, where it is numbers; empty are seconds.
     mend : whether times that do not rise are mended, and not refused.
-    rate : of the samples [Hz], in place of a time; 0 where none is told.
+    rate : of the samples [Hz], in place of a time; 0 where none is given.
     """
 
     format = "arrays"

@@ -50,7 +50,7 @@ HAND = "steering wheel"  # an angle that wants a ratio
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
-# Units that are met where none is told, "" SI.
+# Units that are met where none is given, "" SI.
 UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
 _OBLIQUE = "its box is mounted obliquely: no axis of it is one of the car"
 SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
@@ -330,11 +330,11 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     groups: dict[str, dict[str, Heading]] = {}
     for one in map(_with_given_unit, headings):
         words = "_".join(words_of(without_ending(one.name, one.unit)))
-        told = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
+        possible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
-            if found and wanted in told and not of & _NO_POSE:
+            if found and wanted in possible and not of & _NO_POSE:
                 key = mark if mark == "h" else mark + found["axis"]
                 groups.setdefault(found["of"] or "", {}).setdefault(key, one)
                 break
@@ -389,7 +389,7 @@ def _with_signs(
 def _triads(headings: Sequence[Heading]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z."""
     named = map(_with_given_unit, headings)
-    units = {one.name: told.unit for one, told in zip(headings, named, strict=True)}
+    units = {one.name: possible.unit for one, possible in zip(headings, named, strict=True)}
     words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
     bad = REFERENCE | CORNERS
     return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
@@ -523,10 +523,10 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
             return guess
         loss = guess.confidence - _NO_UNIT_LOSS
         return replace(guess, confidence=loss, why="no unit in the file")
-    told, unit = quantities(one.unit), one.unit.strip()
-    if quantity in told:
+    possible, unit = quantities(one.unit), one.unit.strip()
+    if quantity in possible:
         return replace(guess, unit=unit)
-    near = quantity == RATE and ANGLE in told  # as some databases have it
+    near = quantity == RATE and ANGLE in possible  # as some databases have it
     return replace(
         guess,
         unit=f"{unit}/s" if near else "",

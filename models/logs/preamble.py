@@ -2,7 +2,7 @@
 
 Loggers put sample rates, venues and comments before the table; name columns in a line, in a
 comment or in a section; put units in the names, in a line of their own or nowhere; and set cells
-apart by commas, semicolons, tabs, bars or blanks, with decimal points or commas. All that is told
+apart by commas, semicolons, tabs, bars or blanks, with decimal points or commas. All that is given
 by the cells: whatever makes most of the last lines of the beginning numbers is how it was written,
 and upwards from there the first line that is not numbers is the header, or its units.
 """
@@ -69,7 +69,7 @@ class Layout:
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
     delimiter : one character, " " for any number of blanks and tabs.   decimal : "." or ",".
     thousands : what sets thousands apart in some cell, "" where nothing does.
-    units : of the columns, "" where none is told.
+    units : of the columns, "" where none is given.
     first : line of the first row of data, from 1; one beyond the header where there is none.
     again : lines of header and units, which may come again further down and are no data then.
     made_by : the logger or program whose format it is, "" where nothing tells.
@@ -542,9 +542,9 @@ def _with_channel_units(
     own = len(names) - len(listed)
     if own < 0 or any(name.lower() in _OF_THE_BOX for name in names[own:]):
         return list(units)
-    told = [unit if is_unit(unit) else "" for unit in listed]
-    for name, title, unit in zip(names[own:], units[own:], told, strict=True):
+    given = [unit if is_unit(unit) else "" for unit in listed]
+    for name, title, unit in zip(names[own:], units[own:], given, strict=True):
         said = title or unit_in_name(name)
         if said and unit and quantities(said) != quantities(unit):
             return list(units)
-    return [*units[:own], *(a or b for a, b in zip(units[own:], told, strict=True))]
+    return [*units[:own], *(a or b for a, b in zip(units[own:], given, strict=True))]

@@ -64,8 +64,8 @@ _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 def given_by(signals: Iterable[str]) -> set[str]:
     """Return what signals tell, by name; beta tells v_y, wheels v_x, a pose v_x, v_y and r."""
     stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
-    told = {stands_for.get(name, name) for name in signals}
-    return told | {"v_x", "v_y", "r"} if set(POSE) <= told else told
+    given = {stands_for.get(name, name) for name in signals}
+    return given | {"v_x", "v_y", "r"} if set(POSE) <= given else given
 
 
 def has_speed(signals: Iterable[str]) -> bool:

@@ -135,8 +135,8 @@ def no_clock(
     if way and not counted:
         return f"no column is a time: {shown(way[0])} is a distance; export the log over time"
     counts = f", {shown(counted[0])} counts samples" if counted else ""
-    told = "--rate HZ gives the samples per second, or --columns t=COLUMN the time"
-    return f"no column is a time that rises{counts}; {told}"
+    advice = "--rate HZ gives the samples per second, or --columns t=COLUMN the time"
+    return f"no column is a time that rises{counts}; {advice}"
 
 
 def _even(
@@ -209,11 +209,11 @@ def _is_beside(
 ) -> bool:
     """Return whether a time is that of other samples than the first one's, of the same drive."""
     times = []
-    for told, column in ((clock, cells), (first, first_cells)):
+    for advice, column in ((clock, cells), (first, first_cells)):
         numbers = [value for cell in column if (value := _number(cell)) is not None]
-        if told.unit not in PER_SECOND or len(numbers) < FEWEST:
+        if advice.unit not in PER_SECOND or len(numbers) < FEWEST:
             return False
-        times.append(np.array(numbers) / PER_SECOND[told.unit])
+        times.append(np.array(numbers) / PER_SECOND[advice.unit])
     if any((np.diff(t) <= 0.0).any() for t in times) or abs(times[0][0] - times[1][0]) > NEAR:
         return False
     if _plain(clock.name) == _plain(first.name):
@@ -262,10 +262,10 @@ def _clock(
         return Clock(column, name, kind, False, f"{name!r} as date or time of day, {words}")
     if kind == "hhmmss":
         return Clock(column, name, kind, False, f"{name!r} as hhmmss, {words}")
-    told = time_unit(unit)
-    found, epoch = _unit(t, told)
+    advice = time_unit(unit)
+    found, epoch = _unit(t, advice)
     since = " since 1970" if epoch else ""
-    guessed = "" if told else ", a unit that its steps tell (likely)"
+    guessed = "" if advice else ", a unit that its steps tell (likely)"
     return Clock(column, name, found, epoch, f"{name!r} in {found}{since}, {words}{guessed}")
 
 
@@ -293,14 +293,14 @@ def _rises_evenly(steps: Array) -> bool:
     return typical > 0.0 and bool((np.abs(steps - typical) <= 0.5 * typical).mean() > 0.9)
 
 
-def _unit(t: Array, told: str) -> tuple[str, bool]:
+def _unit(t: Array, advice: str) -> tuple[str, bool]:
     finite = t[np.isfinite(t)]
     largest = float(np.abs(finite).max()) if finite.size else 0.0
     for unit, (low, high) in _EPOCHS.items():
-        if low < largest < high and told in ("", unit) and _step(finite, unit) <= 10.0:
+        if low < largest < high and advice in ("", unit) and _step(finite, unit) <= 10.0:
             return unit, True
-    if told:
-        return told, False
+    if advice:
+        return advice, False
     if not _step(finite, "s") < _COARSEST:
         for unit in ("ms", "us", "ns"):
             if FASTEST <= _step(finite, unit) <= SLOWEST:

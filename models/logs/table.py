@@ -90,7 +90,7 @@ class Table(Protocol):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their units, "" where none is told."""
+        """Their units, "" where none is given."""
 
     @property
     def numeric(self) -> tuple[bool, ...]:
@@ -187,7 +187,7 @@ class Gathered:
 class TableLog:
     """A table as a log: which of its columns is the clock, and which names the runs.
     clock_name, clock_unit : of the column that is the time; empty finds them.
-    rate : of all samples [Hz], in place of a time; 0 where none is told.
+    rate : of all samples [Hz], in place of a time; 0 where none is given.
     mend : whether stamps that do not rise are mended, and not refused.
     """
 
@@ -244,13 +244,13 @@ class TableLog:
             name = bare[0] if len(bare) == 1 else name
         (column,) = chosen(self.path, [name], self._places)
         unit = self.clock_unit or table.units[column] or unit_in_name(self.clock_name)
-        told = given_clock(column, name, unit, table.first_rows(column))
-        if told is None:
+        given = given_clock(column, name, unit, table.first_rows(column))
+        if given is None:
             raise RecordingError(
                 f"{self.path}: {name} must be a time, its first cells are "
                 f"{shown(', '.join(table.first_rows(column)[:3]))}"
             )
-        return told
+        return given
 
     @property
     def may_be_long(self) -> bool:

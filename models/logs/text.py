@@ -70,7 +70,7 @@ class TextTable:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Units of the columns, "" where none is told."""
+        """Units of the columns, "" where none is given."""
         return self.layout.units
 
     @property

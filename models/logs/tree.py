@@ -52,7 +52,7 @@ Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
 class Clock(NamedTuple):
     """Times of samples.
 
-    leaf, column: where they are; unit: that is told of it, "" for none.
+    leaf, column: where they are; unit: that is given of it, "" for none.
     """
 
     name: str

@@ -293,8 +293,8 @@ def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
     empty = {name: count for name, count in counts.items() if count}
     if not empty:
         return ()
-    told = ", ".join(f"{count} of {name}" for name, count in empty.items())
-    return (f"cells without a value are cut out: {told}",)
+    given = ", ".join(f"{count} of {name}" for name, count in empty.items())
+    return (f"cells without a value are cut out: {given}",)
 
 
 def _gap_notes(segments: list[Segment]) -> tuple[str, ...]:
@@ -390,12 +390,12 @@ def _on_wheels(
             for name in ("r", "delta_f", "delta_r")
         }
         try:
-            told = rolled(speeds, **turns, wheels=wheels, dt=dt)
+            given = rolled(speeds, **turns, wheels=wheels, dt=dt)
         except RecordingError as error:
             raise RecordingError(f"{label}: {error}") from None
-        signals = {"v_x": told.v_x, **_without_wheels(one.signals)}
+        signals = {"v_x": given.v_x, **_without_wheels(one.signals)}
         found.append(one._replace(signals=signals))
-        gated, held, n = gated + told.gated, held + told.held, n + one.t.size
+        gated, held, n = gated + given.gated, held + given.held, n + one.t.size
     names = ", ".join(name for name in WHEELS if name in segments[0].signals)
     return found, (
         f"vx is computed from {names}: at {100.0 * gated / n:.2g} % of the samples a wheel "

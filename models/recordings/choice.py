@@ -1,6 +1,6 @@
 """Which channels of a log become which signals: told, by standard names, or beyond doubt.
 
-What is told by a map holds; then the standard names; then what the names of the channels propose,
+What is given by a map holds; then the standard names; then what the names of the channels propose,
 where every signal that is needed is sure. What was proposed is said in the recording's notes; where
 something is not sure, the error says what it may be, and the word that tells it.
 """
@@ -45,7 +45,7 @@ class Reading(NamedTuple):
 
 
 def column_of(name: str) -> str:
-    """Return what a signal is called where columns are told."""
+    """Return what a signal is called where columns are given."""
     return COLUMNS.get(name, name)
 
 
@@ -57,17 +57,17 @@ def chosen_signals(
     lost = _lost_text(log_map.signals, by_map)
     if log_map.is_complete:
         return Reading(by_map, lost)
-    told = _beside(standard_signals(log, names), by_map)
-    told = _without_wheels(told, by_map)
-    missing = missing_signals(told)
-    if has_v_y(told) and not missing:
-        return Reading(told, lost)
-    _refuse_words(log, missing if has_v_y(told) else ["v_y", *missing], run)
+    given = _beside(standard_signals(log, names), by_map)
+    given = _without_wheels(given, by_map)
+    missing = missing_signals(given)
+    if has_v_y(given) and not missing:
+        return Reading(given, lost)
+    _refuse_words(log, missing if has_v_y(given) else ["v_y", *missing], run)
     proposal = propose(log, headings, run)
-    found = _without_wheels(likely_signals(told, proposal), by_map)
+    found = _without_wheels(likely_signals(given, proposal), by_map)
     if missing := missing_signals(found):
         raise RecordingError(missing_text(log, missing, proposal, names))
-    notes = [_taken_text(name, found[name]) for name in found if name not in told]
+    notes = [_taken_text(name, found[name]) for name in found if name not in given]
     if aside := aside_text(found, proposal):
         notes.append(aside)
     return Reading(found, (*lost, *notes))
@@ -79,7 +79,7 @@ def as_listed(
     """Return signals with the names of their channels as the log lists them.
 
     A channel that is listed with its unit, "Vel Lat [km/h]", may be told without. A v_x that is
-    not there is left out where wheels are told.
+    not there is left out where wheels are given.
     """
     bare: dict[str, list[str]] = {}
     for one in names:
@@ -103,16 +103,16 @@ def as_listed(
     return found
 
 
-def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
-    """Return what is told, and what a proposal is sure of beside it, in the order of signals."""
-    sure = {name: one for name, one in proposal.signals().items() if name not in told}
-    if has_wheels(told):
+def likely_signals(given: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
+    """Return what is given, and what a proposal is sure of beside it, in the order of signals."""
+    sure = {name: one for name, one in proposal.signals().items() if name not in given}
+    if has_wheels(given):
         sure.pop("v_x", None)
-    if "v_y" in given_by(told) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
+    if "v_y" in given_by(given) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
         sure = {name: one for name, one in sure.items() if name not in POSE}
-    if "v_x" in given_by(told) or "v_x" in proposal.guesses:
+    if "v_x" in given_by(given) or "v_x" in proposal.guesses:
         sure = {name: one for name, one in sure.items() if name not in WHEELS}
-    found = _beside(sure, told)
+    found = _beside(sure, given)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
     if not set(POSE) <= set(found):
@@ -186,10 +186,10 @@ def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
     return result
 
 
-def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Return signals that are told, and more where they are not; beta and v_y exclude another."""
-    kept = {name: one for name, one in more.items() if INSTEAD.get(name) not in told}
-    found = {**kept, **told}
+def _beside(more: Mapping[str, Signal], given: Mapping[str, Signal]) -> dict[str, Signal]:
+    """Return signals that are given, and more where they are not; beta and v_y exclude another."""
+    kept = {name: one for name, one in more.items() if INSTEAD.get(name) not in given}
+    found = {**kept, **given}
     if "v_y" in found:
         found.pop(BETA, None)
     return found
@@ -218,11 +218,11 @@ def _taken_text(name: str, signal: Signal) -> str:
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
 
 
-def _lost_text(told: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tuple[str, ...]:
+def _lost_text(given: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tuple[str, ...]:
     """Return what is said where the v_x that a map tells is not in the log, and wheels are."""
-    if "v_x" not in told or "v_x" in listed:
+    if "v_x" not in given or "v_x" in listed:
         return ()
-    channels = " + ".join(told["v_x"].channel)
+    channels = " + ".join(given["v_x"].channel)
     return (f"there is no column {shown(channels)}: vx is computed from the wheels",)
 
 

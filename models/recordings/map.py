@@ -143,11 +143,11 @@ class LogMap:
         """
         data = read_toml(Path(path), RecordingError)
         try:
-            told = cls._of_table(Table(data, "", RecordingError))
+            declared = cls._of_table(Table(data, "", RecordingError))
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}") from None
-        beside = Path(path).parent / told.dbc
-        return replace(told, dbc=str(beside)) if told.dbc and beside.is_file() else told
+        beside = Path(path).parent / declared.dbc
+        return replace(declared, dbc=str(beside)) if declared.dbc and beside.is_file() else declared
 
     @classmethod
     def _of_table(cls, table: Table) -> "LogMap":
@@ -192,9 +192,9 @@ class LogMap:
             ("clock", clock | {key: key for key in ("rate", "longest_gap", "holes", "order")}),
             ("filters", {"low_pass": "low_pass"}),
         ):
-            told = {key: getattr(self, ours) for key, ours in keys.items()}
+            declared = {key: getattr(self, ours) for key, ours in keys.items()}
             usual = {key: getattr(plain, ours) for key, ours in keys.items()}
-            blocks.append(_block(table, {k: v for k, v in told.items() if v != usual[k]}))
+            blocks.append(_block(table, {k: v for k, v in declared.items() if v != usual[k]}))
         for name in QUANTITIES:
             if name in self.signals:
                 blocks.append(_block(f"signals.{name}", _signal_numbers(self.signals[name])))
@@ -253,15 +253,15 @@ def _signal(table: Table, name: str) -> Signal:
 
 
 def _signal_numbers(signal: Signal) -> dict[str, Any]:
-    """Return what is told of a signal, beyond what holds where nothing is."""
+    """Return what is given of a signal, beyond what holds where nothing is."""
     plain = Signal(channel=signal.channel)
-    told = {
+    declared = {
         key: getattr(signal, key)
         for key in _SIGNAL_KEYS[1:]
         if getattr(signal, key) != getattr(plain, key)
     }
     channel = signal.channel[0] if len(signal.channel) == 1 else signal.channel
-    return {"channel": channel, **told}
+    return {"channel": channel, **declared}
 
 
 def _block(name: str, values: Mapping[str, Any]) -> str:
@@ -283,7 +283,7 @@ def _value(value: Any) -> str:
 
 
 def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
-    """Return signals as they are told on a command line.
+    """Return signals as they are given on a command line.
 
     "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
     "delta_f=SteerFL + SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a

@@ -19,7 +19,7 @@ from models.vehicle import Vehicle, sedan
 
 _NO_NAMES: Mapping[str, str] = {}
 DT = 0.01  # [s], the sample time of every method
-Told = LogMap | str | PathLike[str] | None
+GivenMap = LogMap | str | PathLike[str] | None
 
 
 def read_recording(
@@ -30,7 +30,7 @@ def read_recording(
     name: str = "",
     check: bool = True,
     columns: Mapping[str, str] = _NO_NAMES,
-    log_map: Told = None,
+    log_map: GivenMap = None,
 ) -> Recording:
     """Read one run of a log, a file or arrays in memory, and bring it to a uniform sample time.
 
@@ -67,21 +67,21 @@ def read_recording(
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    told = with_columns(map_of(log_map), columns)
+    given = with_columns(map_of(log_map), columns)
     if not isinstance(source, str | PathLike):
         name = name or "recording"
         arrays = ArrayLog(
             name,
             source,
-            told.clock,
-            told.clock_unit,
-            mend=told.order == MEND,
-            rate=told.rate or 0.0,
+            given.clock,
+            given.clock_unit,
+            mend=given.order == MEND,
+            rate=given.rate or 0.0,
         )
-        return _judged(arrays, name, replace(told, clock=""), run=run, dt=dt, check=check)
+        return _judged(arrays, name, replace(given, clock=""), run=run, dt=dt, check=check)
     path = Path(source)
-    log = told.opened(path)
-    return _judged(log, name or _stem(path), told, run=run, dt=dt, check=check)
+    log = given.opened(path)
+    return _judged(log, name or _stem(path), given, run=run, dt=dt, check=check)
 
 
 def read_repaired(
@@ -92,7 +92,7 @@ def read_repaired(
     *,
     check: bool = True,
     columns: Mapping[str, str] = _NO_NAMES,
-    log_map: Told = None,
+    log_map: GivenMap = None,
 ) -> tuple[Recording, Vehicle]:
     """Read one run of a log and take out what the map's repair says, of the log and of the car.
 
@@ -107,13 +107,13 @@ def read_repaired(
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    told = with_columns(map_of(log_map), columns)
-    told = replace(told, wheels=told.wheels.completed(told.repair.on(vehicle)))
-    judged = check and not told.repair
-    recording = read_recording(path, run, dt, check=judged, log_map=told)
-    if told.repair:
-        recording, vehicle = told.repair.apply(recording, vehicle)
-        note = f"repaired by the map: {repair_text(told.repair)}"
+    given = with_columns(map_of(log_map), columns)
+    given = replace(given, wheels=given.wheels.completed(given.repair.on(vehicle)))
+    judged = check and not given.repair
+    recording = read_recording(path, run, dt, check=judged, log_map=given)
+    if given.repair:
+        recording, vehicle = given.repair.apply(recording, vehicle)
+        note = f"repaired by the map: {repair_text(given.repair)}"
         recording = replace(recording, notes=(*recording.notes, note))
         if check:
             check_physics(recording)
@@ -131,36 +131,36 @@ def repair_text(repair: Repair) -> str:
     return ", ".join(words)
 
 
-def map_of(told: Told) -> LogMap:
+def map_of(given: GivenMap) -> LogMap:
     """Return a map that may be given as a path; an empty one where there is none.
-    told : a map, the path of a log.toml, or None.
+    given : a map, the path of a log.toml, or None.
     """
-    if told is None:
+    if given is None:
         return LogMap()
-    return told if isinstance(told, LogMap) else LogMap.from_toml(told)
+    return given if isinstance(given, LogMap) else LogMap.from_toml(given)
 
 
-def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
-    """Return a map with columns that are told beside it; "t" is the time."""
+def with_columns(given: LogMap, columns: Mapping[str, str]) -> LogMap:
+    """Return a map with columns that are given beside it; "t" is the time."""
     if not isinstance(columns, Mapping):
         raise RecordingError(
             f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
         )
     signals = {name: words for name, words in columns.items() if name != "t"}
-    told = told.with_signals(given_signals([f"{a}={b}" for a, b in signals.items()]))
+    given = given.with_signals(given_signals([f"{a}={b}" for a, b in signals.items()]))
     if "t" not in columns:
-        return told
+        return given
     clock = given_channel(columns["t"])
-    return replace(told, clock=" + ".join(clock.channel), clock_unit=clock.unit, rate=None)
+    return replace(given, clock=" + ".join(clock.channel), clock_unit=clock.unit, rate=None)
 
 
 def _judged(
-    log: LogFile, name: str, told: LogMap, *, run: str | None, dt: float, check: bool
+    log: LogFile, name: str, given: LogMap, *, run: str | None, dt: float, check: bool
 ) -> Recording:
-    recording = recording_of(log, name, told, run=run, dt=dt)
+    recording = recording_of(log, name, given, run=run, dt=dt)
     if check:
         try:
-            check_physics(_without_faults(recording, told.repair))
+            check_physics(_without_faults(recording, given.repair))
         except RecordingError as error:
             label = f"{log.path}{recording.name.removeprefix(name)}"
             raise RecordingError(label + str(error).removeprefix(recording.name)) from None

@@ -87,16 +87,16 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
-        told = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
+        declared = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
         if self.acceleration_sensor_x:
-            told.add("a_y")
+            declared.add("a_y")
         turned = self.velocity_sensor_angle or self.velocity_sensor_x
         if self.sideslip or turned:
-            told.add("v_y")
+            declared.add("v_y")
         for name in CHANNELS:
-            if name in told and getattr(recording, name) is None:
+            if name in declared and getattr(recording, name) is None:
                 raise RecordingError(f"{recording.name}: has no {name} that could be repaired")
-        if not told:
+        if not declared:
             return recording, self.on(vehicle)
         n, t = len(recording), recording.t
         signals: dict[str, Array] = {

@@ -37,7 +37,7 @@ class Scale(NamedTuple):
 def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
     """Return what a wheel in SI, turns or a speed, is multiplied by to be a speed.
 
-    Where no unit is written, a radius that is told says that the numbers are turns.
+    Where no unit is written, a radius that is given says that the numbers are turns.
     """
     radius = wheels.radius_of(name)
     if not is_given(unit):
@@ -70,10 +70,10 @@ def identified_scales(
     for name in WHEELS:
         if name not in parts:
             continue
-        told = identified_scale(t, v_x, r, at(name))
-        if told is None:
+        given = identified_scale(t, v_x, r, at(name))
+        if given is None:
             continue
-        value, seconds = told
+        value, seconds = given
         unit, (low, high) = units[name], SPEEDS
         speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
         turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
@@ -112,12 +112,12 @@ def scale_text(scales: Mapping[str, Scale]) -> str:
     """Return in words what v_x told of wheels; empty where it told nothing."""
     if not scales:
         return ""
-    told = ", ".join(
+    given = ", ".join(
         f"{name} {one.value:.4g} m" if one.turns else f"{name} {one.value:.4g} times its speed"
         for name, one in scales.items()
     )
     seconds = min(one.seconds for one in scales.values())
-    return f"wheels roll by vx, over {seconds:.0f} s of straight driving: {told}"
+    return f"wheels roll by vx, over {seconds:.0f} s of straight driving: {given}"
 
 
 def with_scales(

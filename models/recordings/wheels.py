@@ -88,9 +88,9 @@ class Wheels:
 
     def table(self) -> dict[str, Any]:
         """Return it as a document holds it: what differs from the defaults."""
-        told = {one.name: getattr(self, one.name) for one in fields(self)}
+        declared = {one.name: getattr(self, one.name) for one in fields(self)}
         plain = {one.name: one.default for one in fields(self)}
-        changed = {name: value for name, value in told.items() if value != plain[name]}
+        changed = {name: value for name, value in declared.items() if value != plain[name]}
         return {
             name: value[0] if isinstance(value, tuple) and len(value) == 1 else value
             for name, value in changed.items()

@@ -49,7 +49,7 @@ def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
 
 
 def can_scale(tire: PredictionTire) -> bool:
-    """Return whether a tire can be told for another friction."""
+    """Return whether a tire can be scaled to another friction."""
     return tire.structure.at_friction(tire.weights, 1.0) is not None
 
 

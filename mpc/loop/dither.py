@@ -1,6 +1,6 @@
 """A weave that teaches while the car drives its path: off unless it is asked for.
 
-The path that the tracker is told is displaced sideways by d = g A (0.6 sin ωt + 0.4 sin 1.618 ωt),
+The path that the tracker is given is displaced sideways by d = g A (0.6 sin ωt + 0.4 sin 1.618 ωt),
 with its curvature ahead (κ + d̈/v²) and its heading (ḋ/v): the tracker plans it as it plans any
 path, and the deviation from the true path bears it, at most A. g, from 0 to 1, follows within a
 second what is still unknown, and the lateral acceleration that bends ahead leave free: a car that
@@ -26,7 +26,7 @@ USED = 0.7  # share of the grip that path and weave may take together
 
 @dataclass(slots=True, kw_only=True)
 class Dither:
-    """Displaces the path that a tracker is told.
+    """Displaces the path that a tracker is given.
 
     Parameters
     ----------
@@ -65,20 +65,20 @@ class Dither:
         omega = 2.0 * math.pi * FREQUENCY / self.vehicle.froude_time
         return self.amplitude * omega**2 * (SHARES[0] + SHARES[1] * RATIO**2)
 
-    def displaced(self, told: Measurement, t: float, times: Array, period: float) -> Measurement:
-        """Return what the tracker is told in place of a measurement.
+    def displaced(self, given: Measurement, t: float, times: Array, period: float) -> Measurement:
+        """Return what the tracker is given in place of a measurement.
 
-        t : now [s].   times : after which the road ahead is told [s], (k,).
+        t : now [s].   times : after which the road ahead is given [s], (k,).
         period : since the last one [s].
         """
-        bends = float(np.abs(told.kappa * told.v_x**2).max())
+        bends = float(np.abs(given.kappa * given.v_x**2).max())
         free = (USED * self.grip - bends) / self.acceleration
         wanted = min(1.0 if self.need is None else self.need(), max(free, 0.0), 1.0)
         self.strength += min(period / FOLLOWS, 1.0) * (wanted - self.strength)
         d, rate, acceleration = (self.strength * one for one in self.displacement(t + times))
-        v_x = np.maximum(told.v_x, 1e-3)
-        return told._replace(
-            e_y=told.e_y - float(d[0]),
-            e_psi=told.e_psi - math.atan(float(rate[0] / v_x[0])),
-            kappa=told.kappa + acceleration / v_x**2,
+        v_x = np.maximum(given.v_x, 1e-3)
+        return given._replace(
+            e_y=given.e_y - float(d[0]),
+            e_psi=given.e_psi - math.atan(float(rate[0] / v_x[0])),
+            kappa=given.kappa + acceleration / v_x**2,
         )

@@ -115,9 +115,9 @@ def drive(
     ending = ""
     while not ending:
         shown = measured = sensors.measure(state, rng)
-        told = None if lateral is None else lateral.tell(shown)
-        if told is not None:
-            measured = told.in_place_of(shown)
+        given = None if lateral is None else lateral.tell(shown)
+        if given is not None:
+            measured = given.in_place_of(shown)
         place = _located(measured, place, car.period)
         for channel in place.just_lost(car.period):
             record.note(state.t, f"{channel} is no number: dead reckoning")
@@ -141,7 +141,7 @@ def drive(
         if record.plan_is_due:
             there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)
             record.plan(command, there.s)
-        record.add(state, here, shown, v_ref, command, told)
+        record.add(state, here, shown, v_ref, command, given)
         waiting.append(command.steering)
         try:
             state = car.step(state, waiting.popleft(), v_ref)

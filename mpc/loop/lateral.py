@@ -1,4 +1,4 @@
-"""The lateral velocity of a car that nothing measures it of: told online, with its uncertainty.
+"""The lateral velocity of a car without a sensor of it, estimated online with its uncertainty.
 
 Two that err differently are one: an inertial identifier, which knows what tires do, and position,
 which knows where the car came to. A Kalman filter of what the dead reckoned place misses:
@@ -27,8 +27,8 @@ UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
 FINEST = 1e-3  # m/s: least deviation that is believed
 
 
-class Told(NamedTuple):
-    """What is told of a sample; NaN where nothing is known.
+class LateralEstimate(NamedTuple):
+    """What is given of a sample; NaN where nothing is known.
 
     v_y, v_y_sd : lateral velocity and its standard deviation [m/s].   observable : 1 where side
     slip is known well enough, else 0.   a_y : acceleration of the center of gravity in the plane of
@@ -44,14 +44,14 @@ class Told(NamedTuple):
     inertial_v_y_sd: float
 
     def in_place_of(self, measured: Measured) -> Measured:
-        """Return a sample with what is told of v_y and a_y in it."""
+        """Return a sample with what is given of v_y and a_y in it."""
         return measured._replace(v_y=self.v_y, a_y=self.a_y)
 
 
 class TellsLateral(Protocol):
     """What a loop asks for lateral velocity where no sensor shows it."""
 
-    def tell(self, measured: Measured) -> Told:
+    def tell(self, measured: Measured) -> LateralEstimate:
         """Take a sample; return what it tells.
 
         measured : by the sensors; v_y is not read.
@@ -72,7 +72,7 @@ class Localization:
     correlation_time : for which the identifier errs alike [s].
     clip : standard deviations from which an innovation counts no more.
     lost : rate at which v_y may change where no acceleration is shown [m/s²].
-    observable : largest standard deviation of side slip that is told for observed [rad].
+    observable : largest standard deviation of side slip that counts as observed [rad].
     """
 
     position: float = 0.025
@@ -96,7 +96,7 @@ class LateralVelocity:
 
     Parameters
     ----------
-    identifier : of a method that tells v_y; it is told every sample here, and learns.
+    identifier : of a method that tells v_y; it is given every sample here, and learns.
     localization : how far position and heading are trusted; None takes the default.
     body : how it rolls; None takes what the chassis of the identifier's vehicle tells.
     """
@@ -121,7 +121,7 @@ class LateralVelocity:
         self._surprise = 1.0  # mean square of the identifier's errors over what it tells of them
         self._last: tuple[Measured, float] | None = None  # a sample ago, and a + b - v_x r of it
 
-    def tell(self, measured: Measured) -> Told:
+    def tell(self, measured: Measured) -> LateralEstimate:
         """Take a sample; return what it tells.
 
         measured : by the sensors; v_y is not read.
@@ -147,7 +147,7 @@ class LateralVelocity:
             self._listen(v_y, sd)
         deviation = math.sqrt(self._P[1, 1])
         observable = float(deviation < self.trust.observable * m.v_x)
-        return Told(self._v_y, deviation, observable, level, v_y, sd)
+        return LateralEstimate(self._v_y, deviation, observable, level, v_y, sd)
 
     def _listen(self, v_y: float, sd: float) -> None:
         """Correct by the identifier's v_y [m/s], as far as it has been as right as it says."""

@@ -11,7 +11,7 @@ from codegen.arrays import Array
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from mpc.cars import CarState
-from mpc.loop.lateral import Told
+from mpc.loop.lateral import LateralEstimate
 from mpc.loop.sensing import Measured
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Status
@@ -55,7 +55,8 @@ class Drive:
         (n,).
     measured : what the sensors said, by the names of `Measured`, (n,) each; v_y is not among them
         where nothing measures it.
-    estimates : v_y in its place, by the names of `Told`, (n,) each; empty where it is measured.
+    estimates : v_y in its place, by the names of `LateralEstimate`, (n,) each; empty where v_y is
+        measured.
     status : of the tracker, by its number, (n,).
     solve_time : of the tracker [s], (n,).
     notes : what the learner said and when [s].
@@ -98,7 +99,7 @@ class Drive:
     def recording(self) -> Recording:
         """Return what an identifier would read of it: measured signals, axle forces as truth.
 
-        Where nothing measures v_y, it is what was told, and marked as that: no method is shown it.
+        Where nothing measures v_y, it is what was given, and marked as that: no method is shown it.
         """
         return Recording(
             name=self.name,
@@ -130,7 +131,7 @@ class Recorder:
         self._plan_every = plan_every
         self._cars: list[CarState] = []
         self._measured: list[Measured] = []
-        self._told: list[Told] = []
+        self._told: list[LateralEstimate] = []
         self._others: list[tuple[float, ...]] = []
         self._plans: list[Plan] = []
         self._notes: list[tuple[float, str]] = []
@@ -163,14 +164,14 @@ class Recorder:
         measured: Measured,
         v_ref: float,
         command: Command,
-        told: Told | None = None,
+        given: LateralEstimate | None = None,
     ) -> None:
         """Keep a period.
 
         v_ref : wanted speed [m/s].
         """
-        if told is not None:
-            self._told.append(told)
+        if given is not None:
+            self._told.append(given)
         self._cars.append(state)
         self._measured.append(measured)
         e_psi = here.heading_error(state.psi)
@@ -191,12 +192,12 @@ class Recorder:
         completed: bool,
         ending: str,
     ) -> Drive:
-        """Return the drive; its control period is told in s."""
+        """Return the drive; its control period is given in s."""
         others = dict(zip(OTHERS, np.array(self._others).T, strict=True))
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
-        told: dict[str, Array] = {}
+        given: dict[str, Array] = {}
         if self._told:
-            told = dict(zip(Told._fields, np.array(self._told).T, strict=True))
+            given = dict(zip(LateralEstimate._fields, np.array(self._told).T, strict=True))
             del measured["v_y"]
         return Drive(
             name=name,
@@ -207,7 +208,7 @@ class Recorder:
             status=others.pop("status").astype(np.int64),
             **others,
             measured=measured,
-            estimates=told,
+            estimates=given,
             plans=tuple(self._plans),
             notes=tuple(self._notes),
             completed=completed,
@@ -273,7 +274,7 @@ class EstimateScores(NamedTuple):
 
 
 def estimate_scores(drive: Drive) -> EstimateScores | None:
-    """Return how right the v_y was that was told over a drive; None where sensors showed it."""
+    """Return how right the v_y was that was given over a drive; None where sensors showed it."""
     if not drive.estimates:
         return None
 

@@ -183,7 +183,7 @@ class FaultySensors:
         return shown
 
 
-# The wanted speed along a path, and what a tracker is told of the road ahead.
+# The wanted speed along a path, and what a tracker is given of the road ahead.
 #
 # v(s): wanted speed [m/s] at the samples of the path. The car's speed v_x runs to it with the time
 # constant 1/k of the driver's gain, so that ahead it is v(s(t)) + (v_x - v(s)) exp(-k t).

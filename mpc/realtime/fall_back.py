@@ -1,7 +1,7 @@
 """Steering without a plan: optimal feedback to the path, by speed, of the car that its file states.
 
 x = [e_y, e_ψ, v_y, r, δ] off the steady turn of the path: deviation [m], heading [rad], lateral
-velocity [m/s], yaw rate [rad/s], angle of the wheels [rad].   u: steering that is told [rad].
+velocity [m/s], yaw rate [rad/s], angle of the wheels [rad].   u: steering that is given [rad].
 The linear bicycle with the vehicle's own cornering stiffness, so that nothing that was learnt, and
 may be what the solver failed at, reaches it. The delay is a lag of its length.
 """
@@ -63,7 +63,7 @@ def fall_back(
 
 def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
     """Return A (5, 5) and B (5, 1) of ẋ = A x + B u at a speed.
-    v_x : longitudinal speed [m/s].   lag : of the wheels behind what is told [s].
+    v_x : longitudinal speed [m/s].   lag : of the wheels behind what is given [s].
     """
     m, I_z, l_f, l_r, C_f, C_r = vehicle.bicycle
     moment = C_f * l_f - C_r * l_r

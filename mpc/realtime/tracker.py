@@ -106,7 +106,7 @@ class Tracker:
 
     @property
     def steering(self) -> float:
-        """Angle that the last step told to steer [rad]."""
+        """Angle that the last step asked for [rad]."""
         return float(self.instance.steering)
 
     @property
@@ -176,7 +176,7 @@ class Tracker:
         """Do ahead of the next measurement what does not ask for it; return the time it took [s].
 
         The step is a sweep then: its `solve_time_s` is the latency from measurement to command. On
-        another road than it is told with the measurement, or without a plan, it does all itself.
+        another road than it is given with the measurement, or without a plan, it does all itself.
         kappa : curvature [1/m] that the next measurement will tell, at `times`, (N + 1,).
         v_x : speed [m/s] that it will tell, (N + 1,).
         """

@@ -76,7 +76,8 @@ class LadderAxles(TireStructure):
             load * ca.dot(axle.W, ca.tanh(per_scale * x))
             for axle, x, load in zip(axles, slip, self._loads(at), strict=True)
         )
-        cos_delta = 1 - at.delta**2 / 2 + at.delta**4 / 24  # as the frozen axle model has it
+        delta = (1 + at.w[self.n_weights - 1]) * at.delta if self.mounted else at.delta
+        cos_delta = 1 - delta**2 / 2 + delta**4 / 24  # as the frozen axle model has it
         return front * cos_delta, rear
 
     def lag_length(self, slip: Pair, at: Point) -> Pair:
@@ -159,7 +160,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
         offset=(model.own[0, 2], model.own[1, 2]),
         downforce=_downforce(model.vehicle),
     )
-    mounted = any(model.sensors)
+    mounted = any((model.sensors.v_y_angle, model.sensors.steering_gain))
     if mounted:
         weights = np.append(weights, [model.sensors.v_y_angle, model.sensors.steering_gain])
     doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
@@ -312,7 +313,7 @@ def _fitted_tire(
 ) -> PredictionTire:
     ladder, W = fitted_ladder(alpha, force)
     least = np.zeros(2) if lengths is None else lengths
-    told, pressed = _downforce(vehicle), vehicle.has_downforce
-    weights = ladder_weights(ladder, W, compliance=np.zeros(2), least=least, downforce=told)
+    given, pressed = _downforce(vehicle), vehicle.has_downforce
+    weights = ladder_weights(ladder, W, compliance=np.zeros(2), least=least, downforce=given)
     structure = LadderAxles(units=ladder.size, lagged=lengths is not None, pressed=pressed)
     return PredictionTire(structure, weights, vehicle)

@@ -118,7 +118,7 @@ RELATIVE, FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire miss
 class PredictionTire(NamedTuple):
     """A structure with its weights (n_weights,), and the car that they are of.
     doubt : half the band of 90 % of the axle forces at slips 0, 0.02, … 0.5 rad [N], (2, 26); None
-        where nobody told.
+        where none is given.
     """
 
     structure: TireStructure
@@ -132,7 +132,7 @@ class PredictionTire(NamedTuple):
         return np.array(self.vehicle.bicycle[:4])
 
     def doubt_or_told(self) -> Array:
-        """Return the doubt (2, 26) [N]; where nobody told it, that of a tire learnt well."""
+        """Return the doubt (2, 26) [N]; where none is given, that of a tire learnt well."""
         if self.doubt is not None:
             return self.doubt
         slip = DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)

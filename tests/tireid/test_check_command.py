@@ -172,7 +172,7 @@ def test_the_default_is_judged_along_a_log_on_the_slip_that_it_learns_there(caps
     assert code == 0 and json.loads(said.out)["verdict"] == "pass"
     for axle in ("front", "rear"):
         error = found[f"along/{axle}/force_error"]
-        parts = [found[f"along/{axle}/{name}"]["value"] for name in ("told", "begin", "moved")]
+        parts = [found[f"along/{axle}/{name}"]["value"] for name in ("declared", "begin", "moved")]
         assert error["value"] == pytest.approx(sum(parts)) and error["value"] < 0.1
         assert found[f"along/{axle}/opposes"]["value"] > 1.0
     assert found["along/jump"]["value"] <= found["jump"]["value"]

@@ -26,7 +26,7 @@ from tireid.fleet.merge import (
     sizes,
     usable,
 )
-from tireid.fleet.store import TOLD, LogRow, Store, information_columns
+from tireid.fleet.store import OBSERVABLE, LogRow, Store, information_columns
 from tireid.fleet.watch import Alarm, Watching, change_from, watch
 
 pyarrow = pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
@@ -34,7 +34,7 @@ pytest.importorskip("fsspec", reason="needs pyarrow and fsspec")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 CAR = replace(sedan(), chassis=None)
-Q = len(TOLD)
+Q = len(OBSERVABLE)
 SCALES = np.append(np.full(20, 0.05), np.full(Q - 20, 0.02))  # of u that a residual of 1 is worth
 
 
@@ -42,10 +42,10 @@ def told_of(p, rng, *, seconds=60.0, noise=0.0):
     """Information of random residuals, linear in u, of parameters (p,)."""
     u, _ = coordinates(p)
     J = rng.normal(size=(200, Q)) / SCALES / 4.0
-    y = J @ u[TOLD] + noise * rng.normal(size=200)
+    y = J @ u[OBSERVABLE] + noise * rng.normal(size=200)
     matrix, vector = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
-    matrix[np.ix_(TOLD, TOLD)] = 0.5 * (J.T @ J + (J.T @ J).T)
-    vector[TOLD] = J.T @ y
+    matrix[np.ix_(OBSERVABLE, OBSERVABLE)] = 0.5 * (J.T @ J + (J.T @ J).T)
+    vector[OBSERVABLE] = J.T @ y
     return Information(matrix=matrix, vector=vector, seconds=seconds)
 
 

@@ -53,7 +53,7 @@ class KnownCurves(NamedTuple):
 
     t : (m,) [s].   alpha : slip [rad], (k,).   steering, learnt : forces of what is steered by and
     of what was learnt by then [N], (m, k, 2), NaN where there was none.   slip : up to which that
-    is known [rad], (m, 2), NaN where it cannot be told.
+    is known [rad], (m, 2), NaN where it is not known.
     """
 
     t: Array

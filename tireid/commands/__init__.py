@@ -38,7 +38,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
 
 GROUP = "tireid.commands"  # of entry points
 
-# Exit codes: how a command ends, told to the shell.
+# Exit codes: how a command ends, for the shell.
 DONE = 0
 FAILS = 1  # a check that was asked for fails
 BAD_INPUT = 2

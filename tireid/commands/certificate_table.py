@@ -60,8 +60,8 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
     else:
         lines += ["no limits are enforced by construction"]
     if certificate.properties:
-        told = f"at {driving.v_x:.3g} m/s on a friction of {driving.friction:g}"
-        lines += [f"proven, of drops of friction {told}:", certificate_text(certificate, 1.0)]
+        conditions = f"at {driving.v_x:.3g} m/s on a friction of {driving.friction:g}"
+        lines += [f"proven, of drops of friction {conditions}:", certificate_text(certificate, 1.0)]
         return "\n".join(lines)
     return "\n".join(
         [

@@ -50,16 +50,16 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 1 where a signal that is needed is missing or not sure."""
     path, named = split_log_argument(options.log)
-    told = given_map(options)
+    log_map = given_map(options)
     if options.write is not None:
         require_toml(options.write)
         require_free(options.write, force=options.force)
-    log = told.opened(path)
-    chosen = _run_of(log, options.run_name or named or told.run)
+    log = log_map.opened(path)
+    chosen = _run_of(log, options.run_name or named or log_map.run)
     listed = log.listed()
     names = [one.name for one in listed]
     proposal = propose(log, log.headings(), chosen)
-    by_map = choice.as_listed(log, told.signals, names)
+    by_map = choice.as_listed(log, log_map.signals, names)
     sure = {**choice.standard_signals(log, names), **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
@@ -69,15 +69,15 @@ def run(options: argparse.Namespace) -> int:
     tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)))
     empty = _holes_text(seen, signals)
     if empty:
-        cut = "cut out, as given" if told.holes == CUT else _CUT_BY_MAP
+        cut = "cut out, as given" if log_map.holes == CUT else _CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
-        told = replace(told, holes=CUT)
+        log_map = replace(log_map, holes=CUT)
     aside = [] if "v_y" in missing else choice.aside_signals(signals, proposal)
     if aside:
         tell(choice.aside_text(signals, proposal))
     elif not choice.has_v_y(signals) and not missing:
         tell(f"{choice.column_of('a_y')} is there: without vy, identify estimates it")
-    said, of_wheels, rolls = _wheels(log, signals, told, chosen)
+    said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
     if rolls or missing:
         tell(missing_text(options.log, missing, proposal, signals))
     if said:
@@ -97,23 +97,23 @@ def _run_of(log: LogFile, name: str) -> str | None:
 
 
 def _wheels(
-    log: LogFile, signals: Mapping[str, Signal], told: LogMap, run: str | None
+    log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
 ) -> tuple[str, LogMap, bool]:
     """Return what is said of wheels, the map with what is learnt, and whether v_x is known."""
-    plain = replace(told, signals=signals)
+    plain = replace(log_map, signals=signals)
     if not choice.has_wheels(signals):
         return "", plain, True
     if "v_x" in signals:
         try:
-            scales = wheel_scales(log, signals, told, run)
+            scales = wheel_scales(log, signals, log_map, run)
         except RecordingError as error:
             kept = replace(plain, signals={n: one for n, one in signals.items() if n not in WHEELS})
             return f"the wheels are not used: {error}", kept, True
-        wheels, scaled = with_scales(told.wheels, signals, scales)
-        return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
+        wheels, scaled = with_scales(log_map.wheels, signals, scales)
+        return scale_text(scales), replace(log_map, wheels=wheels, signals=scaled), True
     try:
         for name, unit in wheel_units(log.headings(), signals).items():
-            wheel_factor(choice.column_of(name), name, unit, told.wheels)
+            wheel_factor(choice.column_of(name), name, unit, log_map.wheels)
     except RecordingError as error:
         return str(error), plain, False
     return "vx is computed from the wheels", plain, True
@@ -131,7 +131,7 @@ def _head(log: LogFile, run: str | None) -> list[str]:
 def _seen(
     log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
 ) -> dict[str, Channel]:
-    """Return the channels whose ranges are told, by name."""
+    """Return the channels whose ranges are given, by name."""
     names = [one.name for one in listed]
     if sum(one.samples for one in listed) > _MOST_NUMBERS:
         likely = {channel for signal in signals.values() for channel in signal.channel}
@@ -144,7 +144,7 @@ def _channels_text(
     seen: Mapping[str, Channel],
     signals: Mapping[str, Signal],
     proposal: Proposal,
-    told: frozenset[str] = frozenset(),
+    known: frozenset[str] = frozenset(),
 ) -> str:
     """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for."""
     rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
@@ -159,7 +159,7 @@ def _channels_text(
                 "empty", "")  # fmt: skip
         name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
-        meant = _meaning(one, signals, proposal, told)
+        meant = _meaning(one, signals, proposal, known)
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
     return text_table(rows, "<<>>>><")
 
@@ -173,11 +173,11 @@ def _meaning(
         if channel in signal.channel:
             guess = proposal.guesses.get(name)
             guessed = name not in known and guess is not None and guess.confidence < 1.0
-            told = f" ({guess.confidence:.0%})" if guessed and guess is not None else ""
-            told += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
-            told += f", its sign in {visible(signal.sign)}" if signal.sign else ""
+            remark = f" ({guess.confidence:.0%})" if guessed and guess is not None else ""
+            remark += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
+            remark += f", its sign in {visible(signal.sign)}" if signal.sign else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
-            return f"{choice.column_of(name)}: {MEANINGS[name]}{told}{among}"
+            return f"{choice.column_of(name)}: {MEANINGS[name]}{remark}{among}"
     for name, guess in proposal.guesses.items():
         for one in (guess, *proposal.rivals.get(name, ())):
             if channel in one.channel and INSTEAD.get(name) in signals:
@@ -229,8 +229,8 @@ def missing_text(
             if likely
             else f"{choice.column_of(name)} ({MEANINGS[name]}) is missing"
         )
-        told = [choice.column_word(one, proposal) for one in likely]
-        words += told or [f'"{choice.column_of(name)}=CHANNEL"']
+        proposed = [choice.column_word(one, proposal) for one in likely]
+        words += proposed or [f'"{choice.column_of(name)}=CHANNEL"']
     return "\n".join([*lines, f"declare it: tireid channels {log} --columns {' '.join(words)}"])
 
 

@@ -258,8 +258,8 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
     """Return where the conditions come from."""
     changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
     stored = options.design is not None and design.driving is not None
-    told = "none stored in the design, those of the car" if options.design else "of the car"
-    said = f"conditions: {'as stored in the design' if stored else told}"
+    origin = "none stored in the design, those of the car" if options.design else "of the car"
+    said = f"conditions: {'as stored in the design' if stored else origin}"
     if not changed or (stored and driving == design.driving):
         return said
     return f"{said}, but for {changed}" + (": not the verdict of the file" if stored else "")

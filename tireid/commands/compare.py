@@ -112,11 +112,11 @@ def run(options: argparse.Namespace) -> int:
             remarks=results.remarks(comparison),
             command=options.words,
         )
-        told = [results.summary_table(comparison)]
+        tables = [results.summary_table(comparison)]
         if len(comparison.names) ** 2 <= _FEW_PAIRS:
-            told.append(results.pair_tables(comparison))
-    told += [verdicts_text(verdicts)] if verdicts else []
-    tell("\n".join(told))
+            tables.append(results.pair_tables(comparison))
+    tables += [verdicts_text(verdicts)] if verdicts else []
+    tell("\n".join(tables))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
 
@@ -128,9 +128,9 @@ def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    told = shared.given_map(options)
+    log_map = shared.given_map(options)
     recordings = [
-        shared.read_log(log, vehicle, told, check=not options.no_check) for log in options.logs
+        shared.read_log(log, vehicle, log_map, check=not options.no_check) for log in options.logs
     ]
     if options.simulate or not options.logs:
         say(f"driving the plant of {vehicle.name} with noisy sensors")

@@ -58,9 +58,9 @@ _NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recor
 
 def _slip_cells(trial: Trial) -> list[str]:
     """Return the mean error of side slip and the mean share within two sigma, as text."""
-    told = trial.side_slip.values()
-    errors = [one.rms for one in told if one.rms is not None]
-    shares = [one.within for one in told if one.within is not None]
+    notes = trial.side_slip.values()
+    errors = [one.rms for one in notes if one.rms is not None]
+    shares = [one.within for one in notes if one.within is not None]
     return [
         f"{np.mean(errors):.3f}" if errors else NOT_TOLD,
         f"{np.mean(shares):.0f} %" if shares else NOT_TOLD,
@@ -77,16 +77,16 @@ def summary_table(comparison: Comparison) -> str:
 
 def remarks(comparison: Comparison) -> list[str]:
     """Return what the methods say of themselves below the table, those alike in one line."""
-    told: dict[str, list[str]] = {}
+    notes: dict[str, list[str]] = {}
     for name in comparison.trials:
         if name in methods():
             method = make_method(name, comparison.course.vehicle, comparison.seed)
-            told.setdefault(method.remark, []).append(name)
+            notes.setdefault(method.remark, []).append(name)
             if not method.needs_v_y:
-                told.setdefault(_NOT_SHOWN, []).append(name)
+                notes.setdefault(_NOT_SHOWN, []).append(name)
     for name, why in comparison.left_out.items():
-        told.setdefault(why, []).append(name)
-    return [f"{', '.join(names)}: {remark}" for remark, names in told.items() if remark]
+        notes.setdefault(why, []).append(name)
+    return [f"{', '.join(names)}: {remark}" for remark, names in notes.items() if remark]
 
 
 def pair_tables(comparison: Comparison) -> str:
@@ -156,8 +156,8 @@ def write_comparison(
     if any(trial.frozen for trial in comparison.trials.values()):
         figures["matrix"] = matrix_figure(comparison)
     if any(trial.side_slip for trial in comparison.trials.values()):
-        told = {name: trial.side_slip for name, trial in comparison.trials.items()}
-        figures["side_slip"] = side_slip_figure(comparison.course.recordings, told)
+        notes = {name: trial.side_slip for name, trial in comparison.trials.items()}
+        figures["side_slip"] = side_slip_figure(comparison.course.recordings, notes)
     return save_figures(folder, figures)
 
 

@@ -125,7 +125,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
 
 
 def _predict(story: Story) -> page.Section:
-    told = ["frozen", "of rms"]
+    columns = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         page.Paragraph(
             text="The same frozen weights predict two other maneuvers, not used for "
@@ -135,7 +135,7 @@ def _predict(story: Story) -> page.Section:
         page.Table(
             caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
-            header=["drive", "axle, online", *told, "paper, online", *told],
+            header=["drive", "axle, online", *columns, "paper, online", *columns],
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
@@ -318,12 +318,12 @@ def run(options: argparse.Namespace) -> None:
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
         page.write_report(folder / REPORT, report)
-        told = [
+        columns = [
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
             f"{story.text()}\n",
             f"{demo_parts.shipped_text(shipped)}\n",
             demo_parts.drive_text(driven),
         ]
-    tell("\n".join(told))
+    tell("\n".join(columns))
     tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

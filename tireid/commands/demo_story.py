@@ -74,9 +74,9 @@ class Story:
                 frozen = method.replays[name].against_truth
                 online, size = online_error(run), force_rms(run)
                 assert size is not None and frozen is not None and online is not None
-                told = [f"{one.both / 1e3:.3f}" for one in (online, frozen)]
+                cells = [f"{one.both / 1e3:.3f}" for one in (online, frozen)]
                 share = f"{100.0 * frozen.both / size.both:.0f} %"
-                rows.setdefault(name, [name]).extend([*told, share])
+                rows.setdefault(name, [name]).extend([*cells, share])
         return list(rows.values())
 
     def side_by_side(self, drive: str) -> dict[str, Replay]:
@@ -88,8 +88,8 @@ class Story:
 
     def text(self) -> str:
         """Return the rows as lines of text."""
-        told = ["online", "frozen", "of rms"]
-        rows = [["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in told)]]
+        cells = ["online", "frozen", "of rms"]
+        rows = [["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in cells)]]
         return "\n".join(
             [
                 "Frozen after the slalom, on validation drives: RMSE [kN]; the axle identifier "

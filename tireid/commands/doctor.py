@@ -41,8 +41,10 @@ def run(options: argparse.Namespace) -> int:
     if options.repair is not None:
         shared.require_toml(options.repair)
         require_free(options.repair, force=options.force)
-    vehicle, told = shared.read_vehicle(options), shared.given_map(options)
-    recording = shared.read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
+    vehicle, log_map = shared.read_vehicle(options), shared.given_map(options)
+    recording = shared.read_log(
+        options.log, vehicle, log_map, run_name=options.run_name, check=False
+    )
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
@@ -59,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:
         _tell_repair(options, repair, after)
-        write_repair(options.repair, told, diagnosis)
+        write_repair(options.repair, log_map, diagnosis)
         say(f"wrote {options.repair}; read the log with --log {options.repair}")
     if options.out is not None:
         say(f"wrote {options.out}/")

@@ -1,4 +1,4 @@
-"""`tireid drive`: steer a car along a path, told of the tires that were learnt."""
+"""`tireid drive`: steer a car along a path on identified tires."""
 
 import argparse
 from typing import Any
@@ -42,7 +42,7 @@ def add_parser(commands: Any) -> None:
         ),
         "--speed WHAT": (
             "90%",
-            "share of the grip that the tightest bend takes (90%%), or a speed (17m/s, 60km/h); "
+            "share of the grip that the tightest bend takes, or a speed (17m/s, 60km/h); "
             "constant on an open path; a share on a closed one brakes for bends (%(default)s)",
         ),
     }
@@ -135,7 +135,7 @@ def run(options: argparse.Namespace) -> int:
             film=folder / f"drive.{options.film}" if options.film in SHOWN else None,
             command=options.words,
         )
-        told = f"{headline(conditions)}\ntires: {source}\n{drive_lines(runs)}"
-    tell(told)
+        declared = f"{headline(conditions)}\ntires: {source}\n{drive_lines(runs)}"
+    tell(declared)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else _NOT_COMPLETED

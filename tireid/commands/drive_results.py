@@ -167,8 +167,8 @@ def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[st
 
 def _scores(run: Run) -> dict[str, Any]:
     notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
-    told = estimate_scores(run.drive)
-    lateral = {} if told is None else {"lateral_velocity": told._asdict()}
+    given = estimate_scores(run.drive)
+    lateral = {} if given is None else {"lateral_velocity": given._asdict()}
     return {**run.scores.to_dict(), **lateral, "ending": run.drive.ending, "notes": notes}
 
 
@@ -210,7 +210,7 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
 
 
 def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
-    """Return what the trackers were told, and the linear and the true tire beside it."""
+    """Return the tires of the trackers, and the linear and the true tire beside it."""
     models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
         models[FROZEN] = prediction_tire(learnt, setup.vehicle)
@@ -237,11 +237,11 @@ def drive_lines(runs: Sequence[Run]) -> str:
 
 
 def _estimate_words(run: Run) -> str:
-    """Return how right the v_y was that was told, in one line."""
-    told = estimate_scores(run.drive)
-    assert told is not None
+    """Return the error of the estimated v_y, in one line."""
+    got = estimate_scores(run.drive)
+    assert got is not None
     return (
-        f"v_y estimated to {told.rms_error_m_s:.3f} m/s, side slip to {told.rms_error_deg:.2f} of "
-        f"{told.rms_deg:.2f} degrees rms; {100.0 * told.within_two_sd:.0f} % of the errors within "
+        f"v_y estimated to {got.rms_error_m_s:.3f} m/s, side slip to {got.rms_error_deg:.2f} of "
+        f"{got.rms_deg:.2f} degrees rms; {100.0 * got.within_two_sd:.0f} % of the errors within "
         f"two standard deviations"
     )

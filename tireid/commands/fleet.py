@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from identifier.tire_model import STIFFNESS
+from models.extras import needs
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
@@ -40,7 +41,7 @@ def add_parser(commands: Any) -> None:
         help=str(__doc__)[:-1].lower(),
         description="Identify thousands of logs into a store, a Parquet dataset with a row for "
         "each log. From it: one model of many logs, a prior for the next car, cars whose tires "
-        "changed. {needs('A store', 'libraries', 'fleet')}.",
+        f"changed. {needs('A store', 'libraries', 'fleet')}.",
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
     _add_learn(tasks)
@@ -338,7 +339,7 @@ def _table(groups: list[Merged]) -> str:
     rows = [["group", "logs", "learning", "stiffness front, rear", "known to"]]
     for one in groups:
         known = one.model.known_slip * 57.29578
-        C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
+        C = [number.words for number in one.model.estimates() if number.title == STIFFNESS]
         rows.append(
             [
                 one.name,

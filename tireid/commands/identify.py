@@ -166,7 +166,7 @@ def run(options: argparse.Namespace) -> int:
             command=options.words,
             asked=asked,
         )
-        told = (
+        given = (
             found.table(),
             closing,
             "" if bound is None else guaranteed_text(found.model),
@@ -177,7 +177,7 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         write_repair(options.repair, shared.given_map(options), diagnosis)
         say(f"wrote {options.repair}")
-    tell("\n".join(part for part in told if part))
+    tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
 
@@ -218,8 +218,8 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
     reach = f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)"
-    told = side_slip_text(learnt)
-    reach = f"{told}\n{reach}" if told else reach
+    given = side_slip_text(learnt)
+    reach = f"{given}\n{reach}" if given else reach
     if not learnt.online:
         return reach
     return (

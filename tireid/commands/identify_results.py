@@ -47,7 +47,7 @@ from tireid.reports.identify import guaranteed_sentence
 
 NETWORK = "network"
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
-TOLD = {  # columns of forces.csv by the outputs of methods that estimate v_y
+ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
     "v_y_estimated_m_s": "v_y",
     "v_y_sd_m_s": "v_y_sd",
     "side_slip_observable": "side_slip_observable",
@@ -372,7 +372,7 @@ def _force_columns(
     """
     recording, car, n = run.recording, run.vehicle, len(run.recording)
     outputs = run.outputs
-    given = {column: outputs[port].ravel() for column, port in TOLD.items() if port in outputs}
+    given = {column: outputs[port].ravel() for column, port in ESTIMATED.items() if port in outputs}
     curves = {} if recording.axle_force is None else {"true": recording.axle_force}
     curves |= {"online": run.axle_force} if run.online else {}
     curves |= {label: replay.axle_force for label, replay in replays.items()}

@@ -98,8 +98,8 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
     command : its name, which the folder bears by default; None writes a folder only where asked.
     """
     folder = None if command is None else Path(f"tireid-{command}")
-    told = f"folder to write ({folder or 'only where asked'})"
-    parser.add_argument("--out", type=Path, default=folder, metavar="DIR", help=told)
+    declared = f"folder to write ({folder or 'only where asked'})"
+    parser.add_argument("--out", type=Path, default=folder, metavar="DIR", help=declared)
     add_force(parser)
 
 
@@ -191,7 +191,7 @@ def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
 
 
 class Chosen(NamedTuple):
-    """A method by the name that results are told under."""
+    """A method by the name that results are given under."""
 
     name: str
     method: Method
@@ -206,7 +206,7 @@ def require_one(options: argparse.Namespace, *words: str) -> bool:
 
 
 def method_is_given(options: argparse.Namespace) -> bool:
-    """Return whether a command is told what learns."""
+    """Return whether a command is given what learns."""
     return require_one(options, "method", "paper", "design")
 
 
@@ -227,9 +227,7 @@ def chosen_method(
     method_is_given(options)
     if options.design is not None:
         if seed is not None:
-            raise ValueError(
-                f"--seed is for a method: the seed is in {options.design} stands in it"
-            )
+            raise ValueError(f"--seed is for a method: the seed of a design is in {options.design}")
         design = read_design(options.design)
         return Chosen(design.law, design)
     usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
@@ -288,20 +286,20 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 def given_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
-    told = with_columns(map_of(_map_path(options)), _column_words(options.columns))
+    declared = with_columns(map_of(_map_path(options)), _column_words(options.columns))
     if options.cut_holes:
-        told = replace(told, holes=CUT)
+        declared = replace(declared, holes=CUT)
     if options.mend_clock:
-        told = replace(told, order=MEND)
+        declared = replace(declared, order=MEND)
     if options.rate is not None:
-        told = replace(told, rate=options.rate, clock="", clock_unit="")
-    return told if options.dbc is None else replace(told, dbc=options.dbc)
+        declared = replace(declared, rate=options.rate, clock="", clock_unit="")
+    return declared if options.dbc is None else replace(declared, dbc=options.dbc)
 
 
 def read_log(
     log: str,
     vehicle: Vehicle,
-    told: LogMap,
+    declared: LogMap,
     *,
     run_name: str | None = None,
     check: bool = True,
@@ -315,7 +313,7 @@ def read_log(
     if named is not None and run_name is not None and named != run_name:
         raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
     recording, _ = read_repaired(
-        path, vehicle, run=run_name or named, dt=dt, check=check, log_map=told
+        path, vehicle, run=run_name or named, dt=dt, check=check, log_map=declared
     )
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
     for note in recording.notes:
@@ -324,7 +322,7 @@ def read_log(
 
 
 def _column_words(pairs: Sequence[str]) -> dict[str, str]:
-    """Return what is told of columns by the name that they are read as."""
+    """Return what is given of columns by the name that they are read as."""
     columns = {}
     for pair in pairs:
         name, equals, column = pair.partition("=")

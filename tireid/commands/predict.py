@@ -70,9 +70,9 @@ def run(options: argparse.Namespace) -> int:
         columns = (force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
         output.write_long_csv(folder / "forces.csv", columns)
         if friction is not None:
-            told = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
-            told |= {"another": friction.another, "unexplained": friction.unexplained}
-            output.write_csv(folder / "friction.csv", told)
+            given = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
+            given |= {"another": friction.another, "unexplained": friction.unexplained}
+            output.write_csv(folder / "friction.csv", given)
         output.write_json(folder / "summary.json", summary(prediction, verdict, facts))
         lines = _prediction_text(prediction, friction, facts)
         say("drawing figures")
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
             prediction,
             verdict,
             figures,
-            told=lines,
+            given=lines,
             source=options.model,
             command=options.words,
         )

@@ -1,4 +1,4 @@
-"""One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
+"""One drive for each tire that a tracker is given: linear, frozen, true, or learnt on the way."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -223,7 +223,7 @@ def require_compiler() -> None:
 
 
 def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
-    """Return the tire that a tracker is told at the start."""
+    """Return the tire that a tracker is given at the start."""
     if label == LINEAR:
         return prediction_tire(setup.vehicle)
     if label == ORACLE:
@@ -235,7 +235,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
 def run_drive(
     label: str, conditions: Conditions, learnt: TireModel | None, *, linearizations: int = 1
 ) -> Run:
-    """Drive the path once with the tracker told of a tire."""
+    """Drive the path once with the tracker on a tire."""
     setup, problem = conditions.setup, Problem()
     model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag

@@ -115,7 +115,7 @@ def _look(k: int, name: str, of: int) -> tuple[str, str]:
 
 
 def _days(rows: Sequence[LogRow]) -> Array:
-    """Return when logs were driven, in days since the first; in their order where nobody told."""
+    """Return when logs were driven, in days since the first; else in their order."""
     try:
         when = np.array([datetime.fromisoformat(row.date).timestamp() for row in rows])
     except ValueError:

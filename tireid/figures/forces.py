@@ -2,7 +2,7 @@
 
 A method that learns from a whole log has replays alone.
 
-And those that the motion shows, over slip angle, as a log is told and as the doctor repairs it.
+And those that the motion shows, over slip angle, as a log is given and as the doctor repairs it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -244,11 +244,11 @@ def draw_diagnosis(
     drawn = [("as logged", style.GREY, recording, vehicle)]
     if repaired is not recording:
         drawn.append(("repaired", style.BLUE, repaired, car))
-    for name, color, one, told in drawn:
+    for name, color, one, given in drawn:
         motion = Motion.of(one)
         if motion is None:
             continue
-        axles = forces_and_slips(motion, told, Reading())
+        axles = forces_and_slips(motion, given, Reading())
         for panel, slip, force in zip(panels[0], axles.slip, axles.force, strict=True):
             panel.plot(np.degrees(slip), force, ".", color=color, markersize=2.5, label=name)
     for panel in panels[0]:

@@ -82,10 +82,10 @@ class DrawnRun:
         self._values: list[list[Array]] = []
 
     def take(self, block: Block) -> None:
-        told, here = self._tell(block), self._recording.t[block.part]
-        part: Any = slice(None) if self._width == 1 else farthest(told, self._width)
+        given, here = self._tell(block), self._recording.t[block.part]
+        part: Any = slice(None) if self._width == 1 else farthest(given, self._width)
         self._times.append(here[part])
-        self._values.append([one[part] for one in told])
+        self._values.append([one[part] for one in given])
 
     def curves(self) -> tuple[Array, list[Array]]:
         """Return times and values as they are drawn: (k,) and (k, ...) each.

@@ -77,7 +77,7 @@ class _Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Telling:
-    """What is told of all logs.
+    """What is given of all logs.
 
     start : a fit or a prior that is believed before; None believes the table.
     judging : "motion" asks whether the frozen model gives the drive's motion back, "none" for
@@ -101,8 +101,8 @@ class Telling:
                 f"a fleet begins with a fit or a fleet's prior, not with kind {kind!r}"
             )
         if self.log_map.dbc:  # whoever reads a log may run in another folder
-            told = replace(self.log_map, dbc=str(Path(self.log_map.dbc).absolute()))
-            object.__setattr__(self, "log_map", told)
+            given = replace(self.log_map, dbc=str(Path(self.log_map.dbc).absolute()))
+            object.__setattr__(self, "log_map", given)
 
     def digest(self, vehicle: Vehicle) -> str:
         """Return the hash of all that a row follows from beside its log: car, method, options.
@@ -119,8 +119,8 @@ class Telling:
             None if self.start is None else json.dumps(self.start.to_dict()),
             (self.judging, self.check, self.part),
         )
-        told = "\0".join(map(repr, parts)).encode()
-        return hashlib.blake2b(told, digest_size=8).hexdigest()
+        given = "\0".join(map(repr, parts)).encode()
+        return hashlib.blake2b(given, digest_size=8).hexdigest()
 
 
 class Car(NamedTuple):
@@ -223,14 +223,14 @@ def _stamp(address: str, info: Mapping[str, Any]) -> str:
     """Return a hash of what changes with a file; empty where its file system tells nothing."""
     if "://" not in address:
         at = Path(address).stat()  # of the file itself, where `info` is of a link to it
-        told: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
+        given: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
     else:
         some = {key.replace("_", "").lower(): value for key, value in info.items()}
-        told = [(key, str(some[key])) for key in CHANGES if some.get(key)]
-        if not told:
+        given = [(key, str(some[key])) for key in CHANGES if some.get(key)]
+        if not given:
             return ""
-        told.append(("size", info.get("size")))
-    return hashlib.blake2b(repr(told).encode(), digest_size=8).hexdigest()
+        given.append(("size", info.get("size")))
+    return hashlib.blake2b(repr(given).encode(), digest_size=8).hexdigest()
 
 
 def _written(info: Mapping[str, Any]) -> str:
@@ -380,7 +380,7 @@ def _of_model(model: FittedModel) -> dict[str, Any]:
         "relaxation": model.relaxation_length,
         "known": model.known_slip,
     }
-    told = {
+    given = {
         f"{name}_{axle}": float(value)
         for name, both in numbers.items()
         for axle, value in zip(AXLES, both, strict=True)
@@ -388,7 +388,7 @@ def _of_model(model: FittedModel) -> dict[str, Any]:
     text = json.dumps(model.to_dict(), ensure_ascii=False)
     reached = model.driven, model.speeds, model.a_x, model.unexplained
     reach = [value for one in reached for value in one.tolist()]
-    return {**told, "model": text, "reach": reach}
+    return {**given, "model": text, "reach": reach}
 
 
 # Who does it.

@@ -34,8 +34,15 @@ from tireid.fleet.store import MOVING, LogRow
 
 _TAGGED = ("vehicle", "tires", "date")
 BY = (*_TAGGED, "week", "month", "log", "setting")
-TOLD = ("reach", "part_begin", "part_seconds", "matrix", "vector")
-COLUMNS = (*WHICH, *_TAGGED, "tags", "valid", "car", *TOLD)  # of a row, that are asked for here
+INFORMATION = ("reach", "part_begin", "part_seconds", "matrix", "vector")
+COLUMNS = (
+    *WHICH,
+    *_TAGGED,
+    "tags",
+    "valid",
+    "car",
+    *INFORMATION,
+)  # of a row, that are asked for here
 ROUNDS = 3  # over the rows
 PASSES = 60  # of expectation and maximization
 WORTH = 2.0  # cars that the identifier's prior counts as

@@ -41,7 +41,7 @@ BATCH = 512  # rows that are read at once
 SMALL = 1 << 22  # bytes of a file that is fetched as one
 HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
 MOVING = [name for name, moves in zip(NAMES, Priors.of(sedan()).moves, strict=True) if moves]
-TOLD = np.array([*range(FORCES), *(PLACE[name] for name in MOVING if name in PLACE)])  # of u
+OBSERVABLE = np.array([*range(FORCES), *(PLACE[name] for name in MOVING if name in PLACE)])  # of u
 WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "oci", "memory"}  # see _put
 
 
@@ -64,7 +64,7 @@ class LogRow:
     log : its name: absolute path or address, or where it lies under a root.
     run : of the file, where it has several; else empty.
     content : hash of what the file holds; empty where it could not be read.
-    setting : hash of all that was told: car, method, map, start, options.
+    setting : hash of all that was given: car, method, map, start, options.
     size : of the file [bytes].
     stamp : hash of what its file system says of the file, which changes with it.
     vehicle, tires, date : as its path or its folder says; the date as ISO 8601.
@@ -87,7 +87,7 @@ class LogRow:
         model of it leaves unexplained of both axles, (8,).
     part_begin : when the parts begin [s], counted from the first sample, k of them.
     part_seconds : of driving that counts [s], (k,).
-    matrix : information of the parts over `TOLD`, upper triangles, (k, q (q + 1)/2) by rows.
+    matrix : information of the parts over `OBSERVABLE`, upper triangles, (k, q (q + 1)/2) by rows.
     vector : of the parts, (k, q) by rows.
     """
 
@@ -152,7 +152,7 @@ class LogRow:
 
     @property
     def declared_car(self) -> Vehicle:
-        """The car as it was told."""
+        """The car as given."""
         try:
             return vehicle_from(json.loads(self.car))
         except ValueError as error:
@@ -166,16 +166,16 @@ class LogRow:
     @property
     def parts(self) -> list[Information]:
         """What its parts tell of the tires, in the order of time."""
-        k, q = len(self.part_begin), len(TOLD)
+        k, q = len(self.part_begin), len(OBSERVABLE)
         self.numbers("part_begin", k)
         triangles = self.numbers("matrix", k, q * (q + 1) // 2)
         vectors, seconds = self.numbers("vector", k, q), self.numbers("part_seconds", k)
-        rows, columns = TOLD[np.array(np.triu_indices(q))]
+        rows, columns = OBSERVABLE[np.array(np.triu_indices(q))]
         found = []
         for packed, vector, some in zip(triangles, vectors, seconds.tolist(), strict=True):
             matrix, whole = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
             matrix[rows, columns] = matrix[columns, rows] = packed
-            whole[TOLD] = vector
+            whole[OBSERVABLE] = vector
             try:
                 found.append(Information(matrix=matrix, vector=whole, seconds=some))
             except ValueError as error:
@@ -207,11 +207,11 @@ HEAVY = (*LISTS, "car", "model")  # read where they are asked for by name
 
 def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
     """Return the columns that hold what parts of a log tell."""
-    rows, columns = TOLD[np.array(np.triu_indices(len(TOLD)))]
+    rows, columns = OBSERVABLE[np.array(np.triu_indices(len(OBSERVABLE)))]
     return {
         "part_seconds": [one.seconds for one in parts],
         "matrix": np.ravel([one.matrix[rows, columns] for one in parts]).tolist(),
-        "vector": np.ravel([one.vector[TOLD] for one in parts]).tolist(),
+        "vector": np.ravel([one.vector[OBSERVABLE] for one in parts]).tolist(),
     }
 
 
@@ -440,14 +440,14 @@ def protocols(fs: Any) -> set[str]:
 
 def _require_ours(path: str, found: Any) -> None:
     """Refuse a file whose columns are not those of this version's store."""
-    told = (found.metadata or {}).get(b"format", b"").decode(errors="replace")
-    if told.startswith("tireid fleet") and told != FORMAT:
+    given = (found.metadata or {}).get(b"format", b"").decode(errors="replace")
+    if given.startswith("tireid fleet") and given != FORMAT:
         raise StoreError(
-            f"{path}: is of another version's store ({told}, not {FORMAT}): learn its logs again, "
+            f"{path}: is of another version's store ({given}, not {FORMAT}): learn its logs again, "
             "into a new store"
         )
-    if told != FORMAT or found.names != list(COLUMNS):
-        raise StoreError(f"{path}: is not of this version's store ({told or 'no format'})")
+    if given != FORMAT or found.names != list(COLUMNS):
+        raise StoreError(f"{path}: is not of this version's store ({given or 'no format'})")
     for name in COLUMNS:
         kind = schema().field(name).type
         if found.field(name).type != kind:

@@ -233,9 +233,9 @@ def parts_of(row: LogRow) -> list[Part]:
     """Return the parts of a log that tell of the tires."""
     day_of(row)
     return [
-        Part(row.name, row.date, begin, told)
-        for begin, told in zip(row.part_begin, row.parts, strict=True)
-        if told.seconds >= SHORTEST
+        Part(row.name, row.date, begin, given)
+        for begin, given in zip(row.part_begin, row.parts, strict=True)
+        if given.seconds >= SHORTEST
     ]
 
 
@@ -251,16 +251,16 @@ def _against_baseline(
     count = int(np.searchsorted(learnt, watching.baseline)) + 1
     if count >= len(parts):
         return None
-    beliefs, told = Priors.of(vehicle), Information.nothing()
+    beliefs, given = Priors.of(vehicle), Information.nothing()
     for one in parts[:count]:
-        told += one.information.loosened(*errors_of(beliefs))
-    p, _ = settled(beliefs.after(told), beliefs.mean)
+        given += one.information.loosened(*errors_of(beliefs))
+    p, _ = settled(beliefs.after(given), beliefs.mean)
     changes = [change_from(one.information, p, beliefs) for one in parts]
     z, S = (np.array(each) for each in zip(*changes, strict=True))
     return _Compared(tuple(parts), z, S, list(range(count)))
 
 
-def change_from(told: Information, p: Array, beliefs: Priors) -> tuple[Array, Array]:
+def change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, Array]:
     """Return ln of both stiffnesses and of the friction over a car's, and variances, (3,) each.
 
     Sensors may be off otherwise than when the car was learnt: that is estimated beside it.
@@ -272,8 +272,8 @@ def change_from(told: Information, p: Array, beliefs: Priors) -> tuple[Array, Ar
     sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
     along = np.hstack([slopes[:, _CHANGED], sensors])
     sd = np.array([*(LARGEST for _ in _CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
-    P = np.linalg.inv(along.T @ told.matrix @ along + np.diag(sd**-2.0))
-    value = P @ (along.T @ (told.vector - told.matrix @ u))
+    P = np.linalg.inv(along.T @ given.matrix @ along + np.diag(sd**-2.0))
+    value = P @ (along.T @ (given.vector - given.matrix @ u))
     return value[: len(_CHANGED)], np.diag(P)[: len(_CHANGED)]
 
 

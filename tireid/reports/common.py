@@ -55,7 +55,7 @@ def origin(
     command: str, vehicle: Vehicle, recordings: Iterable[Recording], **others: str
 ) -> Section:
     """Return what is needed to compute a report again."""
-    told = list(recordings)
+    given = list(recordings)
     rows = [
         ["command", command],
         ["tireid", __version__],
@@ -68,9 +68,9 @@ def origin(
                 f"{one.name}: {len(one)} samples, {one.duration:.4g} s, hash "
                 f"{recording_digest(one)}",
             ]
-            for one in told
+            for one in given
         ),
-        *(["how it was read", f"{one.name}: {note}"] for one in told for note in one.notes),
+        *(["how it was read", f"{one.name}: {note}"] for one in given for note in one.notes),
         *([name.replace("_", " "), value] for name, value in others.items()),
     ]  # fmt: skip
     table = Table(

@@ -70,12 +70,12 @@ def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
         )
         for run in runs[1:]
     ]
-    told = estimate_scores(runs[0].drive)
-    if told is not None:
+    given = estimate_scores(runs[0].drive)
+    if given is not None:
         numbers.append(
             Headline(
-                f"{told.rms_error_deg:.2f}°",
-                f"rms error of the estimated side slip, of {told.rms_deg:.2f}°",
+                f"{given.rms_error_deg:.2f}°",
+                f"rms error of the estimated side slip, of {given.rms_deg:.2f}°",
             )
         )
     median, p99 = first.solve_ms["median"], first.solve_ms["p99"]
@@ -147,7 +147,7 @@ def _drive_blocks(
 
 
 def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
-    """Return what trackers believed of the tires, and what they were told on the way."""
+    """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",
         "lateral": "Lateral velocity, which no sensor measured: the truth and the estimate.",

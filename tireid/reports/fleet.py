@@ -110,9 +110,9 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
 
 def _watch_blocks(watched: Watch) -> list[Block]:
     """Return what was seen over time, as table and figures."""
-    told = f"{len(watched.seen)} cars were driven beyond their baseline"
+    driven = f"{len(watched.seen)} cars were driven beyond their baseline"
     short = f"; {len(watched.short)} were not, and are not watched yet" if watched.short else ""
-    blocks: list[Block] = [Paragraph(text=f"{told}{short}.")]
+    blocks: list[Block] = [Paragraph(text=f"{driven}{short}.")]
     if not watched.alarms:
         return [*blocks, Paragraph(text="No change was noticed.")]
     rows = [_alarm_row(alarm) for alarm in watched.alarms]
@@ -132,18 +132,18 @@ def _watch_blocks(watched: Watch) -> list[Block]:
 
 
 def _alarm_row(alarm: Alarm) -> list[str | float | None]:
-    told = alarm.to_dict()
+    fields = alarm.to_dict()
     over = f"{alarm.cause}; over since {alarm.ended}" if alarm.ended else alarm.cause
     sd = 100.0 * alarm.sd[alarm.statistic]
-    change = 100.0 * float(told["change"])
-    return [alarm.car, str(told["what"]), change, sd, alarm.began, alarm.log, over]
+    change = 100.0 * float(fields["change"])
+    return [alarm.car, str(fields["what"]), change, sd, alarm.began, alarm.log, over]
 
 
 def _groups_table(groups: Sequence[Merged]) -> Table:
     rows: list[list[str | float | None]] = []
     for one in groups:
         known = map(float, np.degrees(one.model.known_slip))
-        C = [told.words for told in one.model.estimates() if told.title == STIFFNESS]
+        C = [number.words for number in one.model.estimates() if number.title == STIFFNESS]
         rows.append([one.name, one.logs, one.information.seconds / 60.0, *C, *known])
     return Table(
         caption=f"Merged models{_first(len(rows))}.",
@@ -159,8 +159,8 @@ def _first(count: int) -> str:
 
 def _origin(command: str, store: str, rows: Sequence[LogRow]) -> Section:
     settings = ", ".join(sorted({row.setting for row in rows}))
-    told = [["command", command], ["tireid", __version__], ["store", store]]
+    entries = [["command", command], ["tireid", __version__], ["store", store]]
     if settings:
-        told.append(["settings of learning, hashes", settings])
-    table = Table(caption="What went in.", header=["what", "value"], rows=told, verbatim=True)
+        entries.append(["settings of learning, hashes", settings])
+    table = Table(caption="What went in.", header=["what", "value"], rows=entries, verbatim=True)
     return Section(heading="To compute it again", blocks=[table])

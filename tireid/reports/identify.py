@@ -100,8 +100,8 @@ def write_identify_report(
 def _how_learnt(learnt: History) -> str:
     estimated = learnt.recording.logged_v_y is None
     lateral = "acceleration" if estimated else "velocity"
-    told = side_slip_text(learnt)
-    more = f" Lateral velocity was not measured: {told}." if estimated and told else ""
+    declared = side_slip_text(learnt)
+    more = f" Lateral velocity was not measured: {declared}." if estimated and declared else ""
     how = "identified sample by sample" if learnt.online else "one estimate of tires and sensors"
     return (
         f"{learnt.recording.duration:.4g} s of driving, {how} from speed, "
@@ -212,9 +212,9 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         blocks.append(
             page.Table(caption=f"Parameters of the tires, {law}.", header=["", *AXLES], rows=facts)
         )
-    for told in (band_sentence(model), guaranteed_sentence(model)):
-        if told:
-            blocks.append(page.Paragraph(text=told))
+    for declared in (band_sentence(model), guaranteed_sentence(model)):
+        if declared:
+            blocks.append(page.Paragraph(text=declared))
     captions = {
         "side_slip": "Side slip as it was estimated.",
         "learnt": "Estimates over time.",

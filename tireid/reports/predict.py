@@ -34,14 +34,14 @@ def write_predict_report(
     verdict: Verdict,
     figures: Mapping[str, Figure],
     *,
-    told: str,
+    given: str,
     source: Path,
     command: str,
 ) -> None:
     model, recording = prediction.model, prediction.recording
     notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
     found: list[page.Block] = [*_errors(prediction)]
-    found += [page.Paragraph(text=page.printed(line)) for line in told.splitlines()]
+    found += [page.Paragraph(text=page.printed(line)) for line in given.splitlines()]
     captions = {
         "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
         "forces": "Axle forces over time.",

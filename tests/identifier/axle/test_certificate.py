@@ -134,12 +134,12 @@ def test_the_worst_errors_of_y_reach_the_bound_and_larger_ones_pass_it(run):
     g, begin = reach.g[:, i, m], reach.begin[i, m]
     by_begin = begin_error(taught, reach)[i, m]
     side = np.sign(reach.moved[i, m])
-    bound = by_begin + np.abs(g) @ taught.told[:, i] + abs(reach.moved[i, m])
+    bound = by_begin + np.abs(g) @ taught.declared[:, i] + abs(reach.moved[i, m])
     assert bound < 1.0
     for share, passes in ((1.0, False), (1.01, True)):
         error = side * BEGIN**2 * taught.begin[i] @ begin / by_begin
         for k in range(len(g)):
-            e = share * side * np.sign(g[k]) * taught.told[k, i] - taught.h[k, i] @ error
+            e = share * side * np.sign(g[k]) * taught.declared[k, i] - taught.h[k, i] @ error
             error = error + taught.gains[k, i] * taught.counts[k, i] * e + taught.moved[k, i]
         reached = abs(np.tanh(0.12 / A) @ error[:4])
         assert reached == pytest.approx(bound, rel=2e-2)

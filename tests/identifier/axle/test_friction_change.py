@@ -17,7 +17,7 @@ from models.plant import Plant
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
 
-DT = 0.01
+DT, RATE = 0.01, 30.0  # s, loads/s
 NOISE = Sensors(
     v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
 )
@@ -26,7 +26,7 @@ STARTS, LASTS, AGAIN = 14.0, 2.0, 3.0  # s
 
 def collected(e, *, g=(0.3, 0.2), seconds=2.0, holds=(1, 1), learns=1, state=None, rule=None):
     """Evidence of errors e [loads] that last, with a variance of 0.03 squared."""
-    numbers = (rule or RoadChange()).at(DT)
+    numbers = (rule or RoadChange()).at(DT, RATE)
     state = RoadState(0.0, 0.0, 0.0, 0.0) if state is None else state
     V = ca.DM([0.03**2, 0.03**2])
     for _ in range(round(seconds / DT)):
@@ -38,7 +38,7 @@ def collected(e, *, g=(0.3, 0.2), seconds=2.0, holds=(1, 1), learns=1, state=Non
 
 
 def change_of(state, rule=None):
-    change, variance = believed((rule or RoadChange()).at(DT), state)
+    change, variance = believed((rule or RoadChange()).at(DT, RATE), state)
     return float(change), float(variance)
 
 
@@ -67,11 +67,25 @@ def test_an_axle_without_a_force_and_a_sample_that_is_not_learnt_tell_nothing():
 
 def test_evidence_is_that_of_about_a_second_and_gone_once_it_is_believed():
     assert collected([-0.1, -0.1], seconds=9.0).A < 1.6 * collected([-0.1, -0.1], seconds=1.0).A
-    numbers, state = RoadChange().at(DT), collected([-0.1, -0.1])
+    numbers, state = RoadChange().at(DT, RATE), collected([-0.1, -0.1])
     none = ca.DM([0.0, 0.0])
     V = ca.DM([1.0, 1.0])
     after = evidence(numbers, state, -0.2, g=none, e=none, V=V, holds=ca.DM([1, 1]), learns=1)
     np.testing.assert_allclose(np.array(after).ravel(), [0.0, 0.0, 0.0, -0.2])
+
+
+def test_a_step_that_the_limit_of_a_sample_cuts_goes_on_with_the_errors_that_are_left():
+    numbers, state = RoadChange().at(0.002, RATE), collected([-0.1, -0.08])
+    change = float(believed(numbers, state)[0])
+    assert change == pytest.approx(-0.06)  # 30 loads/s over 2 ms
+    none, V = ca.DM([0.0, 0.0]), ca.DM([1.0, 1.0])
+    after = evidence(numbers, state, change, g=none, e=none, V=V, holds=ca.DM([1, 1]), learns=1)
+    A, b, E, ln_friction = np.array(after).ravel()
+    w = state.A / (0.3**2 + 0.2**2)  # the errors that remain, summed up by hand
+    left = np.array([-0.1, -0.08]) - change * np.array([0.3, 0.2])
+    expected = w * np.array([0.3**2 + 0.2**2, left @ [0.3, 0.2], left @ left])
+    np.testing.assert_allclose([A, b, E], numbers.keep * expected, rtol=1e-9)
+    assert ln_friction == change
 
 
 def test_numbers_of_a_change_are_positive():

@@ -188,8 +188,9 @@ class ByHand:
         A, b, E = self.evidence
         precision = A + c.spread**-2
         change = spread = 0.0
-        if b**2 / precision > max(2 * c.evidence, c.explains * E):
-            change, spread = np.clip(b / precision, -c.step, c.step), 1 / precision
+        if b**2 / precision > 2 * c.evidence and b**2 > c.explains * E * A:
+            most = min(c.step, m.rate * dt)
+            change, spread = np.clip(b / precision, -most, most), 1 / precision
             self.roads.append(change)
         d = self.theta[:, :n] @ self.M.T
         self.theta[:, :n] += change * d + change**2 / 2 * d @ self.M.T

@@ -7,11 +7,11 @@ import pytest
 from scipy.signal import butter, lfilter
 
 import tireid as ti
+from identifier.estimate.drive import hardest
 from identifier.estimate.fit import fit
 from identifier.estimate.latent import (
     TRUST,
     Latent,
-    hardest,
     lateness,
     latent_priors,
     learn_latent,

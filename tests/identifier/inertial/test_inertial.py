@@ -9,6 +9,7 @@ from identifier.axle import AxleIdentifier, AxleModel
 from identifier.estimate.fit import fit
 from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing, make_method
+from identifier.motion.parameters import INDEX
 from identifier.run import OnlineIdentifier, identify, learn
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
@@ -90,6 +91,19 @@ def test_on_tires_of_an_estimate_side_slip_is_known_better_and_they_stay(estimat
     assert np.abs(slope / slope[0] - 1.0).max() < 0.03
     assert np.abs(level / level[0] - 1.0).max() < 0.15  # but for their grip
     assert (held.state["own"] == held.state["own"][0]).all()
+
+
+def test_a_known_factor_of_the_steering_is_taken_out(estimate, banked):
+    p = estimate.p.copy()
+    share = 1.25 / (1.0 + p[INDEX["steering_gain"]])
+    p[INDEX["steering_gain"]] = 0.25
+    short = replace(as_shown(banked), delta_f=as_shown(banked).delta_f / share)
+    found = []
+    for tires, log in ((estimate, as_shown(banked)), (replace(estimate, p=p), short)):
+        history = identify(log, CAR, continuing(tires, CAR, v_y=False), start=tires)
+        found.append(history.outputs["v_y"].ravel())
+        assert history.freeze().sensors.steering_gain == tires["steering_gain"]
+    np.testing.assert_allclose(found[1], found[0], atol=1e-6)
 
 
 def test_the_error_of_an_estimate_widens_what_is_known_of_side_slip(estimate, banked):
@@ -225,7 +239,7 @@ def test_a_number_that_settles_in_two_steps_counts_once(banked):
         error, sd, _ = errors(history, banked)
         assert np.mean(np.abs(error) < 2 * sd) > 0.8
         sds.append(np.median(sd))
-        noises.append(history.state["heard"][-1].ravel()[4:6])
+        noises.append(history.state["readings"][-1].ravel()[4:6])
     assert sds[1] == pytest.approx(sds[0], rel=0.1)
     np.testing.assert_allclose(noises[1], noises[0], rtol=0.35)
 

@@ -56,7 +56,9 @@ def car():
 def laws(dt):
     """The error of the forces stays as it is, the accelerometer sits 0.4 m ahead and 0.2 aside."""
     bank = np.exp(-dt / BANK_TIME)
-    return Laws(forgets=1.0, bank=bank, sway=SWAY, ahead=0.4, aside=0.2, late=0.0, **LAWS)
+    return Laws(
+        forgets=1.0, bank=bank, sway=SWAY, ahead=0.4, aside=0.2, late=0.0, steering_gain=0.0, **LAWS
+    )
 
 
 def stepped(z, tilt, t, dt):

@@ -47,6 +47,7 @@ def compiled_model():
         ahead=0.3,
         aside=-0.1,
         late=METHOD.a_y_late,
+        steering_gain=0.0,
     )
     z, tilt = ca.SX.sym("z", Q), ca.SX.sym("tilt", 2)
     old, new = ca.SX.sym("old", 3), ca.SX.sym("new", 3)
@@ -154,7 +155,7 @@ class ByHand:
         sd += [t.bank]
         self.P[range(MOVING), range(MOVING)] = [unsure, *np.array(sd) ** 2]
         self.tilt = np.array([v_x * r, 0.0])
-        self.heard = [np.array([r, a_y])] * 2
+        self.readings = [np.array([r, a_y])] * 2
 
     def go_on(self, before, sample, y):
         t, z = METHOD.trust, self.z
@@ -173,11 +174,11 @@ class ByHand:
         noise[4:6] = missed**2 * (1 - np.exp(-2 * DT / t.correlation_time))
         noise[6] = 2 * t.bank**2 * DT / t.bank_time
         P = F @ self.P @ F.T + np.diag(noise)
-        now, old = self.heard
+        now, old = self.readings
         news = np.abs(y - now) > 0.1 * np.abs(now - old)  # a number that settles is none
         shows = np.minimum((y - 2 * now + old) ** 2 / 6, 9 * self.noise + 1e-12)
         self.noise = self.noise + news * (shows - self.noise) / t.noise_samples
-        self.heard = [np.where(news, y, now), np.where(news, now, old)]
+        self.readings = [np.where(news, y, now), np.where(news, now, old)]
         self.waiting = np.minimum(self.waiting + news, 4)
         H = by_differences(lambda z: self.look(z, tilt, sample)[0], ahead) @ self.into
         expected, static = self.look(ahead, tilt, sample)

@@ -156,7 +156,7 @@ def test_a_stale_identifier_is_a_fault_and_the_last_good_tire_stays(car, learnt,
     assert not supervisor.identifier.stale
 
 
-class Told:
+class LateralEstimate:
     """A judge whose mean chi-squares are given: of the tire in use, and of any other."""
 
     def __init__(self, in_use, mean, *, better=0.0, worse_lately=0.0):
@@ -186,7 +186,7 @@ def test_the_baseline_follows_what_is_seen_slowly_and_not_a_change(
         supervisor_module, "look_at_road", lambda *_, **given: baseline.append(given["baseline"])
     )
     supervisor = supervisor_of(car, learnt, rules=Rules(learning_time=1e3))
-    supervisor.judge = Told(supervisor.target, mean)
+    supervisor.judge = LateralEstimate(supervisor.target, mean)
     watched(supervisor, dry[1].between(0.0, 4.0))
     n, share = np.arange(len(baseline)), 0.05 / 10.0
     assert n.size > 70
@@ -210,7 +210,7 @@ def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_the_baseline(
     """4 better over seconds, no more than 2 worse in the last moments; on a bad road thrice it."""
     supervisor = supervisor_of(car, learnt, rules=Rules(baseline_time=0.05))
     supervisor._proven = False  # friction is not looked for
-    supervisor.judge = Told(
+    supervisor.judge = LateralEstimate(
         supervisor.target, baseline, better=baseline * better, worse_lately=baseline * worse_lately
     )
     watched(supervisor, dry[1].between(0.0, 6.0))

@@ -18,7 +18,7 @@ from mpc.cars import CarState, DoubleTrackCar
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.drive import drive
-from mpc.loop.lateral import LateralVelocity, Localization, Told
+from mpc.loop.lateral import LateralEstimate, LateralVelocity, Localization
 from mpc.loop.record import estimate_scores
 from mpc.loop.sensing import CarSensors, FaultySensors, Measured, imu_and_localization
 from mpc.path import Path, iso_3888_1
@@ -51,7 +51,7 @@ def told_over(driven, *faults, seed=0, localization=None):
     sensors = FaultySensors(imu_and_localization(np.random.default_rng([seed, 9])), faults)
     teller = lateral(localization)
     rows = np.array([teller.tell(sensors.measure(state, rng)) for state in driven])
-    found = dict(zip(Told._fields, rows.T, strict=True))
+    found = dict(zip(LateralEstimate._fields, rows.T, strict=True))
     t, v_y, a_y = np.array([(state.t, state.v_y, state.a_y) for state in driven]).T
     errors = {"error": found["v_y"] - v_y, "inertial": found["inertial_v_y"] - v_y}
     return {**found, **errors, "leveled": found["a_y"] - a_y, "t": t, "true_a_y": a_y}
