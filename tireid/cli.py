@@ -48,14 +48,13 @@ def build_parser(words: Sequence[str]) -> _Parser:
     parser.add_argument("--version", action="store_true", help="show the version and exit")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    named = next((word for word in words if word in COMMANDS), None)
+    named = next((word for word in words if not word.startswith("-")), None)
     for name, text in COMMANDS.items():
         if name == named:
             add_command(name, commands)
         else:
             commands.add_parser(name, help=text)
-    if named is None:
-        named = next((word for word in words if word in installed()), None)
+    if named not in COMMANDS:
         for name in installed():
             if name == named:
                 add_command(name, commands)

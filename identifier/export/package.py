@@ -377,8 +377,8 @@ def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
         signals = "v_x, r, a_y and steering"
         flagged = " Use it where\n`side_slip_observable` is 1, and as sure as `v_y_sd` says."
         absent.append(
-            "`v_y` may be NaN, and is where no sensor measures it; implausible values count as "
-            f"NaN.\nIts estimate is in `{name}_output`, which `{name}_get_output` "
+            "`v_y` of the input is not read.\n"
+            f"Its estimate is in `{name}_output`, which `{name}_get_output` "
             f"copies.{flagged if specialized.side_slip == SIDE_SLIP else ''} All of\nit is zero "
             "before the first sample, and where samples have been refused for too long."
         )

@@ -104,6 +104,11 @@ def test_an_exporter_is_a_command_that_reads_a_model(tmp_path, capsys):
     assert "their_command" in sys.modules
 
 
+def test_a_command_is_the_first_word_whatever_its_arguments_are_called():
+    for words in (["fleet", "merge", "demo"], ["fleet", "merge", "store", "--out", "plan"]):
+        assert build_parser(words).parse_args(words).command == "fleet"
+
+
 def test_the_list_of_commands_imports_none_and_says_which_is_broken(capsys):
     before = set(sys.modules)
     listed = " ".join(build_parser([]).format_help().split())
