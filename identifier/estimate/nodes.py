@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.estimate.drive import (
     ALONG,
     LONGITUDINAL,
@@ -31,7 +32,7 @@ ROLLS, JERKS = 5.0, 3.0  # Hz of a sedan, below which a_y rolls the body and is 
 FEWEST = 3  # nodes of a segment
 
 
-class TooShortError(ValueError):
+class TooShortError(TireidError, ValueError):
     """A log has too few samples for states of its own."""
 
 

@@ -374,7 +374,7 @@ def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys, unmad
     assert summary["gains"]["eta_W"] == 12.5
     for extra, said in (
         (["--method", "integral"], "give only one of --method, --design"),
-        (["--seed", "0"], f"--seed is for a method: the seed is in {design} stands in it"),
+        (["--seed", "0"], f"--seed is for a method: the seed of a design is in {design}"),
     ):
         assert said in refusal(capsys, [*words[:-1], tmp_path / "other", *extra])
 
