@@ -52,18 +52,17 @@ def test_every_file_compiles_as_it_lies_without_a_warning(file, single, compiler
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_what_is_replayed_of_a_tracker_compiles_too(compiler):
-    words = ["-Impc/export/target", "@compile_flags.txt", "-Werror", "-fsyntax-only"]
-    answer = run(compiler, *words, "codegen/target/replay.c")
+@pytest.mark.parametrize(
+    ("option", "file"),
+    [
+        ("-Impc/export/target", "codegen/target/replay.c"),  # what is replayed of a tracker
+        ("-DMODEL_FMI=2", "identifier/export/c_fmu/fmi.c"),
+        ("-DMODEL_FMI=3", "identifier/export/c_fmu/fmi.c"),
+    ],
+)
+def test_other_uses_of_a_file_compile_too(compiler, option, file):
+    answer = run(compiler, option, "@compile_flags.txt", "-Werror", "-fsyntax-only", file)
     assert (answer.returncode, answer.stderr) == (0, "")
-
-
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_the_interface_of_an_fmu_compiles_for_both_standards(compiler):
-    for version in (2, 3):
-        words = ["@compile_flags.txt", "-Werror", "-fsyntax-only", f"-DMODEL_FMI={version}"]
-        answer = run(compiler, *words, "identifier/export/c_fmu/fmi.c")
-        assert (answer.returncode, answer.stderr) == (0, ""), version
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -13,21 +13,27 @@ ORDER = ("codegen", "models", "identifier", "mpc", "tireid")
 PLOTTING_ALLOWED = ("tireid", "examples", "benchmarks")
 
 
-def imported_packages(source: str) -> set[str]:
-    packages = set()
+def imported(source: str) -> set[str]:
+    """Modules that a file imports, and what it imports from them, by their full names."""
+    names = set()
     for node in nodes_of(source):
         if isinstance(node, ast.Import):
-            packages |= {alias.name.split(".")[0] for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            packages.add(node.module.split(".")[0])
-    return packages
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def commands_imported(source: str) -> set[str]:
+    """The modules of commands that a file imports."""
+    return {name for name in imported(source) if name.split(".")[:2] == ["tireid", "commands"]}
 
 
 def wrong_imports(package: str, source: str) -> set[str]:
     """What a file of `package` imports from the packages to its right, or to draw."""
     later = set(ORDER[ORDER.index(package) + 1 :])
     drawing = set() if package in PLOTTING_ALLOWED else {"matplotlib"}
-    return imported_packages(source) & (later | drawing)
+    return {name.split(".")[0] for name in imported(source)} & (later | drawing)
 
 
 @pytest.mark.parametrize("package", ORDER)
@@ -59,17 +65,6 @@ def test_the_rule_catches_planted_circles_of_late_and_of_typed_imports():
     through = {"m/__init__.py": "from m.a import x", "m/a.py": "from m import x"}
     parsed = {name: ast.parse(text) for name, text in through.items()}
     assert house.circles(parsed) == [["m/__init__.py", "m/a.py"]]
-
-
-def commands_imported(source: str) -> set[str]:
-    """The modules of commands that a file imports."""
-    modules = set()
-    for node in nodes_of(source):
-        if isinstance(node, ast.Import):
-            modules |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            modules |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name for name in modules if name.split(".")[:2] == ["tireid", "commands"]}
 
 
 def test_commands_call_the_interface_and_nothing_calls_the_commands():

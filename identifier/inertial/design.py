@@ -94,6 +94,7 @@ class InertialIdentifier(Method):
             raise ValueError(f"dt must be positive, it is {self.dt}")
         require_within(ValueError, 0.5, 100.0, roll_frequency=self.roll_frequency)
         require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
+        require_within(ValueError, -1.0, 1.0, a_y_late=self.a_y_late)
         ahead, aside = self.sensor_position
         require_within(ValueError, -20.0, 20.0, ahead=ahead, aside=aside)
 

@@ -5,59 +5,38 @@ import numpy as np
 import pytest
 
 import codegen.scan
-from codegen import CompilationError, Scan
-
-
-def leaky_step() -> ca.Function:
-    """A matrix and a vector state, a sample input and a constant."""
-    M, s, u, c = ca.SX.sym("M", 2, 3), ca.SX.sym("s", 2), ca.SX.sym("u", 3), ca.SX.sym("c")
-    M_next = 0.9 * M + c * s @ u.T
-    s_next = 0.5 * s + M @ u
-    return ca.Function(
-        "leaky",
-        [M, s, u, c],
-        [M_next, s_next, M @ u, M[0, 1]],
-        ["M", "s", "u", "c"],
-        ["M_next", "s_next", "y", "corner"],
-    )
+from codegen import CompilationError, Scan, Stepper
+from tests.codegen.conftest import leaky_step
 
 
 def by_hand(M, s, u, c):
-    states, outputs = [], []
+    rows = []
     for row in u:
-        states.append((M, s))
-        outputs.append(M @ row)
-        M, s = 0.9 * M + c * np.outer(s, row), 0.5 * s + M @ row
-    return states, outputs, M, s
-
-
-@pytest.fixture(params=["compiled", "virtual machine"])
-def scan(request, monkeypatch, tmp_path):
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
-    if request.param == "virtual machine":
-        monkeypatch.setattr(codegen.scan, "load_library", lambda *_: None)
-    return Scan(leaky_step(), carry=("M", "s"), over=("u",))
+        rows.append((M, s, M @ np.exp(row), M[0, 1], 2 * M))
+        M, s = 0.9 * M + c * np.outer(np.sin(s), row), 0.5 * s + M @ row
+    return {"M_final": M, "s_final": s}, rows
 
 
 @pytest.mark.parametrize("n", [1, 7, 8])
 @pytest.mark.parametrize("every", [1, 3])
-def test_scan_repeats_the_loop_by_hand(scan, rng, n, every):
-    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(n, 3))
-    states, outputs, M_final, s_final = by_hand(M, s, u, 0.1)
-    record = scan(n, {"M": M, "s": s, "u": u, "c": np.array(0.1)}, every=every)
-    np.testing.assert_allclose(record["M"], [m for m, _ in states][::every], rtol=1e-13)
-    np.testing.assert_allclose(record["s"], [v for _, v in states][::every], rtol=1e-13)
-    np.testing.assert_allclose(record["y"], outputs[::every], rtol=1e-13)
-    np.testing.assert_allclose(record["corner"][:, 0], [m[0, 1] for m, _ in states][::every])
-    np.testing.assert_allclose(record["M_final"], M_final, rtol=1e-13)
-    np.testing.assert_allclose(record["s_final"], s_final, rtol=1e-13)
+def test_scan_repeats_the_loop_by_hand(scan, values, n, every):
+    values["u"] = values["u"][:n]
+    before = {port: value.copy() for port, value in values.items()}
+    expected, rows = by_hand(**values)
+    record = scan(n, values, every=every)
+    for k, port in enumerate(("M", "s", "y", "corner", "twice")):
+        found = record[port][:, 0] if port == "corner" else record[port]
+        column = [row[k] for row in rows[::every]]
+        np.testing.assert_allclose(found, column, rtol=1e-13, err_msg=port)
+    for port, value in expected.items():
+        np.testing.assert_allclose(record[port], value, rtol=1e-13)
+    for port, value in before.items():
+        np.testing.assert_array_equal(values[port], value)
 
 
 @pytest.mark.parametrize("ports", [(), ("s",), ("corner",), ("M", "y")])
 @pytest.mark.parametrize("every", [1, 3])
-def test_what_is_recorded_alone_has_the_bits_that_it_has_among_all(scan, rng, ports, every):
-    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(8, 3))
-    values = {"M": M, "s": s, "u": u, "c": np.array(0.1)}
+def test_what_is_recorded_alone_has_the_bits_that_it_has_among_all(scan, values, ports, every):
     everything, some = scan(8, values, every=every), scan(8, values, every=every, ports=ports)
     assert {"M_final", "s_final"} <= set(some)
     assert {p.removesuffix("_final").removesuffix("_all") for p in some} == {"M", "s", *ports}
@@ -66,36 +45,41 @@ def test_what_is_recorded_alone_has_the_bits_that_it_has_among_all(scan, rng, po
         np.testing.assert_array_equal(array, everything[port], err_msg=port)
 
 
-def test_scan_does_not_change_what_it_is_given(scan, rng):
-    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(5, 3))
-    before = M.copy(), s.copy(), u.copy()
-    scan(5, {"M": M, "s": s, "u": u, "c": np.array(0.1)})
-    for now, then in zip((M, s, u), before, strict=True):
-        np.testing.assert_array_equal(now, then)
+@pytest.mark.parametrize(
+    ("n", "change", "said"),
+    [
+        (8, {"u": np.zeros((3, 8))}, r"u must have shape \(8, 3\)"),
+        (8, {"M": np.zeros((3, 2))}, r"M must have shape \(2, 3\)"),
+        (8, {"M": np.zeros(6)}, r"M must have shape \(2, 3\)"),
+        (8, {"s": np.zeros(3)}, r"s must have shape \(2, 1\)"),
+        (8, {"c": None}, r"missing inputs \['c'\]"),
+        (1, {"u": np.zeros(4)}, r"u must have shape \(1, 3\)"),
+    ],
+)
+def test_wrong_shapes_and_names_are_refused(scan, values, n, change, said):
+    given = {port: value for port, value in (values | change).items() if value is not None}
+    with pytest.raises(ValueError, match=said):
+        scan(n, given)
 
 
-def test_wrong_shapes_and_names_are_refused(scan):
-    good = {"M": np.zeros((2, 3)), "s": np.zeros(2), "u": np.zeros((4, 3)), "c": np.array(0.1)}
-    with pytest.raises(ValueError, match=r"u must have shape \(4, 3\)"):
-        scan(4, good | {"u": np.zeros((3, 4))})
-    with pytest.raises(ValueError, match=r"M must have shape \(2, 3\)"):
-        scan(4, good | {"M": np.zeros((3, 2))})
-    with pytest.raises(ValueError, match=r"missing inputs \['c'\]"):
-        scan(4, {k: v for k, v in good.items() if k != "c"})
-    with pytest.raises(ValueError, match=r"records no \['u'\], only \['M', 'corner', 's', 'y'\]"):
-        scan(4, good, ports=("u", "M"))
+def test_ports_that_there_are_not_are_refused(scan, values):
+    with pytest.raises(ValueError, match=r"records no \['u'\], only \['M', 'corner', 's',"):
+        scan(8, values, ports=("u", "M"))
     with pytest.raises(ValueError, match="no output 'u_next'"):
         Scan(leaky_step(), carry=("u",), over=())
 
 
-def test_a_library_is_built_once(monkeypatch, tmp_path, caplog):
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
-    inputs = {"M": np.zeros((2, 3)), "s": np.zeros(2), "u": np.zeros((4, 3)), "c": np.array(0.1)}
+def test_a_single_sample_may_come_flat(scan, values):
+    flat = scan(1, values | {"u": values["u"][0]})
+    np.testing.assert_allclose(flat["y"], [values["M"] @ np.exp(values["u"][0])], rtol=1e-13)
+
+
+def test_a_library_is_built_once(cache, values, caplog):
     with caplog.at_level("INFO", logger="tireid"):
         for _ in range(2):
-            Scan(leaky_step(), carry=("M", "s"), over=("u",))(4, inputs)
+            Scan(leaky_step(), carry=("M", "s"), over=("u",))(8, values)
     assert sum("compiling leaky" in message for message in caplog.messages) == 1
-    assert len(list(tmp_path.glob("leaky-*.so"))) == 1
+    assert len(list(cache.glob("leaky-*.so"))) == 1
 
 
 def no_compiler(*_):
@@ -108,48 +92,31 @@ def no_space(*_):
 
 @pytest.mark.parametrize("failure", [no_compiler, no_space])
 def test_a_build_that_fails_is_one_warning_and_the_same_numbers(
-    monkeypatch, tmp_path, caplog, rng, failure
+    monkeypatch, cache, caplog, values, failure
 ):
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
-    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(5, 3))
     monkeypatch.setattr(codegen.scan, "load_library", failure)
     scan = Scan(leaky_step(), carry=("M", "s"), over=("u",))
     with caplog.at_level("WARNING", logger="tireid"):
         for _ in range(2):
-            record = scan(5, {"M": M, "s": s, "u": u, "c": np.array(0.1)})
-    np.testing.assert_allclose(record["M_final"], by_hand(M, s, u, 0.1)[2], rtol=1e-13)
+            record = scan(8, values)
+    np.testing.assert_allclose(record["M_final"], by_hand(**values)[0]["M_final"], rtol=1e-13)
     assert len(caplog.messages) == 1
     assert "virtual machine" in caplog.messages[0]
     assert "\n" not in caplog.messages[0]
 
 
-def test_a_compiler_that_cannot_compile_is_no_error(monkeypatch, tmp_path, caplog):
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+def test_a_compiler_that_cannot_compile_is_no_error(monkeypatch, cache, values, caplog):
     monkeypatch.setenv("CC", "false")
     codegen.find_compiler.cache_clear()
-    inputs = {"M": np.zeros((2, 3)), "s": np.zeros(2), "u": np.zeros((4, 3)), "c": np.array(0.1)}
     try:
         with caplog.at_level("WARNING", logger="tireid"):
-            Scan(leaky_step(), carry=("M", "s"), over=("u",))(4, inputs)
+            Scan(leaky_step(), carry=("M", "s"), over=("u",))(8, values)
     finally:
         codegen.find_compiler.cache_clear()
     assert "false refused the generated code of leaky" in caplog.messages[0]
 
 
-def test_a_single_sample_may_come_flat_and_one_too_many_is_refused(scan, rng):
-    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=3)
-    values = {"M": M, "s": s, "u": u, "c": np.array(0.1)}
-    np.testing.assert_allclose(scan(1, values)["y"], [M @ u], rtol=1e-13)
-    with pytest.raises(ValueError, match=r"u must have shape \(1, 3\)"):
-        scan(1, values | {"u": np.zeros(4)})
-    with pytest.raises(ValueError, match=r"M must have shape \(2, 3\)"):
-        scan(1, values | {"M": np.zeros(6)})
-    with pytest.raises(ValueError, match=r"s must have shape \(2, 1\)"):
-        scan(1, values | {"s": np.zeros(3)})
-
-
-def test_a_matrix_for_each_sample_is_laid_out_by_columns_in_one_row(monkeypatch, tmp_path, rng):
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+def test_a_matrix_for_each_sample_is_laid_out_by_columns_in_one_row(cache, rng):
     s, A = ca.SX.sym("s", 2), ca.SX.sym("A", 2, 3)
     step = ca.Function("turned", [s, A], [A[:, :2] @ s, A], ["s", "A"], ["s_next", "seen"])
     matrices = rng.normal(size=(5, 2, 3))
@@ -165,3 +132,54 @@ def test_a_matrix_for_each_sample_is_laid_out_by_columns_in_one_row(monkeypatch,
         np.testing.assert_allclose(record["s_final"], expected, rtol=1e-12)
     with pytest.raises(ValueError, match=r"A must have shape \(5, 6\), not \(5, 2\)"):
         compiled(5, {"s": np.ones(2), "A": np.ones((5, 2))})
+
+
+# A step taken sample by sample, or several at once, carries and tells the bits of the loop.
+
+
+@pytest.mark.parametrize("samples", [1, 2, 4])
+def test_steps_are_bit_equal_to_the_loop(scan, values, samples):
+    whole, u = scan(8, values), values.pop("u")
+    stepper = Stepper(scan, values, samples)
+    for k in range(0, 8, samples):
+        for port in ("M", "s"):
+            np.testing.assert_array_equal(stepper.state()[port], whole[port][k])
+        stepper.inputs["u"][:] = u[k : k + samples] if samples > 1 else u[k]
+        stepper.advance()
+        last, twice = k + samples - 1, stepper.outputs["twice"].reshape(3, 2).T
+        np.testing.assert_array_equal(stepper.outputs["y"], whole["y"][last])
+        np.testing.assert_array_equal(twice, whole["twice"][last])
+        for port in ("M", "s"):
+            np.testing.assert_array_equal(stepper.before(port), whole[port][last])
+            np.testing.assert_array_equal(stepper.value(port), whole[f"{port}_all"][last + 1])
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_run_goes_on_from_another_state(scan, values, rng, samples):
+    other, u = rng.normal(size=(2, 3)), values.pop("u")[:samples]
+    stepper = Stepper(scan, values, samples)
+    for _ in range(2):
+        stepper.begin("M", other)
+        stepper.begin("s", values["s"])
+        stepper.inputs["u"][:] = u
+        stepper.advance()
+        expected = scan(samples, values | {"M": other, "u": u})
+        np.testing.assert_array_equal(stepper.value("M"), expected["M_final"])
+        np.testing.assert_array_equal(stepper.outputs["y"], expected["y"][-1])
+
+
+def test_the_values_at_the_start_stay_the_callers(scan, values):
+    start = values | {"M": np.asfortranarray(values["M"])}
+    stepper = Stepper(scan, {port: start[port] for port in ("M", "s", "c")})
+    kept = {port: start[port].copy() for port in ("M", "s")}
+    stepper.inputs["u"][:] = 1.0
+    state = stepper.state()
+    stepper.advance()
+    for port, value in kept.items():
+        np.testing.assert_array_equal(start[port], value)
+        np.testing.assert_array_equal(state[port], value)  # a copy, not a view
+
+
+def test_a_wrong_shape_is_refused_at_the_start(scan):
+    with pytest.raises(ValueError, match=r"s must have shape \(2, 1\)"):
+        Stepper(scan, {"M": np.zeros((2, 3)), "s": np.zeros(3), "c": np.array(0.1)})

@@ -7,10 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from identifier.axle import AxleIdentifier
 from identifier.frozen import FrozenModelError
+from identifier.run import identify
 from identifier.tire_model import load_model
+from models.maneuvers import RandomSteer
+from models.plant import Plant
 from models.recordings import Recording, read_recording
-from models.vehicle import Vehicle
+from models.vehicle import Vehicle, sedan
 
 CAR = Vehicle(
     mass=1500.0, yaw_inertia=2500.0, l_f=1.15, l_r=1.55, cornering_stiffness_front=1.4e5,
@@ -58,6 +62,59 @@ def driven(n, dt, speed, amplitude):
         v_y += dt / fine * ((F[0] + F[1]) / p.m - speed * r)
         r += dt / fine * (p.l_f * F[0] - p.l_r * F[1]) / p.I_z
     return np.array(rows).T.copy()
+
+
+def learnt(recording, car, start=None):
+    """The model of the axle identifier after a recording."""
+    return identify(recording, car, AxleIdentifier.for_vehicle(car), start=start).freeze()
+
+
+def missed(model, recording, counted=slice(None)):
+    """Rms error of a model's forces over the rms of the true ones, per axle (2,)."""
+    force = recording.axle_force
+    error = (model.axle_force(recording) - force)[counted]
+    return np.sqrt(np.mean(error**2, axis=0) / np.mean(force[counted] ** 2, axis=0))
+
+
+def bicycle(car, t, v_x, delta, push, lag=None, fine=5):
+    """Return v_y, r (n,) and the forces across (n, 2) of a bicycle, by midpoint steps.
+
+    v_x(t), delta(t) [m/s, rad].   push(slip, v_x) : of the axles across their wheels [N], (2,).
+    lag : of slip [m], (2,) or a number.
+    """
+    arm = np.array([car.l_f, -car.l_r])
+
+    def rates(time, moved):
+        v, steered = v_x(time), np.array([delta(time), 0.0])
+        alpha = steered - np.arctan((moved[0] + arm * moved[1]) / v)
+        slip = alpha if lag is None else moved[2:]
+        force = push(slip, v) * np.cos(steered)
+        follows = np.zeros(2) if lag is None else v / lag * (alpha - slip)
+        turn = arm @ force / car.yaw_inertia
+        return np.array([force.sum() / car.mass - v * moved[1], turn, *follows]), force
+
+    moved, rows, h = np.zeros(4), [], (t[1] - t[0]) / fine
+    for begin in t:
+        rows.append((*moved[:2], *rates(begin, moved)[1]))
+        for time in begin + h * np.arange(fine):
+            half = moved + h / 2 * rates(time, moved)[0]
+            moved = moved + h * rates(time + h / 2, half)[0]
+    v_y, r, *force = np.array(rows).T
+    return v_y, r, np.column_stack(force)
+
+
+def steered(seed, duration, *, amplitude=0.08, onset=1.0, speed=20.0, car=None, **road):
+    """A run of the plant of a car, the sedan, that is steered at random."""
+    maneuver = RandomSteer(
+        amplitude=amplitude,
+        frequency=0.5,
+        seed=seed,
+        onset=onset,
+        rate_limit=1.0,
+        duration=duration,
+    )
+    name = f"drive{seed}"
+    return Plant(car or sedan()).simulate(maneuver, speed=speed, name=name, **road)
 
 
 def felt(recording):
@@ -120,26 +177,21 @@ RACE = Vehicle(name="race", mass=1100.0, yaw_inertia=1600.0, l_f=1.45, l_r=1.35,
 @cache
 def pressed_down(lift):
     """Time, speed, steering, lateral velocity, yaw rate, acceleration of `pressed`, (n,) each."""
-    car = RACE
-    dt, kappa = 0.01, lift / (100.0 / 3.6) ** 2
-    t = np.arange(0.0, 60.0, dt)
-    v_x = 31.5 + 13.5 * np.sin(0.35 * t)
-    a_y = 7.0 * np.sin(2.0 * t) + 4.0 * np.sin(4.3 * t)  # that steering asks for, about
-    delta = a_y * (car.wheelbase / v_x**2 + 0.002)
-    loads, moving, fine = np.array(car.axle_loads), np.zeros(2), 10
-    v_y, r, felt = np.empty((3, t.size))
-    for k in range(t.size):
-        v_y[k], r[k] = moving
-        for i in range(fine):
-            sideways = moving[0] + np.array([car.l_f, -car.l_r]) * moving[1]
-            slip = np.array([delta[k], 0.0]) - np.arctan(sideways / v_x[k])
-            force = loads * (1.0 + kappa * v_x[k] ** 2) * 1.6 * np.tanh(16.0 * slip)
-            across = force[0] * np.cos(delta[k]) + force[1]
-            felt[k] = across / car.mass if i == 0 else felt[k]
-            turn = car.l_f * force[0] * np.cos(delta[k]) - car.l_r * force[1]
-            rates = across / car.mass - v_x[k] * moving[1], turn / car.yaw_inertia
-            moving = moving + dt / fine * np.array(rates)
-    return t, v_x, delta, v_y, r, felt
+    loads, kappa = np.array(RACE.axle_loads), lift / (100.0 / 3.6) ** 2
+    t = np.arange(0.0, 60.0, 0.01)
+
+    def v_x(t):
+        return 31.5 + 13.5 * np.sin(0.35 * t)
+
+    def delta(t):
+        a_y = 7.0 * np.sin(2.0 * t) + 4.0 * np.sin(4.3 * t)  # that steering asks for, about
+        return a_y * (RACE.wheelbase / v_x(t) ** 2 + 0.002)
+
+    def push(slip, v_x):
+        return loads * (1.0 + kappa * v_x**2) * 1.6 * np.tanh(16.0 * slip)
+
+    v_y, r, force = bicycle(RACE, t, v_x, delta, push)
+    return t, v_x(t), delta(t), v_y, r, force.sum(axis=1) / RACE.mass
 
 
 def areas_of(car, lift):

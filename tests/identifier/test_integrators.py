@@ -37,39 +37,5 @@ def test_euler_is_of_first_and_rk4_of_fourth_order():
     check_order(euler, 1)
     check_order(rk4, 4)
     assert {"euler": euler, "rk4": rk4} == INTEGRATORS
-
-
-def ahead(state, slope, h):
-    return [s + h * k for s, k in zip(state, slope, strict=True)]
-
-
-def planted_rk4(middle, last, weights):
-    """rk4 with other stages: a mean of slopes, the second and third of which lie at `middle` h."""
-
-    def step(derivative, state, h):
-        k1 = derivative(state)
-        k2 = derivative(ahead(state, k1, middle[0] * h))
-        k3 = derivative(ahead(state, k2, middle[1] * h))
-        k4 = derivative(ahead(state, k3, last * h))
-        mean = [
-            sum(w * k for w, k in zip(weights, ks, strict=True))
-            for ks in zip(k1, k2, k3, k4, strict=True)
-        ]
-        return ahead(state, mean, h)
-
-    return step
-
-
-def test_a_planted_error_in_the_stages_is_caught():
-    right = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
-    check_order(planted_rk4((0.5, 0.5), 1.0, right), 4)
-    for wrong in (
-        planted_rk4((0.5, 1.0), 1.0, right),
-        planted_rk4((1.0, 0.5), 1.0, right),
-        planted_rk4((0.5, 0.5), 0.5, right),
-        planted_rk4((0.5, 0.5), 1.0, (1 / 4, 1 / 4, 1 / 4, 1 / 4)),
-        planted_rk4((0.5, 0.5), 1.0, (1 / 6, 2 / 3, 0.0, 1 / 6)),
-        euler,
-    ):
-        with pytest.raises(AssertionError):
-            check_order(wrong, 4)
+    with pytest.raises(AssertionError):
+        check_order(euler, 4)

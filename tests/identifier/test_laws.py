@@ -75,33 +75,9 @@ def check_descent(case, laws=weight_rates):
     np.testing.assert_allclose(V_dot, V_expected, rtol=RESIDUAL, atol=RESIDUAL)
 
 
-def check_finite_differences(case, laws=weight_rates):
-    f, h = np.array([0.3, -0.7]), 1e-6
-
-    def loss(W, V):
-        residual = f - W @ np.tanh(V @ case["x_bar"])
-        return case["z"] @ -np.linalg.solve(case["A_d"], residual)
-
-    W_dot, V_dot = rates(case, drive=case["z"], laws=laws)
-    for i, j in np.ndindex(2, N_H):
-        e = np.zeros((2, N_H))
-        e[i, j] = h
-        slope = (loss(case["W"] + e, case["V"]) - loss(case["W"] - e, case["V"])) / (2 * h)
-        assert W_dot[i, j] == pytest.approx(-3.0 * slope, rel=1e-6, abs=1e-8)
-    for i, j in np.ndindex(N_H, N_IN):
-        e = np.zeros((N_H, N_IN))
-        e[i, j] = h
-        slope = (loss(case["W"], case["V"] + e) - loss(case["W"], case["V"] - e)) / (2 * h)
-        assert V_dot[i, j] == pytest.approx(-2.0 * slope, rel=1e-6, abs=1e-8)
-
-
 def test_laws_descend_the_static_loss(case):
     """(11)-(13) without leakage are the gradient of zᵀ ξ̃ through the error at rest, W and V."""
     check_descent(case)
-
-
-def test_laws_agree_with_finite_differences_of_the_loss(case):
-    check_finite_differences(case)
 
 
 def without_transpose(*, A_d, **others):
@@ -122,10 +98,9 @@ def without_slope(*, sigma, V, x_bar, **others):
 
 
 @pytest.mark.parametrize("planted", [without_transpose, opposite_error, without_slope])
-@pytest.mark.parametrize("check", [check_descent, check_finite_differences])
-def test_a_planted_error_of_the_laws_is_caught(case, check, planted):
+def test_a_planted_error_of_the_laws_is_caught(case, planted):
     with pytest.raises(AssertionError):
-        check(case, laws=planted)
+        check_descent(case, laws=planted)
 
 
 def test_leakage_pulls_weights_back_in_proportion_to_the_error(case):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from codegen import Scan, arrays
+from codegen import arrays
 from identifier.axle import AxleIdentifier
 from identifier.methods import make_method
 from identifier.prediction import predict
@@ -93,6 +93,8 @@ def test_the_parts_of_a_run_over_two_logs_are_those_of_one_in_a_piece(whole, met
     run = identify(drive, CAR, design)
     pieces = run.parts(logs)
     assert len(run.state.run.parts) == 1
+    for port, values in identify(logs[0], CAR, design).state.items():  # the first, as if alone
+        np.testing.assert_array_equal(values, pieces[0].state[port], err_msg=port)
     frozen = [one.freeze().to_dict() for one in pieces]
     request.getfixturevalue("in_blocks")
     blocks = identify(drive, CAR, design).parts(logs)
@@ -108,36 +110,20 @@ def test_the_parts_of_a_run_over_two_logs_are_those_of_one_in_a_piece(whole, met
     assert [one.freeze().to_dict() for one in blocks] == frozen
 
 
-@pytest.mark.parametrize("method", ["axle", "integral"])
-def test_the_first_of_two_logs_ends_as_if_it_were_alone(whole, method):
-    logs = [whole.between(0.0, 6.5), whole.between(8.0, 11.0)]
-    design = make_method(method, CAR)
-    first, _ = identify(joined(logs), CAR, design).parts(logs)
-    alone = identify(logs[0], CAR, design)
-    for port, values in alone.state.items():
-        np.testing.assert_array_equal(values, first.state[port], err_msg=port)
-
-
-def test_only_blocks_that_are_asked_for_are_computed_again(whole, in_blocks):
-    blocks = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
-    asked = np.array([130, 1000])
-    parts = [block.part for block in blocks.blocks(asked)]
-    assert len(parts) == 2
-    assert all(part.start <= k < part.stop for part, k in zip(parts, asked, strict=True))
-
-
-def test_only_blocks_that_are_asked_for_are_given_of_a_run_in_memory(whole, request):
+def test_only_blocks_that_are_asked_for_are_computed_again_or_given_of_a_run_in_memory(
+    whole, request
+):
     run = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
     piece = replace(run, state=dict(run.state), outputs=dict(run.outputs))
     request.getfixturevalue("in_blocks")
-    asked = np.array([130, 1000])
-    given = list(piece.blocks(asked))
-    assert len(given) == 2 and not isinstance(piece.state, Recalled)
-    for block, k in zip(given, asked, strict=True):
-        assert block.part.start <= k < block.part.stop
-        for port, values in piece.state.items():
-            np.testing.assert_array_equal(block.state[port][k - block.part.start], values[k])
-    assert list(piece.blocks(asked[:0])) == []
+    again, asked = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR)), np.array([130, 1000])
+    assert isinstance(again.state, Recalled) and not isinstance(piece.state, Recalled)
+    for one in (again, piece):
+        for block, k in zip(one.blocks(asked), asked, strict=True):
+            assert block.part.start <= k < block.part.stop
+            for port, values in piece.state.items():
+                np.testing.assert_array_equal(block.state[port][k - block.part.start], values[k])
+        assert list(one.blocks(asked[:0])) == []
 
 
 def test_what_was_asked_for_of_one_block_is_computed_together_of_the_next(
@@ -306,22 +292,3 @@ def test_memory_that_grows_would_be_noticed(lengths, monkeypatch):
     short = peak_of(lengths[0])
     monkeypatch.setattr(arrays, "IN_MEMORY", 1e12)
     assert peak_of(lengths[1]) - short > 8 * (len(lengths[1]) - len(lengths[0]))
-
-
-@pytest.mark.parametrize("method", ["axle", "integral"])
-def test_no_level_of_optimization_changes_a_bit(method, monkeypatch, tmp_path):
-    """What tests compile sooner is what everybody runs."""
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
-    recording = drive(n=800)
-    design = AxleIdentifier.for_vehicle(CAR) if method == "axle" else make_method(method, CAR)
-    setup = design.setup(CAR, None).begin(recording.x[0])
-    step, found = setup.scan, {}
-    for level in ("0", "1", "2", "3"):
-        monkeypatch.setenv("TIREID_OPTIMIZE", level)
-        anew = setup._replace(scan=Scan(step.step, carry=step.carry, over=step.over))
-        (block,) = anew.run(recording, (slice(0, len(recording)),))
-        found[level] = {**block.state, **block.outputs}
-    assert len([*tmp_path.glob("*.so")]) == 4
-    for level in ("1", "2", "3"):
-        for port, values in found[level].items():
-            np.testing.assert_array_equal(values, found["0"][port], err_msg=f"{port} at {level}")

@@ -1,7 +1,8 @@
 """What every method answers: its ports, a setup without a recording, where observers begin."""
 
 import pickle
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -101,6 +102,30 @@ def test_a_step_with_an_output_or_state_that_nobody_describes_is_not_exported(mo
     monkeypatch.setattr(type(method), "ports", ports)
     with pytest.raises(KeyError, match="washed"):
         specialize(method, CAR)
+
+
+def numbers_of(record, before=()):
+    """Where a record and those in it hold numbers."""
+    for field in fields(record):
+        value, here = getattr(record, field.name), (*before, field.name)
+        if is_dataclass(value):
+            yield from numbers_of(value, here)
+        elif isinstance(value, float):
+            yield here
+
+
+def changed(record, place, value):
+    name, *rest = place
+    return replace(record, **{name: changed(getattr(record, name), rest, value) if rest else value})
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_number_that_no_method_has_is_refused_by_its_name(name):
+    method, endless = make_method(name, CAR), ("W_max", "V_max")  # where there is no ball
+    for place, value in product(numbers_of(method), (np.nan, np.inf, -1e9)):
+        if value < np.inf or np.isnan(value) or place[-1] not in endless:
+            with pytest.raises(ValueError, match=place[-1]):
+                changed(method, place, value)
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -48,20 +48,6 @@ def test_a_run_goes_on_from_stored_weights(name, car, drive):
     np.testing.assert_array_equal(driven(online, recording), history.axle_force)
 
 
-def test_a_sample_that_is_no_number_is_refused_and_counted(car, drive):
-    recording, method = drive(n=200), AxleIdentifier.for_vehicle(car)
-    online, clean = (OnlineIdentifier(method, car, 0.01) for _ in range(2))
-    for k, (x, u, v_x) in enumerate(zip(recording.x, recording.u, recording.v_x, strict=True)):
-        clean.update(x, u, v_x)
-        if k % 10 in (3, 4):
-            bad = ((np.array([np.nan, 0.0]), u, v_x), (x, u, np.inf))
-            assert np.isfinite(online.update(*bad[k % 2])).all()
-        else:
-            online.update(x, u, v_x)
-    assert (online.counts.samples, online.counts.refused) == (160, 40)
-    assert clean.counts.refused == 0
-
-
 def test_preparing_leaves_no_trace(car, drive):
     recording, method = drive(n=100), make_method("integral", car)
     fresh, prepared = (OnlineIdentifier(method, car, 0.01) for _ in range(2))

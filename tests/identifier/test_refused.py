@@ -66,18 +66,6 @@ def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
         assert not online.stale
 
 
-@pytest.mark.parametrize("name", ["axle", "magic_formula_ekf", "integral"])
-def test_forces_are_right_again_three_seconds_after_a_speed_that_is_lost(name, slalom):
-    rows, method = rows_of(slalom), make_method(name, CAR)
-    clean = driven(method, rows)[0]
-    size = np.sqrt((slalom.axle_force**2).mean(0))
-    for begin, gap in itertools.product((1200, 1229, 1258), (10, 25, 50, 75, 150, 250, 400)):
-        broken = rows.copy()
-        broken[begin : begin + gap, 0] = np.nan
-        force = driven(method, broken)[0]
-        assert np.abs(((force - clean) / size)[begin + gap + 300 :]).max() < 0.05, (begin, gap)
-
-
 def test_a_gap_that_does_not_count_as_time_costs_more(slalom):
     """What the rule is for: the same samples left out, so that two far ones follow each other."""
     rows, truth = rows_of(slalom), slalom.axle_force

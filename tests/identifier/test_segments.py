@@ -8,13 +8,11 @@ import pytest
 import tireid as ti
 from identifier.axle.gate import GateState
 from identifier.methods import METHODS, make_method
-from identifier.prediction import predict
 from identifier.refused import GATE
 from identifier.run import identify
 from identifier.verdict.motion import Windows, motion_error
 from models.recordings import Recording, RecordingError, Repair, joined
 from models.recordings.evidence import windows
-from models.recordings.portion import portion
 
 CAR = ti.sedan()
 
@@ -144,14 +142,3 @@ def test_a_repair_keeps_to_each_segment(log, cut) -> None:
     for piece, source in zip(mended.segments, cut.segments, strict=True):
         alone, _ = late.apply(cut.taken(source), CAR)
         assert np.array_equal(mended.r[piece], alone.r)
-
-
-def test_a_gap_costs_no_more_than_the_seconds_that_are_missing(log, cut) -> None:
-    other = ti.sample_recording(CAR, seed=1)
-    whole, parts = (ti.identify(one, CAR).freeze() for one in (log, cut))
-    errors = [predict(tire, other).against_truth for tire in (whole, parts)]
-    assert all(errors) and errors[1].both < 1.3 * errors[0].both
-
-
-def test_a_portion_of_a_long_recording_does_not_join_over_a_gap(cut) -> None:
-    assert portion(cut).recording is cut

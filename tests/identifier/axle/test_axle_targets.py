@@ -16,6 +16,7 @@ from models.plant import Plant
 from models.recordings import read_recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
+from tests.identifier.conftest import learnt, missed
 
 NOISE = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))
 WEAVE = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=30.0)
@@ -23,17 +24,6 @@ WEAVE = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1
 
 def rms(force):
     return np.sqrt(np.mean(force**2, axis=0))
-
-
-def learnt(recording, car, start=None):
-    design = AxleIdentifier.for_vehicle(car)
-    return identify(recording, car, design, start=start).freeze(recording.t[-1])
-
-
-def miss(model, recording, where=slice(None)):
-    """Error over the size of the true force, per axle."""
-    error = (model.axle_force(recording) - recording.axle_force)[where]
-    return rms(error) / rms(recording.axle_force[where])
 
 
 @pytest.fixture(name="car", params=told_cars(), ids=lambda car: str(car.bicycle[4:]))
@@ -57,7 +47,7 @@ def test_learnt_on_a_hard_slalom_it_knows_the_gentle_drive(car, drives):
     for name, drive in zip(RUNS, drives, strict=True):
         for k, axle in enumerate(AXLES):
             limit = most(LIMITS["hard", name][k], f"hard/{name}/worst_told/{axle}")
-            assert miss(model, drive)[k] <= limit
+            assert missed(model, drive)[k] <= limit
 
 
 def test_learnt_on_a_gentle_drive_it_knows_its_range_and_says_where_it_ends(car, drives):
@@ -70,11 +60,11 @@ def test_learnt_on_a_gentle_drive_it_knows_its_range_and_says_where_it_ends(car,
     told = hard.alpha(car.l_f, car.l_r) * stiffness
     for axle, name in enumerate(AXLES):
         limit = most(INSIDE, f"inside/worst_told/{name}")
-        assert miss(model, hard, ~outside[:, axle])[axle] <= limit
-        assert miss(model, hard, slip[:, axle] <= reached[axle])[axle] <= INSIDE / 100.0
+        assert missed(model, hard, ~outside[:, axle])[axle] <= limit
+        assert missed(model, hard, slip[:, axle] <= reached[axle])[axle] <= INSIDE / 100.0
         beyond = outside[:, axle]
         linear = rms((told - hard.axle_force)[beyond]) / rms(hard.axle_force[beyond])
-        assert miss(model, hard, beyond)[axle] < linear[axle]
+        assert missed(model, hard, beyond)[axle] < linear[axle]
         assert beyond[slip[:, axle] > 1.1 * reached[axle]].all()
     assert model.outside(gentle).mean() < 0.1
 
@@ -100,22 +90,11 @@ def test_on_the_plant_it_repeats_the_slalom_and_knows_other_maneuvers(sensors, l
     slalom = plant.simulate(WEAVE, speed=20.0).recording(sensors, rng)
     model = learnt(slalom, sedan())
     assert (rms(model.axle_force(slalom) - slalom.axle_force) < limit).all()
+    begin = {"onset": 1.0, "rate_limit": 1.0}
+    lanes = {"amplitude": np.radians(4.5), "frequency": 0.5, "pause": 0.5, "duration": 10.0}
     for maneuver, speed in (
-        (
-            StepSteer(amplitude=np.radians(4.0), onset=1.0, rate_limit=1.0, duration=8.0),
-            20.0,
-        ),
-        (
-            DoubleLaneChange(
-                amplitude=np.radians(4.5),
-                frequency=0.5,
-                pause=0.5,
-                onset=1.0,
-                rate_limit=1.0,
-                duration=10.0,
-            ),
-            20.0,
-        ),
+        (StepSteer(amplitude=np.radians(4.0), duration=8.0, **begin), 20.0),
+        (DoubleLaneChange(**lanes, **begin), 20.0),
         (replace(WEAVE, amplitude=np.radians(2.5), duration=15.0), 25.0),
     ):
         other = plant.simulate(maneuver, speed=speed).recording(sensors, rng)

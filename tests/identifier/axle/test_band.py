@@ -22,9 +22,8 @@ from identifier.tire_model import load_model
 from identifier.verdict import calibrated, within_band
 from identifier.verdict.bands import color_of, quantile
 from identifier.verdict.motion import Windows
-from models.maneuvers import RandomSteer
-from models.plant import Plant
 from models.vehicle import sedan
+from tests.identifier.conftest import steered
 
 SLIP = np.linspace(-0.3, 0.3, 61)
 
@@ -42,13 +41,8 @@ def a_run(swinging):
 @pytest.fixture(scope="module")
 def swinging():
     """A sedan on the plant, and drives of it at three speeds."""
-    drives = []
-    for seed, speed in ((3, 20.0), (4, 17.0), (5, 23.0)):
-        steering = RandomSteer(
-            amplitude=0.08, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=22.0
-        )
-        drives.append(Plant(sedan()).simulate(steering, speed=speed).recording())
-    return sedan(), drives
+    speeds = {3: 20.0, 4: 17.0, 5: 23.0}
+    return sedan(), [steered(seed, 22.0, speed=v).recording() for seed, v in speeds.items()]
 
 
 @pytest.fixture(scope="module", name="model")
@@ -155,11 +149,7 @@ def test_a_band_is_wider_where_the_car_is_slower_than_it_was_taught(model):
 def test_a_drive_at_two_speeds_gives_each_its_own_factor(swinging):
     """Errors of a velocity sensor that is rough while the car is slow are errors there alone."""
     car, _ = swinging
-    together = RandomSteer(
-        amplitude=0.08, frequency=0.6, seed=8, onset=1.0, rate_limit=0.8, duration=40.0
-    )
-    drive = Plant(sedan()).simulate(together, speed=lambda t: np.where(t < 20, 13.0, 20.0))
-    drive = drive.recording()
+    drive = steered(8, 40.0, speed=lambda t: np.where(t < 20, 13.0, 20.0)).recording()
     rng = np.random.default_rng(2)
     slow = np.cumsum(rng.standard_normal(len(drive))) * 0.006 * (drive.v_x < 15.0)
     rough = calibrated(learnt(replace(drive, v_y=drive.v_y + slow), car)).calibration

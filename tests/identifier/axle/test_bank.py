@@ -8,7 +8,6 @@ import pytest
 
 from benchmarks.faults import Bank
 from identifier.axle import AxleIdentifier
-from identifier.axle.bank import RoadSlope
 from identifier.prediction import predict
 from identifier.run import OnlineIdentifier, identify
 from models.vehicle import GRAVITY
@@ -115,8 +114,3 @@ def test_beside_a_car_an_accelerometer_teaches_the_same_bits_as_in_a_recording(c
         np.testing.assert_array_equal(value, history.state[port][-1], err_msg=port)
     blind = OnlineIdentifier(method, car, banked.dt)
     assert (driven(blind, banked, [None] * len(banked)) != history.axle_force).any()
-
-
-def test_numbers_of_the_road_are_positive():
-    with pytest.raises(ValueError, match="level must be positive and finite, it is 0"):
-        RoadSlope(level=0.0)

@@ -12,89 +12,11 @@ from identifier.axle import learning as bounds
 from identifier.axle.covariance import LEAST_VARIANCE, narrowed, packed, per_variance, unpacked
 from identifier.axle.curve import LADDER
 from identifier.run import identify
+from tests.identifier.axle.conftest import HOSTILE, spoilt
 
 SLOPES = np.sum(1 / np.array(LADDER))
 ROW = 1 / np.array(LADDER) / SLOPES
 FLAT, STEEP = 2.0 / SLOPES, 80.0 / SLOPES  # the least and the most stiffness, by the same sum
-
-
-def dead_yaw_rate(s, rng):
-    s["r"][:] = 0.0
-
-
-def stuck_yaw_rate(s, rng):
-    s["r"][300:] = s["r"][300] + 1e-9 * rng.standard_normal(s["r"].size - 300)
-
-
-def noise_of_a_dead_yaw_rate(s, rng):
-    s["r"][:] = 1e-4 * rng.standard_normal(s["r"].size)
-
-
-def flipped_yaw_rate(s, rng):
-    s["r"] *= -1.0
-
-
-def flipped_v_y(s, rng):
-    s["v_y"] *= -1.0
-
-
-def flipped_steering(s, rng):
-    s["delta_f"] *= -1.0
-
-
-def constant_v_y(s, rng):
-    s["v_y"][:] = 1.0
-
-
-def dead_steering(s, rng):
-    s["delta_f"][:] = 0.0
-
-
-def late_yaw_rate(s, rng):
-    s["r"][:] = np.roll(s["r"], 60)
-
-
-def threefold_yaw_rate(s, rng):
-    s["r"] *= 3.0
-
-
-def noise_of_thousands(s, rng):
-    s["v_y"] += 1e4 * rng.uniform(-0.9, 0.9, s["v_y"].size)
-    s["r"] += 1e4 * rng.uniform(-0.9, 0.9, s["r"].size)
-
-
-def noise_within_the_gate(s, rng):
-    s["v_y"][:] = rng.standard_normal(s["v_y"].size)
-    s["r"][:] = 0.3 * rng.standard_normal(s["r"].size)
-
-
-def wandering_gains(s, rng):
-    for name in ("v_y", "r", "delta_f"):
-        s[name] *= np.cumsum(0.1 * rng.standard_normal(s[name].size))
-
-
-HOSTILE = [
-    dead_yaw_rate,
-    stuck_yaw_rate,
-    noise_of_a_dead_yaw_rate,
-    flipped_yaw_rate,
-    flipped_v_y,
-    flipped_steering,
-    constant_v_y,
-    dead_steering,
-    late_yaw_rate,
-    threefold_yaw_rate,
-    noise_of_thousands,
-    noise_within_the_gate,
-    wandering_gains,
-]
-
-
-def spoilt(recording, fault, seed=0):
-    names = ("v_x", "v_y", "r", "delta_f")
-    signals = {name: getattr(recording, name).copy() for name in names}
-    fault(signals, np.random.default_rng(seed))
-    return replace(recording, **signals)
 
 
 def broken(design, car, state):
@@ -127,13 +49,19 @@ def broken(design, car, state):
 
 
 @pytest.mark.parametrize("speed", [8.0, 20.0, 35.0])
-@pytest.mark.parametrize("fault", HOSTILE, ids=lambda fault: fault.__name__)
+@pytest.mark.parametrize("fault", HOSTILE)
 def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
-    design = AxleIdentifier.for_vehicle(car)
-    history = identify(spoilt(drive(speed=speed, amplitude=0.07), fault), car, design)
+    """And all stays finite, with forces of a few loads."""
+    clean, design = drive(speed=speed, amplitude=0.07), AxleIdentifier.for_vehicle(car)
+    history = identify(spoilt(clean, fault), car, design)
     assert history.diverged_at is None
     assert broken(design, car, history.state) == set()
-    assert history.freeze(1e9).cornering_stiffness.min() >= 0.0
+    for port, values in history.state.items():
+        assert np.isfinite(values).all(), port
+    assert (np.abs(history.axle_force) < 6 * np.array(car.axle_loads)).all()
+    model = history.freeze(1e9)
+    assert model.cornering_stiffness.min() >= 0.0
+    assert np.isfinite(model.axle_force(history.recording)).all()
 
 
 @pytest.mark.parametrize("dt", [0.2, 0.3, 0.5])
@@ -148,22 +76,6 @@ def test_what_is_declared_holds_of_coarse_samples_too(dt, car, drive):
     assert broken(design, car, history.state) == set()
 
 
-def test_a_dead_yaw_rate_sensor_leads_to_the_bounds_and_not_beyond(car, drive):
-    """The bounds are at work: the drive ends at them, and a check of narrower ones rings."""
-    design = AxleIdentifier.for_vehicle(car)
-    history = identify(spoilt(drive(n=4000, amplitude=0.07), dead_yaw_rate), car, design)
-    grip = history.state["W"].sum(axis=2)
-    assert broken(design, car, history.state) == set()
-    slope = (history.state["W"] / np.array(design.ladder)).sum(axis=2)
-    assert min(grip.min() - 0.1, 3.0 - grip.max(), slope.min() - 2.0) < 1e-3
-    narrower = replace(
-        design,
-        bounds=replace(design.bounds, least_grip=0.3, most_grip=0.7, weight=0.5),
-        regression=replace(design.regression, widest=0.5),
-    )
-    assert {"grip", "weight", "variance"} <= broken(narrower, car, history.state)
-
-
 def test_left_free_the_same_drive_leaves_the_box(car, drive):
     design = AxleIdentifier.for_vehicle(car)
     wide = replace(design.bounds, least_grip=1e-3, most_grip=30.0, weight=60.0)
@@ -171,7 +83,7 @@ def test_left_free_the_same_drive_leaves_the_box(car, drive):
         design, bounds=wide, rising_until=None, regression=replace(design.regression, widest=1e6)
     )
     found = set()
-    for fault in (dead_yaw_rate, flipped_yaw_rate, flipped_v_y):
+    for fault in ("dead_yaw_rate", "flipped_yaw_rate", "flipped_v_y"):
         recording = spoilt(drive(n=4000, amplitude=0.07), fault)
         found |= broken(design, car, identify(recording, car, free).state)
     assert {"grip", "stiffness", "weight", "variance"} <= found

@@ -12,10 +12,9 @@ from identifier.axle.car import larger, smaller, within
 from identifier.axle.learning import RoadChange, RoadState, believed, evidence
 from identifier.run import identify
 from models.faults import SensorFault
-from models.maneuvers import RandomSteer
-from models.plant import Plant
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
+from tests.identifier.conftest import steered
 
 DT, RATE = 0.01, 30.0  # s, loads/s
 NOISE = Sensors(
@@ -88,11 +87,6 @@ def test_a_step_that_the_limit_of_a_sample_cuts_goes_on_with_the_errors_that_are
     assert ln_friction == change
 
 
-def test_numbers_of_a_change_are_positive():
-    with pytest.raises(ValueError, match="evidence must be positive and finite, it is 0"):
-        RoadChange(evidence=0.0)
-
-
 def test_larger_smaller_and_within_are_those_of_numpy(rng):
     a, b = rng.normal(size=20), rng.normal(size=20)
     a[0] = b[0]
@@ -105,10 +99,7 @@ def test_larger_smaller_and_within_are_those_of_numpy(rng):
 @cache
 def drive():
     """A noisy random drive of the sedan."""
-    steer = RandomSteer(
-        amplitude=0.08, frequency=0.5, seed=3, onset=0.5, rate_limit=1.0, duration=25.0
-    )
-    run = Plant(sedan()).simulate(steer, speed=20.0)
+    run = steered(3, 25.0, onset=0.5)
     return run.recording(NOISE, np.random.default_rng(8))
 
 

@@ -1,52 +1,30 @@
 """Drives on a tire curve that is known exactly, so that its parameters can be asked for."""
 
 from dataclasses import replace
-from math import atan2, cos, sin
 
 import numpy as np
 import pytest
 
-from tests.identifier.conftest import at_one_speed
-
-
-def steering(t, amplitude):
-    """A sweep of frequency and amplitude: the tire is asked everywhere."""
-    return amplitude * (0.55 + 0.45 * sin(0.23 * t)) * sin(2.0 * t + 0.8 * sin(0.31 * t))
-
-
-def slips(car, speed, v_y, r, delta):
-    """Slip angles of both axles in the paper's sign."""
-    return np.array([delta - atan2(v_y + car.l_f * r, speed), -atan2(v_y - car.l_r * r, speed)])
-
-
-def rates(car, curve, speed, moved, delta, lag):
-    """Rates of [v_y, r, α'] and both axle forces in the frame of the body; lag [m] or None."""
-    v_y, r = moved[:2]
-    alpha = slips(car, speed, v_y, r, delta)
-    slip = alpha if lag is None else moved[2:]
-    F_f, F_r = cos(delta) * curve(0, slip[0]), curve(1, slip[1])
-    rate = (F_f + F_r) / car.mass - speed * r, (car.l_f * F_f - car.l_r * F_r) / car.yaw_inertia
-    slip_rate = np.zeros(2) if lag is None else speed / lag * (alpha - slip)
-    return np.array([*rate, *slip_rate]), F_f, F_r
+from tests.identifier.conftest import at_one_speed, bicycle
 
 
 def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None, lag=None):
-    """A bicycle on curve(axle, α' or α) [N], by midpoint steps; rng makes v_y and r noisy."""
-    moved = np.zeros(4)
-    rows, fine = [], 5
-    h = dt / fine
-    for k in range(n * fine):
-        t = k * h
-        here, *forces = rates(car, curve, speed, moved, steering(t, amplitude), lag)
-        if k % fine == 0:
-            rows.append((t, *moved[:2], steering(t, amplitude), *forces))
-        half = moved + h / 2 * here
-        moved = moved + h * rates(car, curve, speed, half, steering(t + h / 2, amplitude), lag)[0]
-    t, v_y, r, delta, F_f, F_r = np.array(rows).T
+    """A bicycle on curve(axle, slip) [N], steered at many frequencies; rng makes it noisy."""
+    t = dt * np.arange(n)
+
+    def delta(t):
+        return (
+            amplitude * (0.55 + 0.45 * np.sin(0.23 * t)) * np.sin(2.0 * t + 0.8 * np.sin(0.31 * t))
+        )
+
+    def push(slip, _):
+        return np.array([curve(axle, slip[axle]) for axle in (0, 1)])
+
+    v_y, r, force = bicycle(car, t, lambda _: speed, delta, push, lag)
     if rng is not None:
         v_y = v_y + 0.02 * rng.standard_normal(n)
         r = r + 0.002 * rng.standard_normal(n)
-    return at_one_speed("curve", speed, t, v_y, r, delta, np.column_stack([F_f, F_r]))
+    return at_one_speed("curve", speed, t, v_y, r, delta(t), force)
 
 
 @pytest.fixture(name="curve_drive")

@@ -57,9 +57,3 @@ def test_learning_baselines_beat_the_linear_tire_where_it_is_wrong(make, slalom)
     linear = identify(recording, wrong, LinearBaseline.for_vehicle(car)).freeze(99.0)
     model = identify(recording, wrong, make(wrong)).freeze(99.0)
     assert (share_of_force(model, recording) < 0.7 * share_of_force(linear, recording)).all()
-
-
-@pytest.mark.parametrize("name", ["walk", "v_y_noise", "relaxation_length"])
-def test_a_number_that_is_not_positive_is_refused(name, car):
-    with pytest.raises(ValueError, match=f"{name} must be positive and finite, it is -1"):
-        replace(magic_formula_ekf(car), **{name: -1.0})

@@ -69,17 +69,6 @@ def test_a_fit_to_several_recordings_serves_all(car, drive, rng):
         assert cost(model, [one]) < cost(joint, [one])
 
 
-def test_the_same_seed_gives_the_same_floor(car, drive):
-    structure, recording = curve_structure(magic_formula_ekf(car), car), drive(n=200)
-    fits = [
-        fit_floor(structure, [recording], rng=np.random.default_rng(seed), starts=1, steps=5)
-        for seed in (1, 1, 2)
-    ]
-    forces = [model.axle_force(recording) for model in fits]
-    np.testing.assert_array_equal(forces[0], forces[1])
-    assert np.abs(forces[0] - forces[2]).max() > 0.0
-
-
 def test_what_cannot_be_fitted_is_refused(car, drive, rng):
     structure = curve_structure(magic_formula_ekf(car), car)
     blind = replace(drive(n=50), axle_force=None)

@@ -21,52 +21,26 @@ def derivative(function, at):
     return np.array(columns).T
 
 
-def textbook(recording, car, method, force, theta, P_theta, walk, lag=None, slip=None):
-    """Predict, correct, one after the other; returns estimates carried into each next sample.
-
-    force(θ, v_x, x, u); where slip lags, force(θ, α', u), slip(θ, v_x, x, u) and lag(θ) [m].
-    """
-    m, I_z, l_f, l_r = car.mass, car.yaw_inertia, car.l_f, car.l_r
+def textbook(recording, car, method, force, P_theta, walk):
+    """Predict and correct with force(θ, v_x, x, u), from θ = 0; what each sample begins with."""
     R = np.diag([method.v_y_noise, method.r_noise]) ** 2
-    lags = 0 if lag is None else 2
-    n, z, dt = 2 + lags + theta.size, 2 + lags, method.dt
-    disturbances = [method.v_y_disturbance, method.r_disturbance, *[0.0] * lags]
-    Q = np.diag([*disturbances, *walk]) ** 2 * dt
-    x, P = recording.x[0], np.zeros((n, n))
-    P[:2, :2], P[z:, z:] = R, P_theta
-    begun = []
-    if lag is not None:  # a start is a steady slide, known as far as x and θ are
-        at = recording.v_x[0], recording.u[0]
-
-        def steady(v):
-            return np.concatenate([v[:2], slip(v[2:], at[0], v[:2], at[1]), v[2:]])
-
-        begun = slip(theta, at[0], x, at[1])
-        T = derivative(steady, np.concatenate([x, theta]))
-        P = (
-            T
-            @ np.block([[R, np.zeros((2, theta.size))], [np.zeros((theta.size, 2)), P_theta]])
-            @ T.T
-        )
-        P[2:4, 2:4] += np.eye(2) * (method.v_y_noise / at[0]) ** 2
-    s = np.concatenate([x, begun, theta])
-    rows, H = [s], np.eye(2, n)
+    n, dt = 2 + len(walk), method.dt
+    Q = np.diag([method.v_y_disturbance, method.r_disturbance, *walk]) ** 2 * dt
+    s, P, H = np.concatenate([recording.x[0], np.zeros(n - 2)]), np.zeros((n, n)), np.eye(2, n)
+    P[:2, :2], P[2:, 2:] = R, P_theta
+    rows = [s]
     for k in range(1, len(recording)):
         u, v_x = recording.u[k - 1 : k + 1].mean(axis=0), recording.v_x[k - 1 : k + 1].mean()
 
         def rate(state, u=u, v_x=v_x):
-            if lag is None:
-                F, slip_rate = force(state[2:], v_x, state[:2], u), []
-            else:
-                F = force(state[4:], state[2:4], u)
-                slip_rate = v_x / lag(state[4:]) * (slip(state[4:], v_x, state[:2], u) - state[2:4])
-            v_dot = F.sum() / m - v_x * state[1]
-            return np.array([v_dot, (l_f * F[0] - l_r * F[1]) / I_z, *slip_rate])
+            F = force(state[2:], v_x, state[:2], u)
+            turn = (car.l_f * F[0] - car.l_r * F[1]) / car.yaw_inertia
+            return np.array([F.sum() / car.mass - v_x * state[1], turn])
 
         def ahead(state, rate=rate):
-            J = derivative(rate, state)[:, :z]
-            moved = state[:z] + np.linalg.solve(np.eye(z) - dt / 2 * J, dt * rate(state))
-            return np.concatenate([moved, state[z:]])
+            J = derivative(rate, state)[:, :2]
+            moved = state[:2] + np.linalg.solve(np.eye(2) - dt / 2 * J, dt * rate(state))
+            return np.concatenate([moved, state[2:]])
 
         F = derivative(ahead, s)
         s, P = ahead(s), F @ P @ F.T + Q
@@ -76,11 +50,6 @@ def textbook(recording, car, method, force, theta, P_theta, walk, lag=None, slip
     return np.array(rows), P
 
 
-def slips(car, v_x, x, u):
-    arm = np.array([car.l_f, -car.l_r])
-    return u - np.arctan2(x[0] + arm * x[1], v_x)
-
-
 def magic(car, method):
     told, loads = np.array(car.bicycle)[4:], np.array(car.axle_loads)
 
@@ -88,7 +57,8 @@ def magic(car, method):
         D = method.friction * loads * np.exp(theta[4:])
         C = 1 + 1 / (1 + np.exp(-theta[2:4]) * 0.6 / 0.4)
         B = told * np.exp(theta[:2]) / (C * D)
-        return D * np.sin(C * np.arctan(B * slips(car, v_x, x, u))) * np.cos(u)
+        slip = u - np.arctan2(x[0] + np.array([car.l_f, -car.l_r]) * x[1], v_x)
+        return D * np.sin(C * np.arctan(B * slip)) * np.cos(u)
 
     return force
 
@@ -101,59 +71,13 @@ def test_magic_formula_filter_is_the_textbook(dt, car, drive, rng):
     method = replace(magic_formula_ekf(car, textbook=True), outlier=1e6, dt=dt)
     history = identify(recording, car, method)
     spread = [0.5, 0.5, 0.7, 0.7, 0.4, 0.4]
-    rows, P = textbook(
-        recording,
-        car,
-        method,
-        magic(car, method),
-        np.zeros(6),
-        np.diag(spread) ** 2,
-        [method.walk] * 6,
-    )
+    P_theta, walk = np.diag(spread) ** 2, [method.walk] * 6
+    rows, P = textbook(recording, car, method, magic(car, method), P_theta, walk)
     np.testing.assert_allclose(history.state["estimate"][1:], rows, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(history.state["P"][-1], P, rtol=1e-3, atol=1e-8)
     other = replace(method, v_y_disturbance=1.1 * method.v_y_disturbance)
     estimate = identify(recording, car, other).state["estimate"][1:]
     assert not np.allclose(estimate, rows, rtol=1e-4, atol=1e-6), "a wrong number shows"
-
-
-@pytest.mark.parametrize("dt", [0.01, 0.03])
-def test_the_lagged_filter_is_the_textbook_with_more_states(dt, car, drive, rng):
-    """States α' and unknowns ln σ/σ₀, δ₀ and b, v_y and r as the sensors read them."""
-    clean = drive(n=120, dt=dt)
-    v_y = clean.v_y + 0.1 + 0.02 * rng.standard_normal(120)
-    recording = replace(clean, v_y=v_y, r=clean.r + 0.002 * rng.standard_normal(120))
-    method = replace(magic_formula_ekf(car), outlier=1e6, dt=dt)
-    told, loads = np.array(car.bicycle)[4:], np.array(car.axle_loads)
-
-    def force(theta, slip, u):
-        D = method.friction * loads * np.exp(theta[4:6])
-        C = 1 + 1 / (1 + np.exp(-theta[2:4]) * 0.6 / 0.4)
-        return D * np.sin(C * np.arctan(told * np.exp(theta[:2]) / (C * D) * slip)) * np.cos(u)
-
-    def slip(theta, v_x, x, u):
-        zero, bias = theta[8] * method.steering_spread, theta[9] * method.v_y_spread
-        return np.array([zero, 0.0]) + slips(car, v_x, x - [bias, 0.0], u)
-
-    spread = [0.5, 0.5, 0.7, 0.7, 0.4, 0.4, *[method.relaxation_spread] * 2, 1.0, 1.0]
-    rows, P = textbook(
-        recording,
-        car,
-        method,
-        force,
-        np.zeros(10),
-        np.diag(spread) ** 2,
-        [method.walk] * 10,
-        lag=lambda theta: method.relaxation_length * np.exp(theta[6:8]),
-        slip=slip,
-    )
-    history = identify(recording, car, method)
-    np.testing.assert_allclose(history.state["estimate"][1:], rows, rtol=1e-3, atol=1e-5)
-    np.testing.assert_allclose(history.state["P"][-1], P, rtol=1e-2, atol=1e-7)
-    assert np.abs(rows[-1, 10:]).max() > 0.01, "lag and offsets have moved"
-    other = replace(method, relaxation_length=1.05 * method.relaxation_length)
-    estimate = identify(recording, car, other).state["estimate"][1:]
-    assert not np.allclose(estimate, rows, rtol=1e-3, atol=1e-5), "a wrong number shows"
 
 
 def test_covariance_stays_symmetric_and_positive(car, drive):

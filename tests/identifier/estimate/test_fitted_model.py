@@ -7,7 +7,6 @@ import pytest
 
 from codegen.arrays import blocks
 from identifier.estimate.model import FittedModel
-from identifier.frozen import FrozenModelError
 from identifier.tire_model import load_model
 from tests.identifier.estimate.conftest import driven
 
@@ -23,60 +22,21 @@ def test_a_saved_model_is_the_same(learnt, tmp_path):
     np.testing.assert_array_equal(loaded.half_band_over(drive), model.half_band_over(drive))
 
 
-def without_grip(data):
-    del data["parameters"]["ln_grip_f"]
-
-
-def too_stiff(data):
-    data["parameters"]["ln_stiffness_r"]["value"] = 9.0
-
-
-def lopsided(data):
-    data["covariance"][0][1] += 1.0
-
-
-def endless(data):
-    data["speeds_m_s"] = [1.0, float("inf")]
-
-
-def short(data):
-    data["driven_slip_rad"] = [0.1]
-
-
-def unheard(data):
-    data["vehicle"]["mass"] = -1.0
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (without_grip, "ln_grip_f"),
-        (too_stiff, "ln_stiffness_r must be within"),
-        (lopsided, "covariance must be symmetric"),
-        (endless, "speeds_m_s"),
-        (short, "driven"),
-        (unheard, "mass"),
+        (lambda d: d["parameters"].pop("ln_grip_f"), "ln_grip_f"),
+        (lambda d: d["parameters"]["ln_stiffness_r"].update(value=9.0), "must be within"),
+        (lambda d: d["covariance"][0].__setitem__(1, 9.0), "covariance must be symmetric"),
+        (lambda d: d.update(speeds_m_s=[1.0, float("inf")]), "speeds_m_s"),
+        (lambda d: d.update(driven_slip_rad=[0.1]), "driven"),
+        (lambda d: d["vehicle"].update(mass=-1.0), "mass"),
     ],
 )
-def test_a_bad_file_is_one_line_that_names_file_field_and_rule(learnt, tmp_path, change, said):
+def test_a_bad_file_is_refused(learnt, refused_in_one_line, change, said):
     data = json.loads(json.dumps(learnt.model.to_dict()))
     change(data)
-    path = tmp_path / "bad.json"
-    path.write_text(json.dumps(data))
-    with pytest.raises(FrozenModelError) as refused:
-        load_model(path)
-    text = str(refused.value)
-    assert "bad.json" in text and said in text and "\n" not in text
-
-
-def test_its_units_are_within_a_percent_of_the_static_load_where_it_is_identified(learnt):
-    model = learnt.model
-    units = model.in_units()
-    for i, known in enumerate(model.known_slip):
-        assert known > 0.04
-        slip = np.linspace(-known, known, 101)
-        away = np.abs(units.force_at(slip) - model.force_at(slip))[:, i]
-        assert away.max() < 0.01 * model.vehicle.axle_loads[i]
+    refused_in_one_line(data, said)
 
 
 def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):

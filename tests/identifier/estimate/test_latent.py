@@ -22,24 +22,15 @@ from identifier.estimate.priors import Priors
 from identifier.estimate.solve import around_beliefs
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
-from models.maneuvers import RandomSteer
-from models.plant import Plant
 from models.recordings import Recording, RecordingError
 from models.recordings.record import joined
+from tests.identifier.conftest import steered
 
 CAR = ti.sedan()
 
 
-def driven(seed, duration=20.0):
-    maneuver = RandomSteer(
-        amplitude=np.radians(4.0),
-        frequency=0.5,
-        seed=seed,
-        onset=1.0,
-        rate_limit=1.0,
-        duration=duration - 0.01,
-    )
-    return Plant(CAR).simulate(maneuver, speed=20.0, name=f"drive{seed}").recording()
+def driven(seed):
+    return steered(seed, 19.99, amplitude=np.radians(4.0)).recording()
 
 
 def blind(exact, seed=1):

@@ -13,7 +13,8 @@ from identifier.inertial.motion import Sample, predicted, static_load, unknowns
 from identifier.run import identify
 from models.recordings import Recording
 from models.vehicle import load_ratio
-from tests.identifier.axle.test_downforce import RACER, SLIPS, UNTOLD, missed, race, static
+from tests.identifier.axle.test_downforce import RACER, SLIPS, UNTOLD, race, static
+from tests.identifier.conftest import missed
 from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, places, state
 
 METHOD = InertialIdentifier.for_vehicle(RACER)
@@ -37,7 +38,7 @@ def models(drive):
 
 def test_the_told_area_leaves_the_static_curve_to_learn(models, drive):
     told, untold = models
-    np.testing.assert_allclose(told.force_at(SLIPS), static(SLIPS), rtol=0.15)
+    np.testing.assert_allclose(told.force_at(SLIPS), static(SLIPS[:, None]), rtol=0.15)
     still = race(car=UNTOLD)  # the same drive of a car without: as well as can be had
     usual = missed(identify(felt(still), UNTOLD, METHOD).freeze(), still)
     assert (missed(told, drive) < 1.5 * usual).all()
