@@ -32,12 +32,6 @@ def test_a_setup_carries_what_its_step_asks_for(name):
     assert (setup.observe is not None) == (name in OBSERVING)
 
 
-def test_a_method_that_learns_from_whole_logs_has_no_step():
-    (name,) = set(METHODS) - set(ONLINE)
-    with pytest.raises(ValueError, match="fit learns from whole logs"):
-        make_method(name, CAR).setup(CAR)
-
-
 @pytest.mark.parametrize("name", sorted(OBSERVING))
 def test_an_observer_begins_at_the_first_measurement(name, drive):
     still, method = drive(n=60), make_method(name, CAR)

@@ -58,12 +58,6 @@ def test_a_change_is_believed_where_it_explains_both_axles_and_not_where_one_con
     assert change_of(collected([-0.12, 0.0], g=(0.3, 0.0)))[0] < 0.0  # that one tells nothing
 
 
-def test_an_axle_without_a_force_and_a_sample_that_is_not_learnt_tell_nothing():
-    assert collected([-0.1, 5.0], holds=(1, 0)) == collected([-0.1, 0.0], g=(0.3, 0.0))
-    before = RoadState(3.0, 1.0, 2.0, -0.1)
-    assert collected([-0.1, -0.1], learns=0, state=before) == before
-
-
 def test_evidence_is_that_of_about_a_second_and_gone_once_it_is_believed():
     assert collected([-0.1, -0.1], seconds=9.0).A < 1.6 * collected([-0.1, -0.1], seconds=1.0).A
     numbers, state = RoadChange().at(DT, RATE), collected([-0.1, -0.1])

@@ -1,13 +1,12 @@
 """Each part of the axle identifier by another road."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import covariance, slip
+from identifier.axle import covariance
 from identifier.axle import curve as units
 from identifier.axle import learning as rls
 from identifier.axle import slip as sway
@@ -60,50 +59,6 @@ def test_axle_impulse_obeys_newton_and_euler(car):
     r_dot = (car.l_f * F[0] - car.l_r * F[1]) / car.yaw_inertia
     rate = number(axle_impulse(the_car(car), v_y_dot, r_dot))
     np.testing.assert_allclose(rate, F / np.array(car.axle_loads) - v_x * r / 9.81, rtol=1e-12)
-
-
-def lag(alpha, s, dt, v_x, car):
-    """Lagged slip over samples of alpha (n, 2), by the step."""
-    last, xs = slip.SlipState(ca.DM.zeros(2), ca.DM.zeros(2), ca.DM.ones(2), ca.DM.zeros(2)), []
-    for k, a in enumerate(alpha):
-        h = slip.hold(car, v_x, dt, ca.SX(s), ca.SX(last.slope))
-        x = number(slip.lagged_slip(h, last, ca.SX(a), float(k == 0)))
-        c = units.curve(ca.SX(x), ca.SX(W), ca.SX(SCALES), STEPS)
-        last = slip.SlipState(x, a, number(c.carcass_slope), number(c.force))
-        xs.append(x)
-    return np.array(xs)
-
-
-def lag_by_euler(t, alpha_of, s, v_x, car, fine=400):
-    """The same differential equation in many small steps, with the slope of every instant."""
-    y, path = alpha_of(t[0]), [alpha_of(t[0])]
-    for start, end in pairwise(t):
-        h = (end - start) / fine
-        for j in range(fine):
-            T = np.tanh(y[:, None] * SCALES)
-            C = (W * (1 - T**2) * SCALES).sum(1)
-            sigma = s * C + 1e-3 * car.wheelbase
-            y = y + h * v_x / sigma * (alpha_of(start + h * (j + 0.5)) - y)
-        path.append(y)
-    return np.array(path)
-
-
-def test_lagged_slip_solves_its_differential_equation(car):
-    """Only the slope is held over a step: the error is of first order in it."""
-    v_x, s = 15.0, np.array([0.04, 0.05])
-
-    def alpha_of(t):
-        return 0.05 * np.sin(8 * t) * np.array([1.0, 0.7])
-
-    errors = []
-    for dt in (0.01, 0.0025):
-        t = dt * np.arange(round(0.4 / dt) + 1)
-        alpha = np.array([alpha_of(time) for time in t])
-        x = lag(alpha, s, dt, v_x, the_car(car))
-        true = lag_by_euler(t, alpha_of, s, v_x, car, fine=round(dt / 5e-5))
-        errors.append(np.abs(x - true).max() / np.abs(alpha - true).max())
-    assert errors[0] < 0.05
-    assert errors[1] < 0.3 * errors[0]
 
 
 def test_a_toy_rolls_as_fast_as_springs_allow_and_a_body_that_is_none_is_refused(car):
