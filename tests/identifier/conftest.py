@@ -72,7 +72,7 @@ def learnt(recording, car, start=None):
 def missed(model, recording, counted=slice(None)):
     """Rms error of a model's forces over the rms of the true ones, per axle (2,)."""
     force = recording.axle_force
-    error = (model.axle_force(recording) - force)[counted]
+    error = (model.predict(recording) - force)[counted]
     return np.sqrt(np.mean(error**2, axis=0) / np.mean(force[counted] ** 2, axis=0))
 
 
