@@ -639,9 +639,7 @@ class FittedModel(TireModel):
             sd = float(wide[0][0, i])
             doubt = math.hypot(sd, top[i] * float(self.load_doubt[i]))
             reached = bool(sd <= DECIDED * wide[1][0, i])
-            listed.append(
-                Estimate(GRIP, axle, float(top[i]), doubt, "static load", None, reached)
-            )
+            listed.append(Estimate(GRIP, axle, float(top[i]), doubt, "static load", None, reached))
             now, prior = (float(np.sqrt(P[s, s])) for P in (self.covariance, before))
             listed.append(
                 Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
