@@ -447,7 +447,10 @@ class FittedModel(TireModel):
 
     @property
     def known_slip(self) -> Array:
-        """Largest slip [rad] that the drives reached and where the doubt is small, (2,)."""
+        """Largest slip [rad] that the drives reached and where the doubt is small, (2,).
+
+        A step steer decides the force at its end better than the slope at zero: the largest counts.
+        """
         return _known_slip(self).copy()
 
     @property
@@ -613,9 +616,12 @@ class FittedModel(TireModel):
         given = self.vehicle.bicycle[4:]
         zero = np.zeros((1, 2))
         stiff = [sd[0] / SMALL for sd in self._curve_sd(np.full((1, 2), SMALL))]
-        peak = np.maximum(self.known_slip, 1e-3)[None]
-        top, at_known, _ = self.curve_at(peak)
         _, at_zero, _ = self.curve_at(zero)
+        slip = np.linspace(0.0, WIDEST, 201)
+        slip = np.column_stack([slip, slip])
+        phi = self.curve_at(slip)[0]
+        peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
+        top = phi.max(axis=0)
         wide = self._curve_sd(peak)
         listed = []
         for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
@@ -630,12 +636,10 @@ class FittedModel(TireModel):
                     bool(sd <= DECIDED * stiff[1][i]),
                 )
             )  # fmt: skip
-            bent = bool(at_known[0, i] < 0.4 * C and wide[0][0, i] <= DECIDED * wide[1][0, i])
-            listed.append(
-                Estimate(
-                    GRIP, axle, float(top[0, i]), float(wide[0][0, i]), "static load", None, bent
-                )
-            )
+            sd = float(wide[0][0, i])
+            doubt = math.hypot(sd, top[i] * float(self.load_doubt[i]))
+            reached = bool(sd <= DECIDED * wide[1][0, i])
+            listed.append(Estimate(GRIP, axle, float(top[i]), doubt, "static load", None, reached))
             now, prior = (float(np.sqrt(P[s, s])) for P in (self.covariance, before))
             listed.append(
                 Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
@@ -892,8 +896,7 @@ def _known_slip(model: FittedModel) -> Array:
     """Return `FittedModel.known_slip`, which a verdict asks for many times."""
     grid = np.linspace(0.0, 1.0, 101)[1:]
     sure = model._relative_sd(np.outer(grid, model.driven)) <= LARGEST_SD
-    count = np.where(sure.all(axis=0), grid.size, np.argmin(sure, axis=0))
-    known: Array = model.driven * count / grid.size
+    known: Array = model.driven * np.max(grid[:, None] * sure, axis=0)
     return known
 
 
