@@ -9,7 +9,7 @@ export PYTHONDONTWRITEBYTECODE :=
 LOCKED :=
 # Quick tests of every package, for versions of dependencies beside those of the lock.
 SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
-	tests/identifier/test_network.py tests/identifier/export/test_compiled.py \
+	tests/identifier/test_laws.py tests/identifier/export/test_compiled.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 

@@ -5,15 +5,18 @@ import numpy as np
 import pytest
 
 from identifier.paper.laws import (
+    INTEGRATORS,
     LAWS,
     ball,
     beyond_ball,
+    euler,
     filter_rate,
     observer_rate,
+    rk4,
     weight_rates,
     whole,
 )
-from identifier.paper.network import hidden_layer
+from identifier.paper.network import SIGNALS, Network, hidden_layer, network_signals
 
 RESIDUAL = 1e-12
 N_H, N_IN = 5, 4
@@ -215,3 +218,84 @@ def test_what_leaks_beyond_a_ball_is_the_way_to_its_nearest_point(rng):
             else:
                 np.testing.assert_allclose(W - way, W * radius / size, atol=1e-12)
     assert not numbers(beyond_ball(ca.DM.zeros(2, N_H), 0.0)).any()
+
+
+# The order of each integrator, by the error of a step against a solution in closed form.
+
+ROTATION = np.array([[0.0, 1.0], [-4.0, -0.4]])
+
+
+def rate(state):
+    """dX/dt = A X and dy/dt = y²: a matrix, and a scalar that is not linear."""
+    X, y = state
+    return [ROTATION @ X, y**2]
+
+
+def exact(h):
+    """X = exp(A h), by a series; y = 1/(1 - h)."""
+    X, term = np.eye(2), np.eye(2)
+    for k in range(1, 30):
+        term = term @ ROTATION * h / k
+        X = X + term
+    return [X, 1.0 / (1.0 - h)]
+
+
+def check_order(step, order):
+    """One step of h misses by a constant times h to the order plus one, in every part."""
+    errors = []
+    for h in (0.04, 0.02):
+        parts = zip(step(rate, [np.eye(2), 1.0], h), exact(h), strict=True)
+        errors.append([np.abs(part - wanted).max() for part, wanted in parts])
+    observed = np.log2(np.array(errors[0]) / np.array(errors[1])) - 1.0
+    np.testing.assert_allclose(observed, order, atol=0.15)
+
+
+def test_euler_is_of_first_and_rk4_of_fourth_order():
+    check_order(euler, 1)
+    check_order(rk4, 4)
+    assert {"euler": euler, "rk4": rk4} == INTEGRATORS
+    with pytest.raises(AssertionError):
+        check_order(euler, 4)
+
+
+# The network: what it may read, and weights that follow from a seed.
+
+
+def test_every_signal_can_be_read(car):
+    """Slip angles among them, in the paper's sign; each divided by its scale."""
+    p = car.bicycle
+    network = Network(hidden=3, inputs=tuple(SIGNALS))
+    x, u, v_x = np.array([0.4, 0.2]), np.array([0.05, -0.01]), 15.0
+    x_bar = network.normalized_input(network_signals(p, v_x, ca.DM(x), ca.DM(u)))
+    alpha = u - np.array([x[0] + p.l_f * x[1], x[0] - p.l_r * x[1]]) / v_x
+    raw = np.concatenate([x, u, [v_x], alpha])
+    np.testing.assert_allclose(np.array(x_bar)[:, 0], raw / list(SIGNALS.values()), rtol=1e-14)
+
+
+def test_initial_weights_follow_from_the_generator():
+    network = Network(hidden=7)
+    one = network.initial_weights(np.random.default_rng(3))
+    same = network.initial_weights(np.random.default_rng(3))
+    other = network.initial_weights(np.random.default_rng(4))
+    np.testing.assert_array_equal(one.V, same.V)
+    assert np.abs(one.V - other.V).max() > 0.1
+    assert one.W.shape == (2, 7)
+    assert one.V.shape == (7, 4)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"hidden": 0}, {"inputs": ("v_y", "speed")}, {"inputs": ("v_y", "v_y")}, {"inputs": ()},
+        {"scale": (1.0, 2.0)}, {"scale": (1.0, 2.0, 0.0, 1.0)},
+    ],
+)  # fmt: skip
+def test_impossible_structures_are_refused(wrong):
+    with pytest.raises(ValueError, match="must"):
+        Network(**wrong)
+
+
+def test_a_list_of_scales_makes_the_same_network_as_a_tuple():
+    one = Network(inputs=["v_y", "r"], scale=[2.0, 3.0])
+    two = Network(inputs=("v_y", "r"), scale=(2.0, 3.0))
+    assert one == two and hash(one) == hash(two)

@@ -70,24 +70,18 @@ def test_without_truth_there_is_no_error_against_it(history):
     assert replay(blind.freeze(6.0), blind).against_online.front > 0.0
 
 
-def test_samples_at_rest_do_not_count(history):
-    recording = history.recording
-    v_x = np.where(np.arange(recording.t.size) < 300, 20.0, 0.0)
-    halted = replace(history, recording=replace(recording, v_x=v_x))
-    kept = (halted.axle_force - recording.axle_force)[:300]
-    assert online_error(halted) == axle_rms(kept)
-    assert force_rms(halted) == axle_rms(recording.axle_force[:300])
-    result = replay(history.freeze(6.0), halted)
-    assert result.against_truth == axle_rms((result.axle_force - recording.axle_force)[:300])
-    assert result.against_online == axle_rms((result.axle_force - halted.axle_force)[:300])
-
-
-def test_samples_before_the_asked_time_do_not_count(history):
-    truth, late = history.recording.axle_force, history.recording.t >= 4.0
-    assert online_error(history, since=4.0) == axle_rms((history.axle_force - truth)[late])
-    assert force_rms(history, since=4.0) == axle_rms(truth[late])
-    result = replay(history.freeze(6.0), history, since=4.0)
-    assert result.against_truth == axle_rms((result.axle_force - truth)[late])
+@pytest.mark.parametrize(("rests", "since"), [(True, None), (False, 4.0)])
+def test_samples_at_rest_and_before_the_asked_time_do_not_count(history, rests, since):
+    truth, n = history.recording.axle_force, len(history.recording)
+    asked = {} if since is None else {"since": since}
+    counted = np.arange(n) < 300 if rests else history.recording.t >= since
+    shown = replace(history.recording, v_x=np.where(counted | (not rests), 20.0, 0.0))
+    run = replace(history, recording=shown)
+    assert online_error(run, **asked) == axle_rms((run.axle_force - truth)[counted])
+    assert force_rms(run, **asked) == axle_rms(truth[counted])
+    result = replay(history.freeze(6.0), run, **asked)
+    assert result.against_truth == axle_rms((result.axle_force - truth)[counted])
+    assert result.against_online == axle_rms((result.axle_force - run.axle_force)[counted])
     assert result.against_truth != replay(history.freeze(6.0), history).against_truth
 
 

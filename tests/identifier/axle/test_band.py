@@ -177,7 +177,7 @@ def test_on_another_road_the_band_opens_by_what_friction_may_do(model):
     np.testing.assert_array_equal(open_.W, model.W)
     grip = np.array([0.1])
     assert (open_.half_band(grip) > 1.5 * model.half_band(grip)).all()
-    near = np.array([1e-3])  # friction does not change the stiffness
+    near = np.array([5e-4])  # friction does not change the stiffness
     np.testing.assert_allclose(open_.half_band(near), model.half_band(near), rtol=0.1)
     for mu in (0.75, 1.3):
         alpha = np.linspace(0.04, 0.15, 20)

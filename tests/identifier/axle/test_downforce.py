@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier
-from identifier.axle.curve import doublings
-from identifier.axle.step import build_frozen, build_lesson, build_step
 from identifier.run import identify
 from identifier.tire_model import AXLES, load_model
 from identifier.verdict import calibrated, contradictions, guaranteed
@@ -107,18 +105,6 @@ def test_an_axle_that_lifts_keeps_a_fifth_of_its_load():
     np.testing.assert_allclose(LIFTING.load_ratio(drive.v_x), pressed(drive.v_x, LIFTING))
     longer = race(car=LIFTING)
     assert (missed(learnt(longer, LIFTING).freeze(), longer) < 0.03).all()
-
-
-def test_a_car_without_has_the_functions_that_there_were():
-    steps = doublings(AxleIdentifier.for_vehicle(UNTOLD).ladder)
-    for build in (build_step, build_frozen, build_lesson):
-        plain, more = build(steps), build(steps, pressed=True)
-        assert "downforce" not in plain.name_in() and "pressed" not in plain.name()
-        assert {*more.name_in()} == {*plain.name_in(), "downforce"}
-        assert more.name() == f"{plain.name()}_pressed"
-    assert AxleIdentifier.for_vehicle(RACER).setup(UNTOLD).scan.step.name() == (
-        AxleIdentifier.for_vehicle(RACER).setup(RACER).scan.step.name().removesuffix("_pressed")
-    )
 
 
 def test_curves_with_a_speed_are_those_of_its_load(model):
