@@ -32,7 +32,6 @@ import json
 import re
 import sys
 import textwrap
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -295,20 +294,6 @@ def _known(item: Item, number: Number, values: Values) -> str:
     with suppress(NotationError):
         return wanted(item, number, values)
     return number.text
-
-
-def section_at(text: str, position: int) -> str:
-    """Return the last heading of second level before a position, empty before the first.
-
-    Parameters
-    ----------
-    text : Markdown.
-    position : in it.
-    """
-    code = CODE.sub(lambda block: re.sub(r"[^\n]", "\0", block[0]), text)
-    headings = [(found.start(), found[1]) for found in re.finditer(r"^## (.*)$", code, re.M)]
-    k = bisect_right([at for at, _ in headings], position)
-    return headings[k - 1][1].strip() if k else ""
 
 
 def recorded(folder: Path = RESULTS) -> dict[str, dict[str, float | int | str]]:

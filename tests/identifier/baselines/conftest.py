@@ -7,6 +7,13 @@ import pytest
 
 from tests.identifier.conftest import at_one_speed, bicycle
 
+MAGIC = np.array([[12.0, 1.5, 6000.0], [14.0, 1.3, 5200.0]])  # B, C, D
+
+
+def magic(axle, alpha):
+    B, C, D = MAGIC[axle]
+    return D * np.sin(C * np.arctan(B * alpha))
+
 
 def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None, lag=None):
     """A bicycle on curve(axle, slip) [N], steered at many frequencies; rng makes it noisy."""

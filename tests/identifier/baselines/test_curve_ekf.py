@@ -9,13 +9,7 @@ from benchmarks.floor import share_of_force
 from identifier.baselines import CurveModel, magic_formula_ekf
 from identifier.baselines.ports import LAG_PORTS
 from identifier.run import identify
-
-MAGIC = np.array([[12.0, 1.5, 6000.0], [14.0, 1.3, 5200.0]])  # B, C, D
-
-
-def magic(axle, alpha):
-    B, C, D = MAGIC[axle]
-    return D * np.sin(C * np.arctan(B * alpha))
+from tests.identifier.baselines.conftest import MAGIC, magic
 
 
 def test_magic_formula_is_found_on_data_that_it_made(car, curve_drive, rng):

@@ -9,13 +9,7 @@ from benchmarks.floor import axle_structure, curve_structure, fit_floor, share_o
 from identifier.axle import AxleIdentifier
 from identifier.baselines import CurveModel, magic_formula_ekf
 from identifier.run import identify
-
-MAGIC = np.array([[12.0, 1.5, 6000.0], [14.0, 1.3, 5200.0]])  # B, C, D
-
-
-def magic(axle, alpha):
-    B, C, D = MAGIC[axle]
-    return D * np.sin(C * np.arctan(B * alpha))
+from tests.identifier.baselines.conftest import MAGIC, magic
 
 
 def cost(model, recordings):
