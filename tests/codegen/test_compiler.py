@@ -165,36 +165,47 @@ def test_a_folder_that_others_can_write_is_not_used(cache, caplog, mode):
     assert len(warned(caplog)) == 1
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners of files")
-def test_a_library_that_others_can_write_is_not_loaded(cache, caplog):
-    library = build_library(ONE, "one")
+def others_can_write(library, _):
     library.chmod(0o666)
+
+
+def belongs_to_another(library, _):
+    if os.getuid() != 0:
+        pytest.skip("needs to be root")
+    os.chown(library, 65534, 65534)
+
+
+def is_a_link(library, elsewhere):
+    library.rename(elsewhere / "trap.so")
+    library.symlink_to(elsewhere / "trap.so")
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners of files")
+@pytest.mark.parametrize(
+    ("spoilt", "said"),
+    [
+        (others_can_write, "is not loaded, but built anew"),
+        (belongs_to_another, "belongs to another user"),
+        (is_a_link, "is a link"),
+    ],
+)
+def test_a_library_that_may_be_of_another_is_not_loaded(
+    cache, tmp_path_factory, caplog, spoilt, said
+):
+    library = build_library(ONE, "one")
+    spoilt(library, tmp_path_factory.mktemp("elsewhere"))
     with caplog.at_level("INFO", logger="tireid"):
         assert load_library(ONE, "one").one() == 1
-    assert "is not loaded, but built anew" in warned(caplog)[0]
-    assert stat.S_IMODE(library.stat().st_mode) == 0o600
+    assert said in warned(caplog)[0]
+    assert not library.is_symlink()
+    found = library.stat()
+    assert (found.st_uid, stat.S_IMODE(found.st_mode)) == (os.getuid(), 0o600)
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="needs to be root")
-def test_what_belongs_to_another_user_is_not_loaded(cache, caplog):
-    library = build_library(ONE, "one")
-    os.chown(library, 65534, 65534)
-    assert load_library(ONE, "one").one() == 1
-    assert "belongs to another user" in warned(caplog)[0]
-    assert library.stat().st_uid == 0
+def test_a_folder_of_another_user_is_not_used(cache):
     os.chown(cache, 65534, 65534)
     assert cache_folder() != cache
-
-
-@pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
-def test_a_link_in_place_of_a_library_is_not_loaded(cache, tmp_path_factory, caplog):
-    library = build_library(ONE, "one")
-    elsewhere = tmp_path_factory.mktemp("elsewhere") / "trap.so"
-    library.rename(elsewhere)
-    library.symlink_to(elsewhere)
-    assert load_library(ONE, "one").one() == 1
-    assert "is a link" in warned(caplog)[0]
-    assert not library.is_symlink()
 
 
 def test_a_new_cache_is_for_this_user_only(monkeypatch, tmp_path):

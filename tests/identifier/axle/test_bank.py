@@ -86,16 +86,12 @@ def test_without_the_comparison_a_wrong_sign_would_ruin_what_is_learnt(car, slal
     assert np.abs(ruined / right - 1.0).max() > 0.05
 
 
-def driven(identifier, recording, felt):
-    samples = zip(recording.x, recording.u, recording.v_x, felt, strict=True)
-    return np.array([identifier.update(*sample) for sample in samples])
-
-
 def test_what_is_no_number_is_as_none_to_the_last_bit(car, slalom):
     method, told = AxleIdentifier.for_vehicle(car), {}
     for name, absent in (("none", None), ("NaN", np.nan), ("inf", np.inf), ("no car's", 1e3)):
         online = OnlineIdentifier(method, car, slalom.dt)
-        told[name] = driven(online, slalom, [absent] * len(slalom)), online.state()
+        samples = zip(slalom.x, slalom.u, slalom.v_x, strict=True)
+        told[name] = [online.update(*sample, absent) for sample in samples], online.state()
         assert online.counts.refused == 0
     history = identify(replace(slalom, a_y=None), car, method)
     for forces, state in told.values():
@@ -103,14 +99,3 @@ def test_what_is_no_number_is_as_none_to_the_last_bit(car, slalom):
         for port, value in state.items():
             assert np.isfinite(value).all()
             np.testing.assert_array_equal(value, history.state[port][-1], err_msg=port)
-
-
-def test_beside_a_car_an_accelerometer_teaches_the_same_bits_as_in_a_recording(car, slalom):
-    banked = Bank(vehicle=car, angle=0.05).apply(slalom)
-    method = AxleIdentifier.for_vehicle(car)
-    online, history = OnlineIdentifier(method, car, banked.dt), identify(banked, car, method)
-    np.testing.assert_array_equal(driven(online, banked, banked.a_y), history.axle_force)
-    for port, value in online.state().items():
-        np.testing.assert_array_equal(value, history.state[port][-1], err_msg=port)
-    blind = OnlineIdentifier(method, car, banked.dt)
-    assert (driven(blind, banked, [None] * len(banked)) != history.axle_force).any()
