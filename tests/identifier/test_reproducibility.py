@@ -63,13 +63,6 @@ def test_replay_compares_with_truth_and_with_what_was_said_online(history):
     assert result.against_truth.both == pytest.approx(np.sqrt(np.mean(by_hand**2)))
 
 
-def test_without_truth_there_is_no_error_against_it(history):
-    blind = replace(history, recording=replace(history.recording, axle_force=None))
-    assert online_error(blind) is None
-    assert replay(blind.freeze(6.0), blind).against_truth is None
-    assert replay(blind.freeze(6.0), blind).against_online.front > 0.0
-
-
 @pytest.mark.parametrize(("rests", "since"), [(True, None), (False, 4.0)])
 def test_samples_at_rest_and_before_the_asked_time_do_not_count(history, rests, since):
     truth, n = history.recording.axle_force, len(history.recording)
@@ -145,9 +138,10 @@ def test_a_side_without_samples_or_truth_has_no_error(history):
     assert reproduce(history, 5.99).reproduction.after_against_truth is None
     assert reproduce(history, 0.0).reproduction.past_against_online is None
     blind = replace(history, recording=replace(history.recording, axle_force=None))
-    sides = reproduce(blind, 4.0).reproduction
-    assert sides.past_against_online.front > 0.0
+    sides, whole = reproduce(blind, 4.0).reproduction, replay(blind.freeze(6.0), blind)
+    assert sides.past_against_online.front > 0.0 and whole.against_online.front > 0.0
     assert (sides.past_against_truth, sides.after_against_truth) == (None, None)
+    assert (online_error(blind), whole.against_truth) == (None, None)
 
 
 def test_a_drive_without_a_sample_that_counts_is_refused(history):

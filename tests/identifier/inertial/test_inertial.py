@@ -184,10 +184,13 @@ def test_what_is_told_for_observed_is_so_and_nothing_is_where_nothing_is_known(h
     assert np.isfinite(parked.outputs["v_y"]).all()
 
 
-def test_an_accelerometer_of_the_other_sign_is_noticed(banked):
+def test_an_accelerometer_of_the_other_sign_is_noticed_and_nothing_of_the_right_one(
+    history, banked
+):
     """Forces that contradict the yaw rate are no curve of a tire."""
     shown = as_shown(banked)
     assert alarms(identify(replace(shown, a_y=-shown.a_y), CAR, METHOD)).any()
+    assert not alarms(history).any()
 
 
 def test_a_gap_of_the_accelerometer_widens_what_is_not_known(banked):
@@ -245,10 +248,6 @@ def test_half_the_grip_is_noticed_within_half_a_second_of_sliding_and_learnt(tir
     error, sd, _ = errors(history, run)
     assert degrees(error[2500:]) < 0.3
     assert np.mean(np.abs(error[2000:]) < 2 * sd[2000:]) > 0.9
-
-
-def test_nothing_is_noticed_on_a_road_that_stays_as_it_is(history):
-    assert not alarms(history).any()
 
 
 def test_a_stored_model_is_gone_on_from(history, banked):
