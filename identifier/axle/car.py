@@ -5,7 +5,9 @@ Rows are axles, front and rear.   F_z = m g l_o/L: static load [N], l_o distance
 dξ_i/dt = φ_i cos δ_i - v_x r/g exactly: one axle, one equation, no stiffness in it.
 """
 
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import is_dataclass
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -65,19 +67,34 @@ def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
 #
 # Numbers are computed once in Python and read by name in the equations, where they are symbols.
 
-Record = TypeVar("Record", bound=tuple[Any, ...])
+
+def symbols(**shapes: Any) -> tuple[dict[str, Any], SimpleNamespace]:
+    """Return the symbols of a step by port, in order, and its numbers by the name of the port.
+
+    shapes : of each port its rows, or (rows, columns); a NamedTuple or dataclass in place of a
+        length says what is in the vector, or in the columns: these are the numbers of the port.
+    """
+    ports, numbers = {}, {}
+    for name, shape in shapes.items():
+        *rows, last = shape if isinstance(shape, tuple) else (shape,)
+        if isinstance(last, int):
+            ports[name] = numbers[name] = ca.SX.sym(name, *rows, last)
+            continue
+        fields = last.__dataclass_fields__ if is_dataclass(last) else last._fields
+        ports[name] = ca.SX.sym(name, *rows, len(fields))
+        split = (ca.horzsplit if rows else ca.vertsplit)(ports[name])
+        named = dict(zip(fields, split, strict=True))
+        numbers[name] = SimpleNamespace(**named) if is_dataclass(last) else last(**named)
+    return ports, SimpleNamespace(**numbers)
 
 
-def named_port(kind: type[Record], name: str) -> tuple[Any, Record]:
-    """Return a symbol (k,) and its k numbers by name."""
-    port = ca.SX.sym(name, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
-    return port, kind(*ca.vertsplit(port))
-
-
-def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
-    """Return a symbol (2, k), rows front and rear, and its k columns (2, 1) by name."""
-    port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
-    return port, kind(*ca.horzsplit(port))
+def step_function(
+    name: str, ports: dict[str, Any], carried: dict[str, Any], outputs: dict[str, Any]
+) -> ca.Function:
+    """Return a step: what it carries comes out as `port_next`, before its outputs."""
+    out = {f"{port}_next": value for port, value in carried.items()} | outputs
+    values = [list(ports.values()), list(out.values())]
+    return ca.Function(name, *values, list(ports), list(out), {"cse": True})
 
 
 # Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.

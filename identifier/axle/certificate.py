@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
+from identifier.axle.curve import unit_slopes
 from identifier.axle.learning import (
     FLOAT,
     LEAN,
@@ -27,7 +28,6 @@ from identifier.axle.learning import (
     Bounds,
     Regression,
     RoadChange,
-    unit_slopes,
 )
 from identifier.axle.prior import Prior
 from identifier.certificate import Property, at_least, at_most, statement
@@ -87,7 +87,7 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
     slabs = [(np.ones(n), (bounds.least_grip, bounds.most_grip))]
     if rising_until is not None:
         least = 0.0 if rising_until else bounds.least_stiffness
-        slabs.append((unit_slopes(ladder, rising_until), (least, bounds.most_stiffness)))
+        slabs.append((unit_slopes(rising_until, ladder), (least, bounds.most_stiffness)))
     found = []
     for active in range(len(slabs) + 1):
         for chosen in combinations(slabs, active):
@@ -148,7 +148,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts
     edges = _cells(until)
     scales = np.array(ladder)
     at = edges[:, None] / scales
-    slopes = 1.0 / (scales * np.cosh(np.minimum(at, 300.0)) ** 2)
+    slopes = unit_slopes(edges, ladder)
     with np.errstate(invalid="ignore", divide="ignore"):
         secants = np.where(at > 0.0, np.tanh(at) / edges[:, None], 1.0 / scales)
     up, down = np.maximum(W, 0.0).T, np.minimum(W, 0.0).T

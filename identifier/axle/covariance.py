@@ -193,30 +193,6 @@ def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
     return Factors(U, D)
 
 
-def loosened(
-    factors: Factors, spread: Spread, amount: Any, limits: list[Any]
-) -> tuple[Factors, Spread]:
-    """Return the factors and the spread of P + amount u u', u the last column of U.
-
-    The last parameter becomes less sure, and the others by what they owe to it. Where P would grow
-    beyond its limits it stays as it is.
-
-    Parameters
-    ----------
-    spread : of P.
-    amount : variance to add to the last parameter, not negative.
-    """
-    U, D = factors
-    q, n = len(D), len(D) - len(spread.others)
-    u = [*(U[i, q - 1] for i in range(q - 1)), 1.0]
-    squares = [sum(one * one for one in u[:n]), *(one * one for one in u[n:])]
-    sizes = [spread.trace, *spread.others]
-    trace, *others = (a + amount * b for a, b in zip(sizes, squares, strict=True))
-    amount = amount * (width(trace, others, limits) <= 1)
-    trace, *others = (a + amount * b for a, b in zip(sizes, squares, strict=True))
-    return Factors(U, [*D[:-1], D[-1] + amount]), spread._replace(trace=trace, others=others)
-
-
 class Excited(NamedTuple):
     """A regressor seen through the covariance: f = U'h, g = D f, v = P h, a = h'P h > 0."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.elementary import tanh
 from identifier.axle.car import larger, smaller
+from identifier.setup import NOT_NEGATIVE, Port
 
 LADDER = (0.016, 0.064, 0.128, 0.256)  # rad: from where a tire bends to where it slides
 
@@ -134,12 +135,32 @@ def unit_matrix(alpha: Array, ladder: tuple[float, ...]) -> Array:
     return units
 
 
+def unit_slopes(alpha: Array | float, ladder: tuple[float, ...]) -> Array:
+    """Return the derivatives of tanh(α/α_j) over α in numpy, (..., n) [1/rad].
+
+    Parameters
+    ----------
+    alpha : slip angles [rad], (...).
+    ladder : slip scales [rad], (n,).
+    """
+    scales = np.array(ladder)
+    at = np.minimum(np.asarray(alpha)[..., None] / scales, 300.0)  # whose cosh² is a number
+    return np.asarray(1.0 / (scales * np.cosh(at) ** 2), dtype=np.float64)
+
+
 # Where the model has been: how long it learnt, by range of slip.
 #
 # Slip counts with the larger of its two sizes, without lag and sway and with them: the first is
 # what a reader of the recording sees, the second is what made the force.
 
 EDGES = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # rad
+EXCITATION = Port(
+    "excitation",
+    "rad; s",
+    "largest slip, then time of learning above each edge, per axle",
+    learnt=True,
+    rule=NOT_NEGATIVE,
+)
 
 
 def excited(state: Any, size: Any, *, dt: Any, samples: Any, learns: Any) -> Any:

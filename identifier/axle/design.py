@@ -14,7 +14,7 @@ from identifier.axle.along import certified_along
 from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
-from identifier.axle.car import car_numbers, downforce_numbers, named_port
+from identifier.axle.car import car_numbers, downforce_numbers, symbols
 from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -279,14 +279,7 @@ class AxleIdentifier(Method):
         ----------
         state : W (k, 2, n) and own (k, 2, 3) at each of k instants.
         """
-        W, compliance = state["W"], state["own"][:, :, 0]
-        slope = (W / np.array(self.ladder)).sum(axis=2)
-        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
-        return (
-            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
-            Track("relaxation length", "m", lag),
-            Track("force at saturation", "static load", W.sum(axis=2)),
-        )
+        return tracks(self.ladder, vehicle, state["W"], state["own"][:, :, 0])
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
         """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth.
@@ -354,6 +347,22 @@ class AxleIdentifier(Method):
         )
 
 
+def tracks(
+    ladder: tuple[float, ...], vehicle: Vehicle, W: Array, compliance: Array
+) -> tuple[Track, ...]:
+    """Return cornering stiffness, relaxation length, and the force that curves saturate at.
+
+    W : weights (k, 2, n) at each of k instants [static axle loads].   compliance : (k, 2) [m].
+    """
+    slope = (W / np.array(ladder)).sum(axis=2)
+    lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
+    return (
+        Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
+        Track("relaxation length", "m", lag),
+        Track("force at saturation", "static load", W.sum(axis=2)),
+    )
+
+
 def _within_prior(P: Array, prior: Array, n: int) -> Array:
     """Return covariances (2, q, q) whose weights are also believed as before any drive."""
     found = np.zeros_like(P)
@@ -365,16 +374,15 @@ def _within_prior(P: Array, prior: Array, n: int) -> Array:
 @cache
 def _projection(n: int, rises: bool) -> ca.Function:
     """Return `bounded` of one axle: [weights, own], P of the weights, numbers, offset, slope."""
-    theta, P, slope = ca.SX.sym("theta", n + 3), ca.SX.sym("P", n, n), ca.SX.sym("slope", n)
-    (port, numbers), offset = named_port(BoundNumbers, "numbers"), ca.SX.sym("offset")
+    ports, s = symbols(theta=n + 3, P=(n, n), numbers=BoundNumbers, offset=1, slope=n)
     kept = bounded(
-        numbers,
-        ca.vertsplit(theta),
-        {(j, k): P[j, k] for j, k in triangle(n)},
-        offset=offset,
-        slope=ca.vertsplit(slope) if rises else None,
+        s.numbers,
+        ca.vertsplit(s.theta),
+        {(j, k): s.P[j, k] for j, k in triangle(n)},
+        offset=s.offset,
+        slope=ca.vertsplit(s.slope) if rises else None,
     )
-    return ca.Function("bounded", [theta, P, port, offset, slope], [ca.horzcat(*kept)])
+    return ca.Function("bounded", list(ports.values()), [ca.horzcat(*kept)])
 
 
 @cache

@@ -6,16 +6,23 @@ after three bad samples in a row, and while v_y and r repeat to the last bit (a 
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import astuple, dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from identifier.axle.car import larger
+from identifier.setup import Port
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY, Vehicle
 
 BAD_IN_A_ROW = 3
+GATE_PORT = Port(
+    "gate",
+    "SI",
+    "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck samples "
+    "in a row",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,33 +92,9 @@ class Plausibility:
         """
         return math.floor(self.hold / dt) + 2
 
-    def numbers(self) -> "GateNumbers":
-        """Return the numbers of a step."""
-        return GateNumbers(**asdict(self))
-
-
-class GateNumbers(NamedTuple):
-    """The fields of `Plausibility`."""
-
-    min_speed: Any
-    learning_speed: Any
-    max_speed: Any
-    max_sideslip: Any
-    slow: Any
-    max_yaw_rate: Any
-    max_steering: Any
-    max_rate: Any
-    jump: Any
-    max_yaw_acceleration: Any
-    yaw_jump: Any
-    max_steering_rate: Any
-    steering_jump: Any
-    hold: Any
-    settle: Any
-
-    def possible_v_y(self, v_x: Any, v_y: Any) -> Any:
-        """Return whether v_y is one that a car may have at v_x, both [m/s]; NaN is not."""
-        return ca.fabs(v_y) < self.max_sideslip * larger(v_x, self.slow)
+    def numbers(self) -> tuple[float, ...]:
+        """Return the numbers of a step, whose port names them as the fields are."""
+        return astuple(self)
 
 
 class GateState(NamedTuple):
@@ -154,11 +137,12 @@ def _all(*conditions: Any) -> Any:
     return result
 
 
-def gate(limits: GateNumbers, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
+def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
     """Judge a sample.
 
     Parameters
     ----------
+    limits : numbers of a `Plausibility`.
     dt : sampling interval [s].
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
@@ -167,7 +151,7 @@ def gate(limits: GateNumbers, dt: Any, last: GateState, x: Any, u: Any, v_x: Any
     v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
     possible = _all(
         ca.fabs(v_x) < limits.max_speed,
-        limits.possible_v_y(ca.fabs(v_x), v_y),
+        ca.fabs(v_y) < limits.max_sideslip * larger(ca.fabs(v_x), limits.slow),  # NaN is not
         ca.fabs(r) < limits.max_yaw_rate,
         ca.fabs(delta_f) < limits.max_steering,
         ca.fabs(delta_r) < limits.max_steering,

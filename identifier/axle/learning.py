@@ -25,6 +25,7 @@ from identifier.axle.covariance import (
     updated,
     width,
 )
+from identifier.axle.curve import unit_slopes
 from models.rules import require_positive_fields
 
 
@@ -402,16 +403,15 @@ class Bounds:
             if not least < most:
                 raise ValueError(f"least_{of} must be below most_{of}, they are {least}, {most}")
 
-    def at(self, n: int, slopes: float, rising_until: float | None) -> "BoundNumbers":
+    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
         """Return the numbers of a step.
 
         n products of weights that lie in the box sum up to within n + 8 roundings.
 
         Parameters
         ----------
-        n : number of units.
-        slopes : sum of their derivatives where the slope is bounded [1/rad].
-        rising_until : the slip of that [rad]; the least stiffness is one at zero slip.
+        ladder : slip scales of the n units [rad].
+        rising_until : slip at which the slope is bounded [rad]; the least stiffness is one at zero.
 
         Raises
         ------
@@ -419,6 +419,7 @@ class Bounds:
             Where n weights within their box, all equal, cannot carry the middle of the grip, or
             are stiffer or softer than they may.
         """
+        n, slopes = len(ladder), float(unit_slopes(rising_until or 0.0, ladder).sum())
         rounding = (n + 8) * FLOAT * self.weight
         least, most = self.least_grip + n * rounding, self.most_grip - n * rounding
         center = 0.5 * (least + most) / n
@@ -450,33 +451,6 @@ class Bounds:
             v_y=inward(self.v_y),
         )
 
-    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
-        """Return the numbers of a step with a ladder.
-
-        Parameters
-        ----------
-        ladder : slip scales of the units [rad].
-
-        Raises
-        ------
-        ValueError
-            As `at` does.
-        """
-        slopes = unit_slopes(ladder, rising_until or 0.0)
-        return self.at(len(ladder), float(slopes.sum()), rising_until)
-
-
-def unit_slopes(ladder: tuple[float, ...], slip: float) -> Array:
-    """Return the derivatives of the units at a slip, (n,) [1/rad].
-
-    Parameters
-    ----------
-    ladder : slip scales of the units [rad].
-    slip : [rad].
-    """
-    scales = np.array(ladder)
-    return np.asarray(1.0 / (scales * np.cosh(slip / scales) ** 2), dtype=np.float64)
-
 
 def rising_shares(ladder: tuple[float, ...], slip: float) -> Array:
     """Return the derivatives of the units at a slip over their sum, (n,), as `bounded` wants them.
@@ -486,7 +460,7 @@ def rising_shares(ladder: tuple[float, ...], slip: float) -> Array:
     ladder : slip scales of the units [rad].
     slip : until which curves shall not fall [rad].
     """
-    slopes = unit_slopes(ladder, slip)
+    slopes = unit_slopes(slip, ladder)
     return np.asarray(slopes / slopes.sum(), dtype=np.float64)
 
 

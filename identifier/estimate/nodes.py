@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.axle.slip import Sway
 from identifier.estimate.drive import (
     ALONG,
     LONGITUDINAL,
@@ -133,7 +134,7 @@ def _piece(
         if slope_on(motion, felt, on, dt, ALONG) is not None:
             a_x, turning = felt, 0.0
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
-    omega = min(5.0 / vehicle.froude_time, 60.0)
+    omega = Sway.for_vehicle(vehicle).frequency
     rho, rate = _rolled(low_passed(a_y, ROLLS / scale, dt), omega, dt)
     jerk = gradient(low_passed(a_y, JERKS / scale, dt), dt)
     speed = mean(v_x)

@@ -118,7 +118,6 @@ class Priors:
         *,
         wide: Mapping[str, float] = {},
         apart: bool = False,
-        fixed: Collection[str] = (),
     ) -> "Priors":
         """Return the beliefs for a car.
 
@@ -141,8 +140,6 @@ class Priors:
             mean[k], sd[k] = min(max(value, low[k]), high[k]), doubt
         for name, value in wide.items():
             sd[INDEX[name]] = value
-        for name in fixed:
-            sd[INDEX[name]] = 0.0
         information = np.zeros((p, p))
         moves = sd > 0.0
         information[moves, moves] = 1.0 / sd[moves] ** 2

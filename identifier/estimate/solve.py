@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.slip import Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_CAR, SEDAN, Priors
@@ -258,7 +259,7 @@ def autocorrelation_time(pieces: Sequence[Array], step: float, lags: int) -> flo
 def car_numbers(vehicle: Vehicle) -> Array:
     """Return the numbers of `CarNumbers`, (7,)."""
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
-    omega = min(5.0 * np.sqrt(GRAVITY / vehicle.wheelbase), 60.0)
+    omega = Sway.for_vehicle(vehicle).frequency
     return np.array(
         CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce, vehicle.drag)
     )

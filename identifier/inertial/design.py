@@ -12,13 +12,13 @@ from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
-from identifier.axle.design import AxleIdentifier
+from identifier.axle.design import AxleIdentifier, tracks
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
-from identifier.axle.slip import FASTEST, SHORTEST, Sensors, Sway
+from identifier.axle.slip import FASTEST, Sensors, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
@@ -287,7 +287,7 @@ class InertialIdentifier(Method):
 
     def body_prior(self, vehicle: Vehicle) -> Body:
         """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
-        frequency = self.roll_frequency / vehicle.froude_time
+        frequency = self._sway(vehicle).frequency
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
 
@@ -384,18 +384,9 @@ class InertialIdentifier(Method):
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.
 
-        Parameters
-        ----------
         state : W (k, 2, n) and own (k, 2) at each of k instants.
         """
-        W, compliance = state["W"], state["own"].reshape(-1, 2)
-        slope = (W / np.array(self.ladder)).sum(axis=2)
-        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
-        return (
-            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
-            Track("relaxation length", "m", lag),
-            Track("force at saturation", "static load", W.sum(axis=2)),
-        )
+        return tracks(self.ladder, vehicle, state["W"], state["own"].reshape(-1, 2))
 
     def beside_force(self, state: Mapping[str, Array]) -> Array:
         """Return bias and roll in what the accelerometer showed, (n,) [weights].

@@ -28,8 +28,8 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
-from identifier.axle.car import named_port
-from identifier.axle.gate import GateNumbers, GateState, gate
+from identifier.axle.car import step_function, symbols
+from identifier.axle.gate import GateState, Plausibility, gate
 from identifier.axle.slip import SHORTEST
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
@@ -113,63 +113,65 @@ def motion_scan(columns: Columns = ()) -> Scan:
     columns : names of the parameters over which slopes are asked for, (n,).
     """
     n = len(columns)
-    state, old = _symbols(CARRIED)
-    signal_port, signals = _symbols(SIGNALS)
-    rate_port, rates = _symbols(RATES)
-    parameter_port, parameters = _symbols(NAMES)
-    car_port, car = named_port(CarNumbers, "car")
-    dt = ca.SX.sym("dt")
-    was_on = ca.SX.sym("was_on")
-    duals = {name: Dual(parameters[name], _unit(name, columns)) for name in NAMES}
-    nothing = ca.SX(1, n)
-    fixed = {name: Dual(value, nothing) for name, value in (signals | rates).items()}
-    first = 1 - was_on * signals["on"]
+    ports, s = symbols(
+        state=len(CARRIED),
+        was_on=1,
+        signals=len(SIGNALS),
+        rates=len(RATES),
+        parameters=len(NAMES),
+        car=CarNumbers,
+        dt=1,
+    )
+    old = _by_name(CARRIED, s.state)
+    duals = {
+        name: Dual(value, _unit(name, columns))
+        for name, value in _by_name(NAMES, s.parameters).items()
+    }
+    fixed = _constant((*SIGNALS, *RATES), ca.vertsplit(ca.vertcat(s.signals, s.rates)), n)
+    on = fixed["on"].value
+    first = 1 - s.was_on * on
     pattern = {name: ca.Sparsity(1, n) for name in CARRIED}
     while True:  # which parameters each state can depend on
         tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
         before = {name: Dual(old[name], tangents[name]) for name in CARRIED}
-        after, out = _step(before, fixed, duals, car, dt, first)
+        after, out = _step(before, fixed, duals, s.car, s.dt, first)
         grown = {
             name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
         }
         if all(grown[name].nnz() == pattern[name].nnz() for name in CARRIED):
             break
         pattern = grown
-    on = signals["on"]
-    following = ca.vertcat(*(ca.if_else(on > 0, after[name].value, 0) for name in CARRIED))
-    ports_in = [state, was_on, signal_port, rate_port, parameter_port, car_port, dt]
-    names_in = ["state", "was_on", "signals", "rates", "parameters", "car", "dt"]
-    names_out = ["state_next", "was_on_next", "force", "missed", "slip"]
-    ports_out = [
-        following,
-        on,
-        *(on * ca.vertcat(*(axis.value for axis in out[name])) for name in ("F", "e", "x")),
-    ]
+    outputs = {
+        "state_next": ca.vertcat(*(ca.if_else(on > 0, after[name].value, 0) for name in CARRIED)),
+        "was_on_next": on,
+        **{
+            port: on * ca.vertcat(*(axis.value for axis in out[name]))
+            for port, name in (("force", "F"), ("missed", "e"), ("slip", "x"))
+        },
+    }
     carry: tuple[str, ...] = ("state", "was_on")
     if n:
-        kept = [ca.vec(tangents[name].nz[:]) for name in CARRIED]
-        flat = ca.SX.sym("tangent", sum(one.numel() for one in kept))
-        moved = [
-            on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED
-        ]
-        slopes = on * ca.vertcat(*(ca.densify(axis.slopes) for axis in out["e"]))
-        exchanged = ca.substitute(
-            [*ports_out, ca.vertcat(*moved), ca.densify(slopes)], [ca.vertcat(*kept)], [flat]
+        kept = ca.vertcat(*(ca.vec(tangents[name].nz[:]) for name in CARRIED))
+        ports["tangent"] = ca.SX.sym("tangent", kept.numel())
+        outputs["tangent_next"] = ca.vertcat(
+            *(on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED)
         )
-        ports_in.append(flat)
-        names_in.append("tangent")
-        ports_out = exchanged
-        names_out += ["tangent_next", "missed_slopes"]
-        carry = ("state", "was_on", "tangent")
-    step = ca.Function(
-        f"motion_{n}", ports_in, [ca.densify(one) for one in ports_out], names_in, names_out
-    )
+        outputs["missed_slopes"] = on * ca.vertcat(*(ca.densify(one.slopes) for one in out["e"]))
+        exchanged = ca.substitute(list(outputs.values()), [kept], [ports["tangent"]])
+        outputs = dict(zip(outputs, exchanged, strict=True))
+        carry = (*carry, "tangent")
+    dense = [ca.densify(one) for one in outputs.values()]
+    step = ca.Function(f"motion_{n}", list(ports.values()), dense, list(ports), list(outputs))
     return Scan(step, carry=carry, over=("signals", "rates"), flags=QUICK)
 
 
-def _symbols(names: tuple[str, ...]) -> tuple[Any, dict[str, Any]]:
-    port = ca.SX.sym(names[0], len(names))
-    return port, dict(zip(names, ca.vertsplit(port), strict=True))
+def _by_name(names: tuple[str, ...], vector: Any) -> dict[str, Any]:
+    return dict(zip(names, ca.vertsplit(vector), strict=True))
+
+
+def _constant(names: tuple[str, ...], values: Sequence[Any], n: int) -> dict[str, Dual]:
+    """Return values that depend on none of n parameters, by name."""
+    return {name: Dual(value, ca.SX(1, n)) for name, value in zip(names, values, strict=True)}
 
 
 def _unit(name: str, columns: Columns) -> Any:
@@ -437,43 +439,41 @@ REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
 @cache
 def replay_step() -> ca.Function:
     """Return the model as a step: axle_force [N], lagged slip and the larger slip [rad], (2,)."""
-    state_port, old = _symbols(REPLAYED)
-    gate_port, last = named_port(GateState, "gate")
-    x, u, v_x, dt = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x"), ca.SX.sym("dt")
-    parameter_port, parameters = _symbols(NAMES)
-    car_port, car = named_port(CarNumbers, "car")
-    limit_port, limits = named_port(GateNumbers, "plausibility")
-    loads = ca.SX.sym("loads", 2)
-    g = gate(limits, dt, last, x, u, v_x)
+    ports, s = symbols(
+        gate=GateState,
+        motion=len(REPLAYED),
+        x=2,
+        u=2,
+        v_x=1,
+        parameters=len(NAMES),
+        dt=1,
+        car=CarNumbers,
+        plausibility=Plausibility,
+        loads=2,
+    )
+    old = _by_name(REPLAYED, s.motion)
+    g = gate(s.plausibility, s.dt, s.gate, s.x, s.u, s.v_x)
     slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
     a_x = (g.v_x - slow) / LAG_OF_A_X - g.v_y * g.r
-    following = g.v_x + (slow - g.v_x) * ca.exp(-dt / LAG_OF_A_X)
+    following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / LAG_OF_A_X)
     values = [g.v_x, g.v_y, g.r, g.delta[0], g.delta[1], a_x, 0, 0, g.on]
-    nothing = ca.SX(1, 0)
-    fixed = {
-        name: Dual(value, nothing)
-        for name, value in zip((*SIGNALS, *RATES), (*values, 0, 0, 0), strict=True)
-    }
-    duals = {name: Dual(parameters[name], nothing) for name in NAMES}
-    before = {name: Dual(old.get(name, 0), nothing) for name in CARRIED}
-    after, out = _step(before, fixed, duals, car, dt, g.first)
+    fixed = _constant((*SIGNALS, *RATES), [*values, 0, 0, 0], 0)
+    duals = _constant(NAMES, ca.vertsplit(s.parameters), 0)
+    before = _constant(CARRIED, [old.get(name, 0) for name in CARRIED], 0)
+    after, out = _step(before, fixed, duals, s.car, s.dt, g.first)
     slip = ca.vertcat(*(axis.value for axis in out["x"]))
     alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
     motion = [ca.if_else(g.on, after[name].value, 0) for name in CARRIED[:10]]
-    force = ca.if_else(g.on, loads * ca.vertcat(*(axis.value for axis in out["F"])), 0)
-    return ca.Function(
+    force = s.loads * ca.vertcat(*(axis.value for axis in out["F"]))
+    return step_function(
         "motion_replay",
-        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limit_port, loads],
-        [
-            g.state,
-            ca.vertcat(*motion, following),
-            force,
-            ca.if_else(g.on, slip, 0),
-            ca.if_else(g.on, ca.fmax(ca.fabs(slip), ca.fabs(alpha)), 0),
-        ],
-        ["gate", "motion", "x", "u", "v_x", "parameters", "dt", "car", "plausibility", "loads"],
-        ["gate_next", "motion_next", "axle_force", "lagged_slip", "slip_size"],
-        {"cse": True},
+        ports,
+        {"gate": g.state, "motion": ca.vertcat(*motion, following)},
+        {
+            "axle_force": ca.if_else(g.on, force, 0),
+            "lagged_slip": ca.if_else(g.on, slip, 0),
+            "slip_size": ca.if_else(g.on, ca.fmax(ca.fabs(slip), ca.fabs(alpha)), 0),
+        },
     )
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 
 from codegen import Scan
-from identifier.axle.car import named_port
+from identifier.axle.car import step_function, symbols
 from identifier.axle.slip import SHORTEST
 from identifier.motion.model import (
     LEAST_GRIP,
@@ -54,21 +54,27 @@ def node_scan(columns: Columns = ()) -> Scan:
     columns : names of the parameters over which slopes are asked for, (n,), those of the
         accelerometer among them.
     """
-    z, z_next = ca.SX.sym("z", len(STATES)), ca.SX.sym("z_next", len(STATES))
-    given, given_next = ca.SX.sym("given", len(GIVEN)), ca.SX.sym("given_next", len(GIVEN))
-    p, felt = ca.SX.sym("parameters", len(NAMES)), ca.SX.sym("accelerometer", len(ACCELEROMETER))
-    car_port, car = named_port(CarNumbers, "car")
-    times, dt = ca.SX.sym("times", len(TIMES)), ca.SX.sym("dt")
-    by_name = dict(zip(LATENT_NAMES, ca.vertsplit(ca.vertcat(p, felt)), strict=True))
-    now, then = (_Instant(one, u, by_name, car) for one, u in ((z, given), (z_next, given_next)))
-    moves = ca.vertcat(*_moves(now, then, by_name, times, dt))
+    over: tuple[str, ...] = ("z", "z_next", "given", "given_next")
+    ports, s = symbols(
+        z=len(STATES),
+        z_next=len(STATES),
+        given=len(GIVEN),
+        given_next=len(GIVEN),
+        parameters=len(NAMES),
+        accelerometer=len(ACCELEROMETER),
+        car=CarNumbers,
+        times=len(TIMES),
+        dt=1,
+    )
+    z, p = s.z, ca.vertcat(s.parameters, s.accelerometer)
+    by_name = dict(zip(LATENT_NAMES, ca.vertsplit(p), strict=True))
+    now, then = (
+        _Instant(z, s.given, by_name, s.car),
+        _Instant(s.z_next, s.given_next, by_name, s.car),
+    )
+    moves = ca.vertcat(*_moves(now, then, by_name, s.times, s.dt))
     shows = ca.vertcat(*_shows(now, by_name))
     begins = ca.vertcat(z[0], 0, z[2:4] - ca.vertcat(*now.alpha), z[4:])
-    ports = {
-        **{"z": z, "z_next": z_next, "given": given, "given_next": given_next, "parameters": p},
-        **{"accelerometer": felt, "car": car_port, "times": times, "dt": dt},
-    }
-    over: tuple[str, ...] = ("z", "z_next", "given", "given_next")
     carry: tuple[str, ...] = ()
     force = ca.vertcat(*now.force) - z[4:6]
     out = {"moves": moves, "shows": shows, "begins": begins, "force": force}
@@ -84,7 +90,7 @@ def node_scan(columns: Columns = ()) -> Scan:
         carry = ("sums", "slopes")
         ports |= {"measured": measured, **weights, "sums": sums, "slopes": slopes}
         of = ca.vertcat(*(by_name[name] for name in columns))
-        J, K, P = (ca.jacobian(missed, one) for one in (z, z_next, of))
+        J, K, P = (ca.jacobian(missed, one) for one in (z, s.z_next, of))
         wJ, wK, wP = (ca.diag(w) @ one for one in (J, K, P))
         out = {
             **{"now": J.T @ wJ, "next": K.T @ wK, "both": K.T @ wJ},
@@ -93,14 +99,8 @@ def node_scan(columns: Columns = ()) -> Scan:
             "shows_z": ca.jacobian(shows, z),
             **{"sums_next": sums + P.T @ wP, "slopes_next": slopes + wP.T @ missed},
         }  # fmt: skip
-    step = ca.Function(
-        f"nodes_{len(columns)}",
-        list(ports.values()),
-        [ca.densify(one) for one in out.values()],
-        list(ports),
-        list(out),
-        {"cse": True},
-    )
+    dense = {name: ca.densify(one) for name, one in out.items()}
+    step = step_function(f"nodes_{len(columns)}", ports, {}, dense)
     return Scan(step, carry=carry, over=over, flags=QUICK)
 
 
