@@ -109,9 +109,6 @@ def _taught(
     step: ca.Function, values: Mapping[str, Array], constants: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return the outputs of `build_lesson` for N samples, (N, ...).
-
-    Parameters
-    ----------
     values : of its ports, (N, ...) but for the constants.
     """
     N, names = len(values["v_x"]), step.name_in()
@@ -135,9 +132,6 @@ def _by_sample(value: Array, N: int) -> Array:
 
 def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint:
     """Return what reaches the force of each axle after a drive, from its end to its beginning.
-
-    Parameters
-    ----------
     slips : at which the force is looked at, of each axle (2, m) [rad].
     ladder : slip scales of the units [rad].
     """
@@ -186,12 +180,8 @@ def _of_axle(
     i: int, model: AxleModel, taught: Lessons, reach: Adjoint, slips: Array, box: Array
 ) -> tuple[Property, ...]:
     """Return what is proven of the curve of axle i.
-
-    Parameters
-    ----------
     reach : of errors, at the slips of both axles (2, m).
-    slips : [rad], up to the range that is known (m,).
-    box : corners of the set of weights (k, n).
+    slips : [rad], up to the range that is known (m,).   box : corners of the set of weights (k, n).
     """
     axle, known = AXLES[i], float(model.known_slip[i])
     facts = curve_facts(model.W[i : i + 1], model.ladder, max(known, SMALLEST))
@@ -257,9 +247,6 @@ def _of_axle(
 
 def begin_error(taught: Lessons, reach: Adjoint) -> Array:
     """Return the force error that the beginning leaves, within `BEGIN` deviations (2, m).
-
-    Parameters
-    ----------
     reach : of errors, at m slips.
     """
     variance = np.einsum("ami,aij,amj->am", reach.begin, taught.begin, reach.begin)

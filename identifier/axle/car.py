@@ -40,11 +40,7 @@ def car_numbers(vehicle: Vehicle) -> Array:
 
 def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
     """Return ξ [s], (2,).
-
-    Parameters
-    ----------
-    v_y : lateral velocity [m/s].
-    r : yaw rate [rad/s].
+    v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
     """
     return v_y / GRAVITY + car.inertia * r
 
@@ -55,9 +51,6 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
 
 def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
     """Return the constant that a step of a car with downforce has beside; {} of one without.
-
-    Parameters
-    ----------
     vehicle : the car; `downforce` holds its κ (2,) [s²/m²].
     """
     return {"downforce": np.array(vehicle.downforce)} if vehicle.has_downforce else {}
@@ -104,9 +97,6 @@ def step_function(
 
 def larger(a: Any, b: Any) -> Any:
     """Return the larger of two, where neither is NaN.
-
-    Parameters
-    ----------
     b : expression of the same shape, or a number.
     """
     return ca.if_else(a > b, a, b)
@@ -114,9 +104,6 @@ def larger(a: Any, b: Any) -> Any:
 
 def smaller(a: Any, b: Any) -> Any:
     """Return the smaller of two, where neither is NaN.
-
-    Parameters
-    ----------
     b : expression of the same shape, or a number.
     """
     return ca.if_else(a < b, a, b)

@@ -77,9 +77,6 @@ class Design(Protocol):
 @cache
 def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | None) -> Array:
     """Return the corners of the set that weights are kept in, (k, n) [static axle loads].
-
-    Parameters
-    ----------
     ladder : slip scales of the units [rad].
     rising_until : as of `AxleIdentifier`; None bounds no slope.
     """
@@ -138,11 +135,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts
 
     On a cell from a to b a falling function s of a unit is between s(b) and s(a), so that
     Σ w_j s_j is at least Σ_(w>0) w_j s_j(b) + Σ_(w<0) w_j s_j(a).
-
-    Parameters
-    ----------
-    W : weights of the curves (k, n) [static axle loads].
-    ladder : slip scales of the units [rad].
+    W : weights of the curves (k, n) [static axle loads].   ladder : slip scales of the units [rad].
     until : largest slip [rad].
     """
     edges = _cells(until)
@@ -173,11 +166,7 @@ def _first(edges: Array, good: NDArray[np.bool_]) -> float:
 
 def widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
     """Return by how much two curves of a set may differ at one slip [static axle loads].
-
-    Parameters
-    ----------
-    W : corners of the set (k, n).
-    ladder : slip scales of the units [rad].
+    W : corners of the set (k, n).   ladder : slip scales of the units [rad].
     until : largest slip [rad].
     """
     units = np.tanh(_cells(until)[:, None] / np.array(ladder))
@@ -190,9 +179,6 @@ def widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionDrop:
     """A drop of friction in a steady corner, for which the time to follow it is proven.
-
-    Parameters
-    ----------
     to : friction after it over that before [-].
     left : share of the change that may still be missing when it counts as followed [-].
     seen : least |φ - x φ'| of the regressor: what a change of ln μ makes [static axle loads].
@@ -217,11 +203,7 @@ class FrictionDrop:
         least, are given the largest and are cut; what is then believed takes that off the error.
         That is of errors that are one change of ln μ at both axles, but for `RoadChange.explains`
         of their squares. inf where it does not end within a minute.
-
-        Parameters
-        ----------
-        friction : before the drop [-].
-        v_x : speed [m/s].
+        friction : before the drop [-].   v_x : speed [m/s].
         """
         r, dt = design.regression, design.dt
         at = design.change.at(dt, r.rate)

@@ -28,9 +28,6 @@ GATE_PORT = Port(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plausibility:
     """Bounds of what a car can do; generous, since they are there for faults.
-
-    Parameters
-    ----------
     min_speed : below this speed [m/s] forces read zero.
     learning_speed : below this speed [m/s] learning rests.
     max_speed : no car is faster [m/s].
@@ -85,9 +82,6 @@ class Plausibility:
 
     def rest(self, dt: float) -> int:
         """Return how many bad samples in a row end a run, so that the next good one begins anew.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         return math.floor(self.hold / dt) + 2
@@ -139,14 +133,8 @@ def _all(*conditions: Any) -> Any:
 
 def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
     """Judge a sample.
-
-    Parameters
-    ----------
-    limits : numbers of a `Plausibility`.
-    dt : sampling interval [s].
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
-    v_x : longitudinal speed [m/s].
+    limits : numbers of a `Plausibility`.   dt : sampling interval [s].   x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).   v_x : longitudinal speed [m/s].
     """
     v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
     possible = _all(

@@ -24,9 +24,6 @@ STEP = 1.2  # ratio over which log-derivatives are taken
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
     """Means and standard deviations before the first sample.
-
-    Parameters
-    ----------
     friction : of the road [-].
     sd_stiffness : of ln C [-].
     sd_friction : of ln μ [-].
@@ -53,9 +50,6 @@ class Prior:
 
     def means(self, vehicle: Vehicle, ladder: tuple[float, ...]) -> tuple[Array, Array]:
         """Return weights (2, n) and [compliance, sway share, offset] (2, 3).
-
-        Parameters
-        ----------
         vehicle : the car; its cornering stiffness enters here and nowhere else.
         ladder : slip scales of the units [rad].
         """
@@ -66,9 +60,6 @@ class Prior:
 
     def covariance(self, vehicle: Vehicle, ladder: tuple[float, ...]) -> Array:
         """Return the covariance of [weights, compliance, sway share, offset] (2, n + 3, n + 3).
-
-        Parameters
-        ----------
         ladder : slip scales of the units [rad].
         """
         n, mu = len(ladder), self.friction
@@ -98,12 +89,7 @@ def _relative_stiffness(vehicle: Vehicle) -> tuple[float, float]:
 
 def fiala_force(alpha: Array, stiffness: float, friction: float) -> Array:
     """Return F/F_z of a brush tire, α > 0, (k,).
-
-    Parameters
-    ----------
-    alpha : slip angles [rad], (k,).
-    stiffness : C/F_z [1/rad].
-    friction : μ [-].
+    alpha : slip angles [rad], (k,).   stiffness : C/F_z [1/rad].   friction : μ [-].
     """
     sliding = np.minimum(np.tan(alpha) * stiffness / (3.0 * friction), 1.0)
     return np.asarray(friction * (1.0 - (1.0 - sliding) ** 3), dtype=np.float64)
@@ -111,11 +97,7 @@ def fiala_force(alpha: Array, stiffness: float, friction: float) -> Array:
 
 def projected(force: Array, ladder: tuple[float, ...]) -> Array:
     """Return the weights whose curves come closest to given ones, with a little ridge.
-
-    Parameters
-    ----------
-    force : curves at `SLIPS` (300,) or (300, k).
-    ladder : slip scales of the units [rad].
+    force : curves at `SLIPS` (300,) or (300, k).   ladder : slip scales of the units [rad].
     """
     weights: Array = _projector(ladder) @ force
     return weights
@@ -131,12 +113,7 @@ def _projector(ladder: tuple[float, ...]) -> Array:
 
 def fiala_weights(stiffness: float, friction: float, ladder: tuple[float, ...]) -> Array:
     """Return the weights (n,) of a brush tire.
-
-    Parameters
-    ----------
-    stiffness : C/F_z [1/rad].
-    friction : μ [-].
-    ladder : slip scales of the units [rad].
+    stiffness : C/F_z [1/rad].   friction : μ [-].   ladder : slip scales of the units [rad].
     """
     return projected(fiala_force(SLIPS, stiffness, friction), ladder)
 
@@ -144,9 +121,6 @@ def fiala_weights(stiffness: float, friction: float, ladder: tuple[float, ...]) 
 @cache
 def friction_direction(ladder: tuple[float, ...]) -> Array:
     """Return M (n, n) with dw/d ln μ = M w for φ = μ φ₀(α/μ): friction changes, stiffness does not.
-
-    Parameters
-    ----------
     ladder : slip scales of the units [rad].
     """
     T = unit_matrix(SLIPS, ladder)

@@ -294,9 +294,6 @@ def build_step(
     steps: tuple[int, ...], *, rises: bool = False, bands: bool = False, pressed: bool = False
 ) -> ca.Function:
     """Return the step; every number stays an input of it.
-
-    Parameters
-    ----------
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is given, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.

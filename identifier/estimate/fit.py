@@ -54,9 +54,6 @@ def fit(
     progress: Callable[[float], None] | None = None,
 ) -> Fit:
     """Estimate the tires of a car from logs, with the same sensors.
-
-    Parameters
-    ----------
     recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
     block : longest time that is estimated at once [s].

@@ -53,9 +53,6 @@ SHORTEST = 50  # nodes from which noise is learnt
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trust:
     """How far curves, road and sensors are trusted; times and sensors as of a sedan.
-
-    Parameters
-    ----------
     error, relative : what curves miss of a force [static axle loads], [-].
     error_time : for which it stays alike [s].
     bank, bank_time : sine of the bank of a road [-], and for which it lasts [s].
@@ -138,9 +135,6 @@ class Smoothed:
 
 def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Priors:
     """Return beliefs with those of the accelerometer behind, and of yaw rate and inertia.
-
-    Parameters
-    ----------
     beliefs : of the car, of one of these, or of a log that came before.
     late : whether a delay of a_y was found and taken out, so that more of it may be left.
     """
@@ -173,9 +167,6 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
 
 class Latent:
     """The problem of a drive: its cost, and how it is minimized.
-
-    Parameters
-    ----------
     priors : of `latent_priors`; what is to be held does not move.
     columns : which parameters slopes are taken over, (m,): those that move, and others whose doubt
         is to be given.
@@ -332,9 +323,6 @@ class Latent:
 
     def begin(self, stiffer: float = 0.0) -> tuple[Array, Array]:
         """Return states whose rear axle does not slip, and the parameters that are believed.
-
-        Parameters
-        ----------
         stiffer : by which ln C of both axles is larger.
         """
         v_x, delta = self.nodes.given[:, 0], self.nodes.given[:, 1]
@@ -445,9 +433,6 @@ class Latent:
 
     def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> Smoothed:
         """Return the optimum from a start, its noise learnt in some rounds.
-
-        Parameters
-        ----------
         R : to begin with (2,); None takes that of good sensors.
         """
         R = self.R if R is None else R
@@ -479,11 +464,7 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
 
     It begins with soft and with stiff tires. Where they end elsewhere, the covariance has the
     distance between both, by how probable they are.
-
-    Parameters
-    ----------
-    beliefs : of the car, or what other drives of it left.
-    late : as of `latent_priors`.
+    beliefs : of the car, or what other drives of it left.   late : as of `latent_priors`.
     """
     problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
     first = problem.smoothed(*problem.settled(STARTS[0]))
@@ -529,9 +510,6 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     It is the delay with which the minute of hardest cornering is explained best, found as a
     parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
     too little.
-
-    Parameters
-    ----------
     priors : as of `Latent`.
     """
     part = hardest(recording, ASKED)
@@ -568,9 +546,6 @@ def estimate_v_y(
     recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
 ) -> LateralVelocity:
     """Return the v_y of a drive on tires that are known, and how well.
-
-    Parameters
-    ----------
     p, covariance : of the tires, as `motion.parameters` lists them (p,), (p, p).
     """
     again = np.array([LATENT_NAMES.index(name) for name in AGAIN])

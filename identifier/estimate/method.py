@@ -30,9 +30,6 @@ class FitMethod(Method):
     """Maximum a posteriori of tires, body and sensors over a whole log.
 
     By `estimate.solve`, without a v_y by `estimate.latent`.
-
-    Parameters
-    ----------
     min_speed : below this speed [m/s] forces read zero.
     dt : sampling interval of the log [s].
     """
@@ -78,9 +75,6 @@ class FitMethod(Method):
         progress: Callable[[float], None] | None = None,
     ) -> FittedModel:
         """Return the tires that a log taught.
-
-        Parameters
-        ----------
         start : a fit, or the prior of a fleet, that is believed before; None believes the table.
 
         Raises

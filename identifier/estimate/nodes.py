@@ -40,9 +40,6 @@ class TooShortError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Nodes:
     """Signals at n nodes.
-
-    Parameters
-    ----------
     t : time in the recording's own clock [s], (n,).
     dt : from a node to the next [s].
     given : columns as `motion.nodes.GIVEN`, (n, 8).
@@ -67,9 +64,6 @@ class Nodes:
         a_y_late: float = 0.0,
     ) -> "Nodes":
         """Return the nodes of a recording.
-
-        Parameters
-        ----------
         a_y_late : by which a_y is late [s].
 
         Raises

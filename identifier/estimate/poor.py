@@ -117,9 +117,6 @@ def _interval(new: NDArray[np.intp]) -> float:
 
 class Kinematics:
     """v_y over a recording as least squares, its unknowns v_y and b of each sample in turn.
-
-    Parameters
-    ----------
     new : samples at which a value is new, (m,).
     """
 
@@ -203,9 +200,6 @@ class Kinematics:
 
     def carried(self, shown: Shown, weights: Array) -> tuple[Array, Array]:
         """Return v_y (n,) and what it misses of the values that were shown (m,) [m/s].
-
-        Parameters
-        ----------
         weights : of the values, at most 1 (m,).
         """
         v_y, missed, _ = self._solved(shown, weights)

@@ -12,9 +12,6 @@ from models.vehicle import Vehicle
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Posterior:
     """Gaussian around the optimum.
-
-    Parameters
-    ----------
     p : all parameters, as `motion.parameters` lists them (p,).
     covariance : of them, zero of those that did not move (p, p).
     slope, curvature : of the loss of the drives alone, without the priors (p,), (p, p).

@@ -85,9 +85,6 @@ TAILS = 1.0  # degrees of freedom of their priors
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Priors:
     """The beliefs for a car, as numbers.
-
-    Parameters
-    ----------
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
@@ -120,9 +117,6 @@ class Priors:
         apart: bool = False,
     ) -> "Priors":
         """Return the beliefs for a car.
-
-        Parameters
-        ----------
         wide : standard deviations in SI in place of those of the table, by parameter.
         apart : whether bias and angle of v_y are believed apart, without `SHARED_ERROR`.
         """

@@ -43,9 +43,6 @@ def with_roads(
     drives: Sequence[Drive], vehicle: Vehicle, priors: Priors, plain: Posterior
 ) -> tuple[Posterior, Roads | None]:
     """Return the estimate with a friction of each segment where that is worth its price.
-
-    Parameters
-    ----------
     plain : the estimate without segments.
     """
     best, roads = plain, None
@@ -99,9 +96,6 @@ def _segments(
 
 def cheapest(loss: Array, price: float) -> NDArray[np.intp]:
     """Return the states of least loss when each change has a price, (m,).
-
-    Parameters
-    ----------
     loss : of each state at each step (k, m) [nats].
     """
     states, steps = loss.shape

@@ -48,9 +48,6 @@ class Residuals(NamedTuple):
 
 class Problem:
     """Residuals of drives of one car as a function of the parameters.
-
-    Parameters
-    ----------
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     every : whether slopes over all parameters are at hand, for `under` other priors.
     """
@@ -135,9 +132,6 @@ class Problem:
 
     def residuals(self, p: Array) -> Residuals:
         """Return what the balance misses, and its slopes.
-
-        Parameters
-        ----------
         p : parameters, and behind them ln of the friction of other roads.
         """
         e, slopes = [], []
@@ -174,9 +168,6 @@ class Problem:
 
     def memory(self, e: Array) -> Array:
         """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
-
-        Parameters
-        ----------
         e : over b [-], (m, 2).
         """
         step, x = float(self.weight[0]), np.clip(e, -4.0, 4.0)
@@ -187,9 +178,6 @@ class Problem:
 
     def scale(self, e: Array) -> Array:
         """Return S² of both axles, (2,), by expectation maximization.
-
-        Parameters
-        ----------
         e : over b [-], (m, 2).
         """
         S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, LEAST_SCALE) ** 2
@@ -201,12 +189,7 @@ class Problem:
 
     def cost(self, e: Array, p: Array, T: Array) -> float:
         """Return J of residuals at parameters when a second of them counts 1/T times [nats].
-
-        Parameters
-        ----------
-        e : over b [-], (m, 2).
-        p : (p,).
-        T : [s], (2,).
+        e : over b [-], (m, 2).   p : (p,).   T : [s], (2,).
         """
         S2 = self.scale(e)
         scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
@@ -214,12 +197,7 @@ class Problem:
 
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
         """Return Σ w/T ρ(e) [nats].
-
-        Parameters
-        ----------
-        e : over b [-], (m, 2).
-        S2 : [-], (2,).
-        T : [s], (2,).
+        e : over b [-], (m, 2).   S2 : [-], (2,).   T : [s], (2,).
         """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
@@ -233,11 +211,7 @@ def error_size(force: Array) -> Array:
 
 def autocorrelation_time(pieces: Sequence[Array], step: float, lags: int) -> float:
     """Return the integrated autocorrelation time of a signal [s]; 2 s where it is zero.
-
-    Parameters
-    ----------
-    pieces : of the signal; such below 20 samples do not count.
-    step : between samples [s].
+    pieces : of the signal; such below 20 samples do not count.   step : between samples [s].
     lags : of which at most a third of a piece is looked at.
     """
     total = np.zeros(lags)
@@ -269,9 +243,6 @@ def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
     """Return the inputs of a compiled motion over a drive.
 
     Late signals are read on time; the rest of a delay is 0.
-
-    Parameters
-    ----------
     car : of `car_numbers`, (7,).
     """
     late = p[DELAYS]
@@ -313,9 +284,6 @@ def estimate(
     enough: float = ENOUGH,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
-
-    Parameters
-    ----------
     vehicle : the car; its stiffnesses are not looked at.
     priors : beliefs; None takes those of the car.
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights
@@ -361,9 +329,6 @@ def descend(
     enough: float = ENOUGH,
 ) -> Posterior:
     """Return the optimum that is found from a start.
-
-    Parameters
-    ----------
     start : parameters to begin with (p,).
     memory : T [s], (2,), where it is held, so that costs can be compared; None estimates it.
     enough : improvement below which it ends [nats].
@@ -438,9 +403,6 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     """Return the optimum (p,) of what is believed, and its covariance (p, p).
 
     With `Priors.after` these are the parameters of all drives together.
-
-    Parameters
-    ----------
     begin : parameters to begin with (p,).
     """
     index, p = np.flatnonzero(priors.moves), begin.copy()
@@ -482,9 +444,6 @@ def softness(p: Array) -> tuple[Array, Array]:
     """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
 
     No tire has less than a quarter of C there: play in the steering looks so.
-
-    Parameters
-    ----------
     p : (p,).
 
     Returns

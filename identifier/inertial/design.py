@@ -48,9 +48,6 @@ class InertialIdentifier(Method):
     """Lateral velocity and axle curves by one Kalman filter, from r, a_y, v_x and steering alone.
 
     What is learnt freezes to the same kind of model as that of the axle identifier.
-
-    Parameters
-    ----------
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
     held : whether tires, lag and steering stay those of the model that it begins with, but for
@@ -100,9 +97,6 @@ class InertialIdentifier(Method):
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "InertialIdentifier":
         """Return the design for a car: lengths scale with L, speeds with sqrt(g L) (Froude).
-
-        Parameters
-        ----------
         vehicle : only its wheelbase is used here; its cornering stiffness enters the prior.
         dt : sampling interval [s].
         """
@@ -126,9 +120,6 @@ class InertialIdentifier(Method):
         cls, model: FittedModel, vehicle: Vehicle, *, dt: float = 0.01
     ) -> "InertialIdentifier":
         """Return the design for a car whose tires are known: it begins with the model.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
@@ -157,9 +148,6 @@ class InertialIdentifier(Method):
         cls, model: TireModel | None, vehicle: Vehicle, *, dt: float = 0.01
     ) -> "tuple[InertialIdentifier, TireModel | None]":
         """Return the design for a car with these tires, and what its run begins with.
-
-        Parameters
-        ----------
         model : a fit is held, what an axle identifier learnt is gone on from; others help nothing.
         dt : sampling interval [s].
         """
@@ -218,9 +206,6 @@ class InertialIdentifier(Method):
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
-
-        Parameters
-        ----------
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -390,9 +375,6 @@ class InertialIdentifier(Method):
 
     def beside_force(self, state: Mapping[str, Array]) -> Array:
         """Return bias and roll in what the accelerometer showed, (n,) [weights].
-
-        Parameters
-        ----------
         state : sensors (n + 1, 4) and body (n + 1, 2).
         """
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
@@ -403,9 +385,6 @@ class InertialIdentifier(Method):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights: where tires are held, as sure as typical ones.
-
-        Parameters
-        ----------
         state : W (2, n), own (2,), sensors (4,), UD of both and excitation (2, 9).
         """
         prior = self._prior_covariance(vehicle)

@@ -74,9 +74,6 @@ class Learnt(NamedTuple):
 
     def into(self, n: int, curves: Any, compliance: Any) -> Any:
         """Return what a step of what moves and of each of these moves of z, sparse.
-
-        Parameters
-        ----------
         n : number of units.
         curves : change of the weights by one of ln grip and of ln stiffness, (4, n): front and rear
             of the first, then of the second.
@@ -106,11 +103,7 @@ CURVES = ("grip_f", "grip_r", "stiffness_f", "stiffness_r")
 
 def unknowns(z: Any, n: int) -> Unknowns:
     """Return z by name.
-
-    Parameters
-    ----------
-    z : as above.
-    n : number of units.
+    z : as above.   n : number of units.
     """
     m, k = MOVING, MOVING + 2 * n
     return Unknowns(
@@ -154,11 +147,7 @@ class Along(NamedTuple):
 
     def moved(self, load: Load, a_x: Any, v_x: Any) -> Any:
         """Return what forces are multiplied with (2,) [-].
-
-        Parameters
-        ----------
-        load : without a_x.
-        a_x : [m/s²].
+        load : without a_x.   a_x : [m/s²].
         """
         f = (a_x + self.drag * v_x**2) * (1 / GRAVITY)
         drives = f > 0
@@ -219,9 +208,6 @@ class Way:
 
     def linear(self, value: Any, slope: Any, x: Any) -> Any:
         """Return a number with a gradient that is known, and not that of how it is computed.
-
-        Parameters
-        ----------
         value, slope : f(x) and f'(x), of any shape.
         """
         return self.held(value) + self.held(slope) * (x - self.held(x))
@@ -234,11 +220,7 @@ class Way:
 
     def gradient(self, z: Any, moving: Any) -> Any:
         """Return F by its way, as `identifier.inertial.gaussian.propagated` takes it.
-
-        Parameters
-        ----------
-        z : symbols (q,).
-        moving : what moves (7,), an expression of z and of symbols on the way.
+        z : symbols (q,).   moving : what moves (7,), an expression of z and of symbols on the way.
         """
         symbols, values = zip(*self._on_the_way, strict=True)
         numbers = ca.vertcat(*values, moving)
@@ -270,9 +252,6 @@ def turning(car: Car) -> Any:
 
 def cosine(delta: Any) -> Any:
     """Return cos δ, without a call.
-
-    Parameters
-    ----------
     delta : steering [rad].
     """
     return 1 - delta**2 / 2 + delta**4 / FIRST_COS
@@ -280,11 +259,7 @@ def cosine(delta: Any) -> Any:
 
 def slip_angle(at: Sample, sideways: Any, steering: Any) -> Any:
     """Return α [rad], (2,).
-
-    Parameters
-    ----------
-    at : speed and steering.
-    sideways : v_y of the axles, v_y ± l r [m/s], (2,).
+    at : speed and steering.   sideways : v_y of the axles, v_y ± l r [m/s], (2,).
     steering : δ₀ [rad].
     """
     return at.delta + ca.vertcat(steering, 0) - ca.atan(sideways * (1 / at.v_x))
@@ -306,13 +281,8 @@ def predicted(
 
     Slip is exact for α linear over the step (first-order hold), forces and motion meet in the
     middle of it.
-
-    Parameters
-    ----------
-    dt : sampling interval [s].
-    z : before the step.
-    scales : 1/α_j of the units [1/rad], (1, n).
-    steps : doublings between the units.
+    dt : sampling interval [s].   z : before the step.
+    scales : 1/α_j of the units [1/rad], (1, n).   steps : doublings between the units.
     """
     way = Way()
     v_x = (before.v_x + now.v_x) / 2
@@ -358,11 +328,7 @@ def predicted(
 
 def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
     """Return the curves at the lagged slip under static loads, tanh with the gradient it tells.
-
-    Parameters
-    ----------
-    z : slip and weights.
-    scales : 1/α_j of the units [1/rad], (1, n).
+    z : slip and weights.   scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
     """
     T = hidden_units(z.slip, scales, steps)
@@ -381,11 +347,7 @@ class Shown(NamedTuple):
 
 def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) -> Shown:
     """Return what the sensors should show of a state.
-
-    Parameters
-    ----------
-    tilt : ä of the rolling body [m/s²].
-    at : curves at the lagged slip.
+    tilt : ä of the rolling body [m/s²].   at : curves at the lagged slip.
     """
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt

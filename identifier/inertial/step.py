@@ -163,9 +163,6 @@ class _Noise(NamedTuple):
 
 def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = False) -> ca.Function:
     """Return the step; every number stays an input of it.
-
-    Parameters
-    ----------
     steps : doublings between the units.
     tires : whether it learns all of the tires, as of `motion.Learnt`.
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).

@@ -80,9 +80,6 @@ class Dual(NamedTuple):
 
 class Stage:
     """Equations from a few inputs to a few outputs, differentiated once.
-
-    Parameters
-    ----------
     outputs : expressions of them, and of symbols without slopes.
     """
 
@@ -107,9 +104,6 @@ def motion_scan(columns: Columns = ()) -> Scan:
     a sample, `parameters` (p,), `car` (7,) and `dt` are constant; `force` (2,) [static loads],
     `missed` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
     `missed_slopes` (2, n) come out.
-
-    Parameters
-    ----------
     columns : names of the parameters over which slopes are asked for, (n,).
     """
     n = len(columns)
@@ -222,9 +216,6 @@ def _step(
 
 def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
     """Return v_x, v_y, r and δ_f without the sensors' errors, as numbers or as symbols.
-
-    Parameters
-    ----------
     p : parameters, those of `SENSORS`.
     """
     v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate = signals

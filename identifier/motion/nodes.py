@@ -48,9 +48,6 @@ def node_scan(columns: Columns = ()) -> Scan:
     for, `measured` (2,) and the weights `of_moves` (8,), `of_shows` (2,) and `of_begins` (8,) have
     a row a node, too, and parts of Gauss-Newton's matrix come out: of the node, of the next, of
     both, with the parameters, the gradient, and of the parameters alone as sums that are carried.
-
-    Parameters
-    ----------
     columns : names of the parameters over which slopes are asked for, (n,), those of the
         accelerometer among them.
     """
