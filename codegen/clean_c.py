@@ -34,7 +34,6 @@ EXPANDED = {**BUILDERS, **OWN}
 
 def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
-
     whole : False leaves our own functions as the scalars that they are made of.
     """
     if not whole:
@@ -152,7 +151,6 @@ Unit = TypeVar("Unit")
 
 def in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
     """Return the units, each after those that it needs.
-
     needs : of each unit that is written, which others, each once; there is no circle.
     results : units that nobody needs, in the order in which they are wanted.
     """
@@ -222,7 +220,6 @@ MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS", "floor": "FLOOR"}
 
 def literal(value: float, prefix: str) -> str:
     """Return a number in C, which reads back as the same double; in float the nearest there is.
-
     value : finite.
     """
     size = abs(value)
@@ -242,7 +239,6 @@ def _digits(value: float) -> str:
 
 class Statements:
     """Statements that compute the outputs of a graph.
-
     graph : the scalars; choices and our own functions are nodes.
     read : C expression of an entry of an input.
     write : C lvalue of an entry of an output.

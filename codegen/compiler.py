@@ -202,7 +202,6 @@ def load_library(
 
 def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) -> Path | None:
     """Compile C source to a shared library in the cache folder, or find it there.
-
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
     flags : of the compiler; None takes `FLAGS`.
 

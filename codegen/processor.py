@@ -51,7 +51,6 @@ PROCESSORS = (
 
 class Program(NamedTuple):
     """A package and what is replayed through it.
-
     name : of the package.   prefix : of its C as it lies in this repository.
     files : its texts by path.   replayed : the `replayed.h` of its kind.
     samples : rows of the inputs in double, as `replayed.h` reads them; None where it reads none.
@@ -68,7 +67,6 @@ class Program(NamedTuple):
 
 class Replay(NamedTuple):
     """What a machine made of a program.
-
     hash : of every state and status.   steps : taken.   faults : steps that were refused.
     state, params, work : sizes [bytes].   stack : of one step [bytes].
     instructions, most_instructions : of a step, mean while driving and largest; 0 where the machine
@@ -113,7 +111,6 @@ def replay(
     corrected: bool = False,
 ) -> Replay:
     """Run a program on a processor in QEMU, or on this machine.
-
     where : one of `PROCESSORS`, or the C compiler of this machine.
     single : whether to compute in float.
     corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
@@ -191,7 +188,6 @@ def size_on(
     processor: Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
 ) -> Size:
     """Return the memory that a package takes on a processor, instances not included.
-
     single : whether to compute in float.
     """
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
@@ -222,7 +218,6 @@ def compiler_version(command: str) -> str:
 
 class Cost(NamedTuple):
     """What a package costs on a processor.
-
     compiler : what it says of itself.   flash : code and constants [bytes].
     replay : what a replay tells.
     static_ram : data that may change and is not the caller's [bytes].
@@ -257,7 +252,6 @@ class Cost(NamedTuple):
 
 def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
     """Return what a program costs on a processor.
-
     single : whether to compute in float.
     """
     size = size_on(processor, program.name, program.files, single=single)
@@ -268,7 +262,6 @@ def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
 
 def cost_table(costs: Sequence[Cost], about: str) -> str:
     """Return costs as Markdown; a line that they were not measured where there are none.
-
     about : over what instructions and stack were measured, and what else is to be said.
     """
     if not costs:
@@ -293,7 +286,6 @@ def cost_table(costs: Sequence[Cost], about: str) -> str:
 
 def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
     """Return <name>.json with the costs; its hashes are of the rest.
-
     manifest : text of the JSON file.
     """
     figures = [

@@ -51,7 +51,6 @@ class Learner(Design, Protocol):
 
 class Lessons(NamedTuple):
     """What N samples taught, rows front and rear, as of `identifier.axle.step.build_lesson`.
-
     theta : parameters before each sample and after the last (N + 1, 2, q).
     moved : m, what learning does not explain (N, 2, q).
     begin : covariance of the parameters before the first sample (2, q, q).
@@ -74,7 +73,6 @@ class Lessons(NamedTuple):
 
 class Adjoint(NamedTuple):
     """What reaches the force of an axle at m slips, static axle loads, rows front and rear.
-
     begin : p_0, of the first error of the parameters (2, m, q).   moved : M (2, m).
     g : of the error of y at each sample (N, 2, m).
     """

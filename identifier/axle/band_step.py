@@ -77,7 +77,6 @@ def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
 
 class AtSample(NamedTuple):
     """An axle at a sample.
-
     units : t, n entries.   slope : φ' [1/rad].   force : φ [static axle loads].   slip : |x| [rad].
     per_v_x : 1/v_x [s/m].   e : of the lag.   by_offset : of slip to its zero, 1 or 1/v_x.
     """

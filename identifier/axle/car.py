@@ -18,7 +18,6 @@ from models.vehicle import GRAVITY, Vehicle
 
 class Car(NamedTuple):
     """Columns (2, 1), numbers or symbols: front and rear.
-
     arm : l_f and -l_r [m].   share : of the weight on the axle [-].
     inertia : ±I_z/(L F_z) [s²/rad].   load : F_z [N].
     """
@@ -63,7 +62,6 @@ def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
 
 def symbols(**shapes: Any) -> tuple[dict[str, Any], SimpleNamespace]:
     """Return the symbols of a step by port, in order, and its numbers by the name of the port.
-
     shapes : of each port its rows, or (rows, columns); a NamedTuple or dataclass in place of a
         length says what is in the vector, or in the columns: these are the numbers of the port.
     """

@@ -112,7 +112,6 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
 
 class CurveFacts(NamedTuple):
     """What holds of force curves on slips from 0 to `until`, proven cell by cell.
-
     opposes_until, rises_until : slip up to which φ/x and φ' are positive for certain [rad].
     flattest, steepest : secants φ/x lie between them [static axle loads/rad].
     """

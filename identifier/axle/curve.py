@@ -22,7 +22,6 @@ LADDER = (0.016, 0.064, 0.128, 0.256)  # rad: from where a tire bends to where i
 
 class Curve(NamedTuple):
     """Static force curve at one slip, per axle (2,).
-
     units : tanh(x/α_j) (2, n).   force : φ [-].   slope : dφ/dx [1/rad].
     carcass_slope : C = slope [1/rad], but at least 2 % of that at zero, for the lag.
     bend : dC/dx [1/rad²], zero where C is held up.

@@ -351,7 +351,6 @@ def tracks(
     ladder: tuple[float, ...], vehicle: Vehicle, W: Array, compliance: Array
 ) -> tuple[Track, ...]:
     """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-
     W : weights (k, 2, n) at each of k instants [static axle loads].   compliance : (k, 2) [m].
     """
     slope = (W / np.array(ladder)).sum(axis=2)

@@ -127,7 +127,6 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
 
 class Learnt(NamedTuple):
     """Parameters (q entries) and factors of the covariance after an update.
-
     uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
     gains : Ph/(R + h'Ph), by which the innovation moves the parameters; 0 where nothing is learnt.
     """

@@ -96,7 +96,6 @@ def _forward_ports(n: int, *, pressed: bool) -> dict[str, Any]:
 
 class _Forward(NamedTuple):
     """What the forward part computes of a sample.
-
     gated : the gate.   sway, hold, curve and the slip angles alpha and x [rad] : at this sample.
     size : of slip, the larger of with and without lag and sway [rad], (2,).
     axle_force : (2,) [N].   next_state : by name.
@@ -267,7 +266,6 @@ def _band_ports(n: int) -> dict[str, Any]:
 
 class _Sample(NamedTuple):
     """A sample of the regression, rows front and rear.
-
     h : regressor (2, q), zero but for the offset where there is no force to learn from.
     e : y - h'w (2,), w after what is believed of the road.   innovation : that, clipped (2,).
     R : its variance (2,).   sigma : standard deviation that y is declared to have (2,).
@@ -467,7 +465,6 @@ def _errors(
     f: _Forward, s: SimpleNamespace, sample: _Sample, h: Any, unsure: Any, peak: Any
 ) -> dict[str, Any]:
     """Return means of errors, excitation and the evidence of another road.
-
     h : regressors of the weights (2, n).   unsure : variance of h'w by the weights (2,).
     """
     numbers, (fast, trend, slow, _) = s.changing, s.errors

@@ -35,7 +35,6 @@ LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of it
 
 class Fit(NamedTuple):
     """What logs taught: the model, the estimate behind it, and each block's own information.
-
     parts : when blocks begin, by the clock of their first log [s], and what they alone tell.
     """
 
@@ -171,7 +170,6 @@ def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
 
 class Reach(NamedTuple):
     """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²].
-
     alike, pairs : sum of products of what the model misses, over its size, at two times `LASTS`
     apart, (2,), and how many there are: white noise of the sensors has no part in it.
     """

@@ -449,7 +449,6 @@ class Latent:
 
 class Learnt(NamedTuple):
     """What a drive without v_y taught: the posterior, where it is, and its states.
-
     parted : side slip by which the starts parted, rms [rad].
     """
 

@@ -40,7 +40,6 @@ ROUNDS = 5
 
 class Shown(NamedTuple):
     """How a sensor shows v_y.
-
     interval : between new values [s].   late : [s].   noise : [m/s].
     push, wanders : variances of w [(m/s²)² s] and of b' [(m/s²)²/s].
     """
@@ -143,7 +142,6 @@ class Kinematics:
         self, s: Shown, weights: Array, late: float | None = None
     ) -> tuple[Array, Array, float]:
         """Return v_y (n,), what it misses of what was shown (m,), and -ln of the likelihood.
-
         late : delay up to which values must have a past to count [s]; None takes that of `s`.
         """
         from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import

@@ -27,7 +27,6 @@ SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go wi
 
 class Belief(NamedTuple):
     """A prior: mean, standard deviation, bounds, and why.
-
     per : what mean, sd and bounds are multiples of: "" for SI, "L" for the wheelbase, "v" for the
     speed sqrt(L/2.7 m).
     """

@@ -29,7 +29,6 @@ ROUNDS = 2  # of finding segments anew at the better estimate
 
 class Roads(NamedTuple):
     """Which road each sample of each drive is on, and the estimate with them.
-
     labels : by drive, (n,); 0 is the road of the curves.   ln_m : of roads 1 to K (K,).   sd : of
     these.
     """

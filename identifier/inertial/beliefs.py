@@ -16,7 +16,6 @@ TOLD_ROLL = 0.25  # standard deviation of the roll that a chassis tells, as a sh
 
 class Body(NamedTuple):
     """A body that rolls under lateral acceleration.
-
     frequency, damping : of its roll [rad/s], [-].   roll, sd_roll : outwards, as the accelerometer
     feels it, and the standard deviation of that [rad/g].
     """

@@ -368,7 +368,6 @@ class InertialIdentifier(Method):
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-
         state : W (k, 2, n) and own (k, 2) at each of k instants.
         """
         return tracks(self.ladder, vehicle, state["W"], state["own"].reshape(-1, 2))

@@ -57,7 +57,6 @@ def size(n: int) -> int:
 
 class Learnt(NamedTuple):
     """What is learnt of z beside what moves, in this order: steps along directions.
-
     tires : along both directions of each curve, that of its stiffness and that of its grip, one
         factor of both compliances, and the zero of the steering; else along that of the grip alone.
     """
@@ -229,7 +228,6 @@ class Way:
 
 class Predicted(NamedTuple):
     """After a step: what moves (7,) of z, the slip α (2,) [rad] and the rolling body.
-
     by_way : how the step leads to `moving`, and that as an expression of the numbers on the way.
     tilt, tilt_rate : ä [m/s²] and its rate [m/s³].   curve : at the slip before the step.
     force_rate : of the lagged slip times the slope of the curve [1/s], (2,).

@@ -145,7 +145,6 @@ class RunningState(NamedTuple):
 
 class _Noise(NamedTuple):
     """What r and a_y tell of themselves, and which of them comes first.
-
     first : 1 where that is r, 0 where it is a_y.   counts : 1 where it has a number.
     turns : 1 where a channel has its turn (2,).   share : 1 over the numbers that waited for it,
     (2,) [-]: of errors that one in a row repeats of another, the sum counts.
