@@ -149,7 +149,7 @@ def _argument(graph: Graph, place: int, template: Graph, leaf: int) -> int | Non
 Unit = TypeVar("Unit")
 
 
-def in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
+def _in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
     """Return the units, each after those that it needs.
     needs : of each unit that is written, which others, each once; there is no circle.
     results : units that nobody needs, in the order in which they are wanted.
@@ -319,7 +319,7 @@ class Statements:
             (unit, None): self._units(self._needs(unit), first_of) for unit in first_of.values()
         }
         needs |= {result: self._units(result[:1], first_of) for result in results}
-        return in_order(needs, results)
+        return _in_order(needs, results)
 
     def _units(self, places: Sequence[int], first_of: Mapping[int, int]) -> list[tuple[int, None]]:
         """Return what is written on its own of what places are made of, each once."""

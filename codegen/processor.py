@@ -24,7 +24,7 @@ _WRAPPED = tuple(f"-Wl,--wrap=__aeabi_{name}" for name in ("dadd", "dsub", "drsu
 TIMEOUT = 120.0  # s
 
 
-class Processor(NamedTuple):
+class _Processor(NamedTuple):
     """A processor: name, machine of QEMU, flags of the compiler, whether it computes in double."""
 
     name: str
@@ -34,13 +34,13 @@ class Processor(NamedTuple):
 
 
 PROCESSORS = (
-    Processor(
+    _Processor(
         "Cortex-M4F",
         "mps2-an386",
         ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
         False,
     ),
-    Processor(
+    _Processor(
         "Cortex-M7",
         "mps2-an500",
         ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
@@ -104,7 +104,7 @@ def _has_newlib() -> bool:
 
 def replay(
     program: Program,
-    where: Processor | str,
+    where: _Processor | str,
     *,
     single: bool,
     flags: Sequence[str] = FLAGS,
@@ -177,16 +177,16 @@ def _result(command: Sequence[str], folder: Path) -> Replay:
     return Replay(hash=found["hash"], **numbers)
 
 
-class Size(NamedTuple):
+class _Size(NamedTuple):
     """Memory of a package itself [bytes]: code and constants, and data that may change."""
 
     flash: int
     static_ram: int
 
 
-def size_on(
-    processor: Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
-) -> Size:
+def _size_on(
+    processor: _Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
+) -> _Size:
     """Return the memory that a package takes on a processor, instances not included.
     single : whether to compute in float.
     """
@@ -203,7 +203,7 @@ def size_on(
         )
         rows = [line.split() for line in answer.stdout.splitlines()[1:]]
         text, data, bss = (sum(int(row[i]) for row in rows) for i in range(3))
-        return Size(flash=text + data, static_ram=data + bss)
+        return _Size(flash=text + data, static_ram=data + bss)
 
 
 @cache
@@ -250,11 +250,11 @@ class Cost(NamedTuple):
         )
 
 
-def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
+def cost_on(program: Program, processor: _Processor, *, single: bool) -> Cost:
     """Return what a program costs on a processor.
     single : whether to compute in float.
     """
-    size = size_on(processor, program.name, program.files, single=single)
+    size = _size_on(processor, program.name, program.files, single=single)
     run = replay(program, processor, single=single)
     version = compiler_version(CROSS_COMPILER)
     return Cost(processor.name, version, single, size.flash, run, size.static_ram)

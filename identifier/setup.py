@@ -150,7 +150,7 @@ class Setup(NamedTuple):
         v_y = math.nan if recording.v_y is None else recording.v_y[0]
         return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
-    def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
+    def shown(self, recording: Recording, part: slice = ALL) -> "_Shown":
         """Return a recording as the step is shown it: before each segment but the first it rests.
 
         A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
@@ -171,12 +171,12 @@ class Setup(NamedTuple):
         }
         breaks = [k - first for k in recording.breaks if first <= k < last]
         if not breaks:
-            return Shown({port: signals[port] for port in self.scan.over}, n, None)
+            return _Shown({port: signals[port] for port in self.scan.over}, n, None)
         rows, resting, at = with_rests(n, breaks, self.rest)
         padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
         padded["v_x"][resting] = NOWHERE if judges_samples(self.carry) else 0.0
         padded["a_y"][resting] = np.nan
-        return Shown({port: padded[port] for port in self.scan.over}, rows.size, at)
+        return _Shown({port: padded[port] for port in self.scan.over}, rows.size, at)
 
 
 class Block(NamedTuple):
@@ -195,10 +195,10 @@ class Block(NamedTuple):
     @property
     def before(self) -> Mapping[str, Array]:
         """Carried values in effect at each sample, by port, (k, ...)."""
-        return Before(self.state)
+        return _Before(self.state)
 
 
-class Before(Mapping[str, Array]):
+class _Before(Mapping[str, Array]):
     """Carried values in effect at each sample, of those that have a row after the last.
     state : by port (k + 1, ...).
     """
@@ -217,7 +217,7 @@ class Before(Mapping[str, Array]):
         return len(self._state)
 
 
-class Shown(NamedTuple):
+class _Shown(NamedTuple):
     """What a step is shown of a part of a recording: samples, and rests between its segments.
     signals : by port of `over`, (N, ...).   samples : N, rests included.
     at : which of these each sample of the part is (n,); None where there is no rest.

@@ -39,7 +39,7 @@ TINY = 1e-30  # keeps a quotient finite
 ROUNDING = 1e-9  # of a bound
 
 
-class Learner(Design, Protocol):
+class _Learner(Design, Protocol):
     """What of an `AxleIdentifier` a run is certified with."""
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
@@ -82,7 +82,7 @@ class Adjoint(NamedTuple):
     g: Array
 
 
-def lessons(design: Learner, history: Run) -> Lessons:
+def lessons(design: _Learner, history: Run) -> Lessons:
     """Return what the samples of a run taught; of a long one those at its end."""
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
@@ -146,7 +146,7 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
     return Adjoint(p, moved, g)
 
 
-def certified_along(design: Learner, history: Run) -> tuple[Property, ...]:
+def certified_along(design: _Learner, history: Run) -> tuple[Property, ...]:
     """Return what is proven of the curves that a drive taught."""
     model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
     taught = lessons(design, history)

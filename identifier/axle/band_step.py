@@ -65,7 +65,7 @@ def hinges(values: Array, at: Sequence[float]) -> Array:
     return np.column_stack([values[:, 0], np.diff(slopes, axis=1, prepend=0.0)])
 
 
-def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
+def _hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
     """Return what `hinges` describe, level beyond the last center.
     numbers : of an axle, k entries.   at : the centers (k,).
     """
@@ -111,8 +111,8 @@ def half_band(
     stretch = within(numbers.speed * at.per_v_x, *STRETCH)
     total = ((RELATIVE * at.force) ** 2 + FLOOR**2) * stretch**2 + left
     unknown = smaller(left * per_before / UNKNOWN**2, 1)
-    factor = hinged(slips, CENTERS, at.slip)
-    factor = factor * hinged(speeds, AT_SPEEDS, numbers.per_froude * reciprocal(at.per_v_x))
+    factor = _hinged(slips, CENTERS, at.slip)
+    factor = factor * _hinged(speeds, AT_SPEEDS, numbers.per_froude * reciprocal(at.per_v_x))
     narrow, wide = factor**2, larger(factor, 1) ** 2
     slip_noise = numbers.sideways * at.per_v_x**2 + numbers.steering
     passed = at.slope**2 * slip_noise * (1 - at.e) * reciprocal(1 + at.e)

@@ -110,7 +110,7 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
     return points[inside]
 
 
-class CurveFacts(NamedTuple):
+class _CurveFacts(NamedTuple):
     """What holds of force curves on slips from 0 to `until`, proven cell by cell.
     opposes_until, rises_until : slip up to which φ/x and φ' are positive for certain [rad].
     flattest, steepest : secants φ/x lie between them [static axle loads/rad].
@@ -129,7 +129,7 @@ def _cells(until: float) -> Array:
     return np.concatenate([[0.0], narrow])
 
 
-def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts:
+def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFacts:
     """Return what holds of every curve of a set.
 
     On a cell from a to b a falling function s of a unit is between s(b) and s(a), so that
@@ -149,7 +149,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts
         return np.asarray((s[1:] @ up + s[:-1] @ down).min(axis=1))
 
     rising, opposing = least(slopes) > 0.0, least(secants)
-    return CurveFacts(
+    return _CurveFacts(
         until=until,
         opposes_until=_first(edges, opposing > 0.0),
         rises_until=_first(edges, rising),
@@ -163,7 +163,7 @@ def _first(edges: Array, good: NDArray[np.bool_]) -> float:
     return float(edges[-1] if good.all() else edges[int(np.argmin(good))])
 
 
-def widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
+def _widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
     """Return by how much two curves of a set may differ at one slip [static axle loads].
     W : corners of the set (k, n).   ladder : slip scales of the units [rad].
     until : largest slip [rad].
@@ -234,7 +234,7 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     b, dt = design.bounds, design.dt
     set_ = corners(b, design.ladder, design.rising_until)
     facts = curve_facts(set_, design.ladder, LARGEST_SLIP)
-    apart = widest_range(set_, design.ladder, LARGEST_SLIP)
+    apart = _widest_range(set_, design.ladder, LARGEST_SLIP)
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
     lean = _lean_over_rounding(design)

@@ -160,7 +160,7 @@ def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
     return Factors(U, D)
 
 
-class Excited(NamedTuple):
+class _Excited(NamedTuple):
     """A regressor seen through the covariance: f = U'h, g = D f, v = P h, a = h'P h > 0."""
 
     f: list[Any]
@@ -169,7 +169,7 @@ class Excited(NamedTuple):
     a: Any
 
 
-def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
+def excited(factors: Factors, h: list[Any], least: Any) -> _Excited:
     """Return what a regressor excites.
     h : regressor, q entries.
     """
@@ -180,10 +180,10 @@ def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
     v: list[Any] = []
     for j in range(q):  # in the order of `updated`, where its terms are found again
         v = [*(v[i] + U[i, j] * g[j] for i in range(j)), g[j]]
-    return Excited(f, g, v, sum(a * b for a, b in zip(f, g, strict=True)) + least)
+    return _Excited(f, g, v, sum(a * b for a, b in zip(f, g, strict=True)) + least)
 
 
-def updated(factors: Factors, direction: Excited, c: Any) -> Factors:
+def updated(factors: Factors, direction: _Excited, c: Any) -> Factors:
     """Return the factors of P - c P h h'P/(1 + c a) (Bierman).
 
     D_j is multiplied by β_(j-1)/β_j, β_j = 1 + c Σ_(i<=j) f_i g_i, which is positive whatever

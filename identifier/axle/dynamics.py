@@ -18,7 +18,7 @@ from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY, Vehicle, load_ratio
 
 
-def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
+def _static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
     """Return the force curve at a slip, in static axle loads.
     slip : (2,) [rad].   W : weights [static axle loads], (2, n).
     ladder : slip scales [rad], (n,).
@@ -35,7 +35,7 @@ def curve_at_speed(
     ladder : slip scales [rad], (n,).
     vehicle : whose downforce counts; without any the speed is not looked at.
     """
-    static = static_curve(slip, W, ladder)
+    static = _static_curve(slip, W, ladder)
     if not vehicle.has_downforce:
         return static
     return static.under(load_ratio(ca.DM(vehicle.downforce), v_x))

@@ -95,7 +95,7 @@ def fiala_force(alpha: Array, stiffness: float, friction: float) -> Array:
     return np.asarray(friction * (1.0 - (1.0 - sliding) ** 3), dtype=np.float64)
 
 
-def projected(force: Array, ladder: tuple[float, ...]) -> Array:
+def _projected(force: Array, ladder: tuple[float, ...]) -> Array:
     """Return the weights whose curves come closest to given ones, with a little ridge.
     force : curves at `SLIPS` (300,) or (300, k).   ladder : slip scales of the units [rad].
     """
@@ -115,7 +115,7 @@ def fiala_weights(stiffness: float, friction: float, ladder: tuple[float, ...]) 
     """Return the weights (n,) of a brush tire.
     stiffness : C/F_z [1/rad].   friction : μ [-].   ladder : slip scales of the units [rad].
     """
-    return projected(fiala_force(SLIPS, stiffness, friction), ladder)
+    return _projected(fiala_force(SLIPS, stiffness, friction), ladder)
 
 
 @cache
@@ -124,7 +124,7 @@ def friction_direction(ladder: tuple[float, ...]) -> Array:
     ladder : slip scales of the units [rad].
     """
     T = unit_matrix(SLIPS, ladder)
-    return projected(T - SLIPS[:, None] / np.array(ladder) * (1.0 - T * T), ladder)
+    return _projected(T - SLIPS[:, None] / np.array(ladder) * (1.0 - T * T), ladder)
 
 
 def _log_derivative(above: Array, below: Array) -> Array:

@@ -33,7 +33,7 @@ REACHED = 0.25  # [s] for which a slip must have been exceeded to count as drive
 LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
-class Fit(NamedTuple):
+class _Fit(NamedTuple):
     """What logs taught: the model, the estimate behind it, and each block's own information.
     parts : when blocks begin, by the clock of their first log [s], and what they alone tell.
     """
@@ -51,7 +51,7 @@ def fit(
     block: float = BLOCK,
     coarse: bool = False,
     progress: Callable[[float], None] | None = None,
-) -> Fit:
+) -> _Fit:
     """Estimate the tires of a car from logs, with the same sensors.
     recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
@@ -138,7 +138,7 @@ def fit(
     ]
     if falling:  # as where a servo has play: such a curve is no tire, the formula alone is one
         return fit(recordings, vehicle, before.without(falling), block=block, coarse=coarse)
-    return Fit(model, found, parts)
+    return _Fit(model, found, parts)
 
 
 def _after(beliefs: Priors, found: Posterior) -> Priors:

@@ -51,7 +51,7 @@ SHORTEST = 50  # nodes from which noise is learnt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trust:
+class _Trust:
     """How far curves, road and sensors are trusted; times and sensors as of a sedan.
     error, relative : what curves miss of a force [static axle loads], [-].
     error_time : for which it stays alike [s].
@@ -92,7 +92,7 @@ class Trust:
     lasting: float = 2.0
 
 
-TRUST = Trust()
+TRUST = _Trust()
 
 
 class LateralVelocity(NamedTuple):
@@ -106,7 +106,7 @@ class LateralVelocity(NamedTuple):
     beside: Array
 
 
-class Around(NamedTuple):
+class _Around(NamedTuple):
     """Gauss-Newton's matrix and gradient: of states, of neighbors, border, of parameters."""
 
     A: Array
@@ -118,7 +118,7 @@ class Around(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Smoothed:
+class _Smoothed:
     """States (n, 8) and all parameters (p + 4,) at an optimum, its cost J [nats], R (2,), and
     covariances: of the states alone (n, 8, 8), of the parameters that move (m, m); dz/dp of v_y
     (n, m).
@@ -165,7 +165,7 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     )
 
 
-class Latent:
+class _Latent:
     """The problem of a drive: its cost, and how it is minimized.
     priors : of `latent_priors`; what is to be held does not move.
     columns : which parameters slopes are taken over, (m,): those that move, and others whose doubt
@@ -178,7 +178,7 @@ class Latent:
         vehicle: Vehicle,
         priors: Priors,
         columns: NDArray[np.intp] | None = None,
-        trust: Trust = TRUST,
+        trust: _Trust = TRUST,
     ) -> None:
         self.nodes, self.vehicle, self.trust = nodes, vehicle, trust
         self.index = np.flatnonzero(priors.moves) if columns is None else columns
@@ -276,7 +276,7 @@ class Latent:
         parts = (("moves", "of_moves"), ("shows", "of_shows"), ("begins", "of_begins"))
         return 0.5 * sum(float(np.sum(weights[w] * out[name] ** 2)) for name, w in parts)
 
-    def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[Around, Array]:
+    def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[_Around, Array]:
         """Return matrix and gradient at a point, and the slopes of what sensors show (n, 2, 8)."""
         m = len(self.index)
         sums = {"sums": np.zeros((m, m)), "slopes": np.zeros(m)}
@@ -290,9 +290,9 @@ class Latent:
         gradient, curvature = around_beliefs(self.priors, p)
         C = out["sums_final"] + curvature[np.ix_(self.index, self.index)]
         g_p = out["slopes_final"].ravel() + gradient[self.index]
-        return Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
+        return _Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
 
-    def _eliminated(self, at: Around, damping: float) -> tuple[Array, Array]:
+    def _eliminated(self, at: _Around, damping: float) -> tuple[Array, Array]:
         """Return A⁻¹ g (8n,) and A⁻¹ B (8n, m)."""
         n = len(at.A)
         banded = np.zeros((2 * N, n * N))
@@ -308,7 +308,7 @@ class Latent:
         X = cho_solve_banded((factor, True), right, overwrite_b=True, check_finite=False)
         return X[:, 0], X[:, 1:]
 
-    def _step(self, at: Around, p: Array, damping: float) -> tuple[Array, Array]:
+    def _step(self, at: _Around, p: Array, damping: float) -> tuple[Array, Array]:
         """Return the steps of states (n, 8) and of parameters that move."""
         x, X = self._eliminated(at, damping)
         free, index = self.free, self.index[self.free]
@@ -431,7 +431,7 @@ class Latent:
             found[i] = max(density - known, 1e-10)
         return found
 
-    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> Smoothed:
+    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> _Smoothed:
         """Return the optimum from a start, its noise learnt in some rounds.
         R : to begin with (2,); None takes that of good sensors.
         """
@@ -444,7 +444,7 @@ class Latent:
         own, P, slopes, _ = self.spread(z, p, R)
         left = 2.0 * self.misfit(z, p, self.weights(z, p, R)) / max(self.nodes.counts.sum(), 1)
         wider = max(1.0, left / self.trust.usual)
-        return Smoothed(z, p, cost, R, wider * own, wider * P, slopes)
+        return _Smoothed(z, p, cost, R, wider * own, wider * P, slopes)
 
 
 class Learnt(NamedTuple):
@@ -465,7 +465,7 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
     distance between both, by how probable they are.
     beliefs : of the car, or what other drives of it left.   late : as of `latent_priors`.
     """
-    problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
+    problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
     first = problem.smoothed(*problem.settled(STARTS[0]))
     z, p, cost = problem.descend(*problem.settled(STARTS[1]), first.R)
     best, other = first, (z, p, cost)
@@ -509,7 +509,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     It is the delay with which the minute of hardest cornering is explained best, found as a
     parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
     too little.
-    priors : as of `Latent`.
+    priors : as of `_Latent`.
     """
     part = hardest(recording, ASKED)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
@@ -521,8 +521,8 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     information[delay, delay] = (ANY_DELAY * scale) ** -2
     open_ = replace(priors, information=information)
 
-    def problem(late: float, beliefs: Priors) -> Latent:
-        return Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
+    def problem(late: float, beliefs: Priors) -> _Latent:
+        return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
     on_time = problem(0.0, priors)
     z, p, least = on_time.descend(*on_time.settled(), on_time.R, FEW)
@@ -568,7 +568,7 @@ def estimate_v_y(
         nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
         if not nodes.counts.any():
             continue
-        problem = Latent(nodes, vehicle, held(late != 0.0), columns)
+        problem = _Latent(nodes, vehicle, held(late != 0.0), columns)
         found = problem.smoothed(*problem.begin(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]

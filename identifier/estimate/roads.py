@@ -79,7 +79,7 @@ def _segments(
         loss[k] = (weight / T * (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))).sum(axis=1)
     count = loss.shape[1]
     bins = np.arange(0, count, BIN)
-    path = cheapest(np.add.reduceat(loss, bins, axis=1), PRICE).repeat(BIN)[:count]
+    path = _cheapest(np.add.reduceat(loss, bins, axis=1), PRICE).repeat(BIN)[:count]
     found, begin = [], 0
     for k, one in enumerate(drives):
         length = problem.lengths[k]
@@ -93,7 +93,7 @@ def _segments(
     return _ranked(found)
 
 
-def cheapest(loss: Array, price: float) -> NDArray[np.intp]:
+def _cheapest(loss: Array, price: float) -> NDArray[np.intp]:
     """Return the states of least loss when each change has a price, (m,).
     loss : of each state at each step (k, m) [nats].
     """

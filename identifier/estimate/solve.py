@@ -39,7 +39,7 @@ SETTLING, SETTLED = 60, 1e-4  # iterations and improvement [nats] where no drive
 Labels: TypeAlias = Sequence[NDArray[np.intp]]
 
 
-class Residuals(NamedTuple):
+class _Residuals(NamedTuple):
     """e over b (m, 2), and its slopes over the parameters that move (m, 2, n)."""
 
     e: Array
@@ -123,14 +123,14 @@ class Problem:
         e = []
         for k, one in enumerate(self.drives):
             driven = one.on(road)
-            given = arguments(driven, p, self._car, scan)
+            given = _arguments(driven, p, self._car, scan)
             out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
             e.append(out["missed"][self._kept[k]])
         whole: Array = np.concatenate(e) / self.size[:, None]
         found: Array = np.nan_to_num(whole, nan=1e3, posinf=1e3)
         return found
 
-    def residuals(self, p: Array) -> Residuals:
+    def residuals(self, p: Array) -> _Residuals:
         """Return what the balance misses, and its slopes.
         p : parameters, and behind them ln of the friction of other roads.
         """
@@ -142,7 +142,7 @@ class Problem:
             driven = one if roads is None else one.on(ln_m[roads])
             out = self._scan(
                 len(driven.signals),
-                arguments(driven, p[: len(NAMES)], self._car, self._scan),
+                _arguments(driven, p[: len(NAMES)], self._car, self._scan),
                 every=stride,
                 ports=("missed", "missed_slopes"),
             )
@@ -161,7 +161,7 @@ class Problem:
         if shrunk < 1.0:
             slope[:, :, self.index == INDEX["v_x_factor"]] -= missed[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
-            return Residuals(
+            return _Residuals(
                 np.nan_to_num(missed / size, nan=1e3, posinf=1e3, neginf=-1e3),
                 np.nan_to_num(slope / size[..., None]),
             )
@@ -239,7 +239,7 @@ def car_numbers(vehicle: Vehicle) -> Array:
     )
 
 
-def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
+def _arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
     """Return the inputs of a compiled motion over a drive.
 
     Late signals are read on time; the rest of a delay is 0.
@@ -269,7 +269,7 @@ def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
     scan = motion_scan()
     return scan(
         len(one.signals),
-        arguments(one, p, car_numbers(vehicle), scan),
+        _arguments(one, p, car_numbers(vehicle), scan),
         ports=("force", "missed", "slip"),
     )
 
@@ -429,18 +429,18 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
 
 def beliefs_cost(priors: Priors, p: Array) -> float:
     """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
-    soft, _ = softness(p)
+    soft, _ = _softness(p)
     return priors.cost(p) + 0.5 * float(soft @ soft)
 
 
 def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
     """Return gradient (p,) and positive curvature (p, p) of `beliefs_cost`."""
     gradient, curvature = priors.around(p)
-    soft, slopes = softness(p)
+    soft, slopes = _softness(p)
     return gradient + soft @ slopes, curvature + slopes.T @ slopes
 
 
-def softness(p: Array) -> tuple[Array, Array]:
+def _softness(p: Array) -> tuple[Array, Array]:
     """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
 
     No tire has less than a quarter of C there: play in the steering looks so.
@@ -464,7 +464,7 @@ def softness(p: Array) -> tuple[Array, Array]:
     return found, slopes
 
 
-def normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
+def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
     w = problem.weight[:, None] / T * (NU + 1.0) / (NU * S2 + at.e**2)
     J = at.slopes.reshape(-1, at.slopes.shape[2])

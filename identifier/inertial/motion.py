@@ -34,7 +34,7 @@ SENSORS = ("bias", "roll", "steering", "gyro")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 
-class Unknowns(NamedTuple):
+class _Unknowns(NamedTuple):
     """z by name: symbols or expressions; slip, error and compliance (2,), W (2, n)."""
 
     v_y: Any
@@ -50,7 +50,7 @@ class Unknowns(NamedTuple):
     gyro: Any
 
 
-def size(n: int) -> int:
+def _size(n: int) -> int:
     """Return how many entries z has for n units."""
     return MOVING + 2 * n + 2 + len(SENSORS)
 
@@ -78,7 +78,7 @@ class Learnt(NamedTuple):
             of the first, then of the second.
         compliance : of both axles that one of its factor adds, (2,).
         """
-        E = ca.SX(size(n), MOVING + len(self.names))
+        E = ca.SX(_size(n), MOVING + len(self.names))
         E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
         rest = MOVING + 2 * n
         for column, name in enumerate(self.names, start=MOVING):
@@ -100,12 +100,12 @@ class Learnt(NamedTuple):
 CURVES = ("grip_f", "grip_r", "stiffness_f", "stiffness_r")
 
 
-def unknowns(z: Any, n: int) -> Unknowns:
+def unknowns(z: Any, n: int) -> _Unknowns:
     """Return z by name.
     z : as above.   n : number of units.
     """
     m, k = MOVING, MOVING + 2 * n
-    return Unknowns(
+    return _Unknowns(
         v_y=z[0],
         r=z[1],
         slip=z[2:4],
@@ -267,7 +267,7 @@ def predicted(
     car: Car,
     laws: Laws,
     dt: Any,
-    z: Unknowns,
+    z: _Unknowns,
     tilt: tuple[Any, Any],
     before: Sample,
     now: Sample,
@@ -324,7 +324,7 @@ def predicted(
     return Predicted(moved, (way, moving), alpha, tilting, rate, before_it, force_rate)
 
 
-def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
+def curve_by(way: Way, z: _Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
     """Return the curves at the lagged slip under static loads, tanh with the gradient it tells.
     z : slip and weights.   scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
@@ -335,7 +335,7 @@ def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curv
     return of_units(way.linear(T, (1 - T * T) * inverse, slip), z.W, scales)
 
 
-class Shown(NamedTuple):
+class _Shown(NamedTuple):
     """What gyro and accelerometer should show [rad/s], [m/s²]; forces (2,) [static axle loads]."""
 
     r: Any
@@ -343,11 +343,11 @@ class Shown(NamedTuple):
     force: Any
 
 
-def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) -> Shown:
+def shown(car: Car, laws: Laws, z: _Unknowns, tilt: Any, now: Sample, at: Curve) -> _Shown:
     """Return what the sensors should show of a state.
     tilt : ä of the rolling body [m/s²].   at : curves at the lagged slip.
     """
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
     a_y += laws.ahead * ca.dot(turning(car), force) - laws.aside * z.r**2
-    return Shown(z.r + z.gyro, a_y, force)
+    return _Shown(z.r + z.gyro, a_y, force)

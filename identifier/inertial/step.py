@@ -114,14 +114,14 @@ class LearntLimits(NamedTuple):
     gyro: Any
 
 
-class BodyState(NamedTuple):
+class _BodyState(NamedTuple):
     """ä of the rolling body [m/s²] and its rate [m/s³]."""
 
     tilt: Any
     rate: Any
 
 
-class Readings(NamedTuple):
+class _Readings(NamedTuple):
     """Of r and a_y, (2,) each: the newest number and the one before [rad/s], [m/s²]; variance of
     the noise; how many numbers wait for their turn [-], and the innovation of these.
     """
@@ -133,7 +133,7 @@ class Readings(NamedTuple):
     left: Any
 
 
-class RunningState(NamedTuple):
+class _RunningState(NamedTuple):
     """1 while the filter runs; mean square of the missed force over its deviation [-]; slow mean of
     v_x [m/s].
     """
@@ -157,7 +157,7 @@ class _Noise(NamedTuple):
     turns: list[Any]
     share: list[Any]
     fresh: list[Any]
-    readings: Readings
+    readings: _Readings
 
 
 def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = False) -> ca.Function:
@@ -177,9 +177,9 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
         UD=(1, len(triangle(k))),
         motion_UD=(1, len(triangle(q)) - len(triangle(k))),
         gate=GateState,
-        body=BodyState,
-        readings=2 * len(Readings._fields),
-        running=RunningState,
+        body=_BodyState,
+        readings=2 * len(_Readings._fields),
+        running=_RunningState,
         excitation=(2, 1 + len(EDGES)),
         x=2,
         u=2,
@@ -306,7 +306,7 @@ def _noise(s: SimpleNamespace, gated: Gate, goes_on: Any) -> _Noise:
     One channel is taken at a sample, that of which more numbers wait: a second update would cost as
     much as the first and tell what the next sample does.
     """
-    a_y, trust, last = s.a_y, s.trust, Readings(*ca.vertsplit(s.readings, 2))
+    a_y, trust, last = s.a_y, s.trust, _Readings(*ca.vertsplit(s.readings, 2))
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
     readings = [gated.r, ca.if_else(there, a_y, last.newest[1])]
     fresh, waiting, variance, state = [], [], [], []
@@ -328,7 +328,7 @@ def _noise(s: SimpleNamespace, gated: Gate, goes_on: Any) -> _Noise:
     share = [1 / larger(one, 1) for one in waiting]
     counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
     columns = (*zip(*state, strict=True), variance, rest)
-    following = Readings(*(ca.vertcat(*one) for one in columns), left=last.left)
+    following = _Readings(*(ca.vertcat(*one) for one in columns), left=last.left)
     return _Noise(first, counts, turns, share, fresh, following)
 
 

@@ -71,14 +71,14 @@ class CarNumbers(NamedTuple):
     drag: Any
 
 
-class Dual(NamedTuple):
+class _Dual(NamedTuple):
     """A value and its slopes over the parameters, (1, n)."""
 
     value: Any
     slopes: Any
 
 
-class Stage:
+class _Stage:
     """Equations from a few inputs to a few outputs, differentiated once.
     outputs : expressions of them, and of symbols without slopes.
     """
@@ -89,11 +89,11 @@ class Stage:
         self._free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
         self._function = ca.Function("stage", [x, self._free], [y, ca.jacobian(y, x)])
 
-    def __call__(self, inputs: list[Dual]) -> list[Dual]:
+    def __call__(self, inputs: list[_Dual]) -> list[_Dual]:
         """Return the outputs and their slopes."""
         value, J = self._function(ca.vertcat(*(one.value for one in inputs)), self._free)
         slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
-        return [Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
+        return [_Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
 
 
 @cache
@@ -118,7 +118,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     )
     old = _by_name(CARRIED, s.state)
     duals = {
-        name: Dual(value, _unit(name, columns))
+        name: _Dual(value, _unit(name, columns))
         for name, value in _by_name(NAMES, s.parameters).items()
     }
     fixed = _constant((*SIGNALS, *RATES), ca.vertsplit(ca.vertcat(s.signals, s.rates)), n)
@@ -127,7 +127,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     pattern = {name: ca.Sparsity(1, n) for name in CARRIED}
     while True:  # which parameters each state can depend on
         tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
-        before = {name: Dual(old[name], tangents[name]) for name in CARRIED}
+        before = {name: _Dual(old[name], tangents[name]) for name in CARRIED}
         after, out = _step(before, fixed, duals, s.car, s.dt, first)
         grown = {
             name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
@@ -163,9 +163,9 @@ def _by_name(names: tuple[str, ...], vector: Any) -> dict[str, Any]:
     return dict(zip(names, ca.vertsplit(vector), strict=True))
 
 
-def _constant(names: tuple[str, ...], values: Sequence[Any], n: int) -> dict[str, Dual]:
+def _constant(names: tuple[str, ...], values: Sequence[Any], n: int) -> dict[str, _Dual]:
     """Return values that depend on none of n parameters, by name."""
-    return {name: Dual(value, ca.SX(1, n)) for name, value in zip(names, values, strict=True)}
+    return {name: _Dual(value, ca.SX(1, n)) for name, value in zip(names, values, strict=True)}
 
 
 def _unit(name: str, columns: Columns) -> Any:
@@ -177,19 +177,19 @@ def _unit(name: str, columns: Columns) -> Any:
 
 
 def _step(
-    before: dict[str, Dual],
-    signals: dict[str, Dual],
-    p: dict[str, Dual],
+    before: dict[str, _Dual],
+    signals: dict[str, _Dual],
+    p: dict[str, _Dual],
     car: CarNumbers,
     dt: Any,
     first: Any,
-) -> tuple[dict[str, Dual], dict[str, tuple[Dual, Dual]]]:
+) -> tuple[dict[str, _Dual], dict[str, tuple[_Dual, _Dual]]]:
     """Return the state after a sample, and F, e, x of both axles."""
-    after: dict[str, Dual] = {}
+    after: dict[str, _Dual] = {}
     L = car.l_f + car.l_r
     v_x, v_y, r, delta = _sensors(signals, p)
     after["rate"], after["rho"], sway = _sway(before, p, car, dt, first, v_x, r)
-    out: dict[str, tuple[Dual, Dual]] = {}
+    out: dict[str, tuple[_Dual, _Dual]] = {}
     found = [
         _axle(
             axle,
@@ -228,23 +228,23 @@ def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, An
     return true_v_x, true_v_y, true_r, true_delta
 
 
-def _sensors(signals: dict[str, Dual], p: dict[str, Dual]) -> tuple[Dual, Dual, Dual, Dual]:
+def _sensors(signals: dict[str, _Dual], p: dict[str, _Dual]) -> tuple[_Dual, _Dual, _Dual, _Dual]:
     """Return v_x, v_y, r and δ_f without the sensors' errors."""
     logged, errors = ([ca.SX.sym(name) for name in names] for names in (SENSED, SENSORS))
-    stage = Stage([*logged, *errors], list(true_signals(logged, errors)))
+    stage = _Stage([*logged, *errors], list(true_signals(logged, errors)))
     found = stage([signals[name] for name in SENSED] + [p[name] for name in SENSORS])
     return found[0], found[1], found[2], found[3]
 
 
 def _sway(
-    before: dict[str, Dual],
-    p: dict[str, Dual],
+    before: dict[str, _Dual],
+    p: dict[str, _Dual],
     car: CarNumbers,
     dt: Any,
     first: Any,
-    v_x: Dual,
-    r: Dual,
-) -> tuple[Dual, Dual, Dual]:
+    v_x: _Dual,
+    r: _Dual,
+) -> tuple[_Dual, _Dual, _Dual]:
     """Return ρ', ρ and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
     names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
     rho, rate, f_f, f_r, C_f, C_r = (ca.SX.sym(name) for name in names)
@@ -262,7 +262,7 @@ def _sway(
     inputs = [rho, rate, f_f, f_r, C_f, C_r, k_f, k_r, ln_sway, shift, speed, yaw]
     outputs = [moved, place, -moved / (omega**2 * speed)]
     of = ("sway_share_f", "sway_share_r", "ln_sway", "cg_shift")
-    found = Stage(inputs, outputs)(
+    found = _Stage(inputs, outputs)(
         [before[name] for name in names] + [p[name] for name in of] + [v_x, r]
     )
     return found[0], found[1], found[2]
@@ -310,27 +310,27 @@ def curve_function() -> ca.Function:
 
 def _axle(
     axle: str,
-    before: dict[str, Dual],
-    signals: dict[str, Dual],
-    p: dict[str, Dual],
+    before: dict[str, _Dual],
+    signals: dict[str, _Dual],
+    p: dict[str, _Dual],
     car: CarNumbers,
     dt: Any,
     first: Any,
     *,
-    v_x: Dual,
-    v_y: Dual,
-    r: Dual,
-    delta: Dual,
-    sway: Dual,
-    after: dict[str, Dual],
+    v_x: _Dual,
+    v_y: _Dual,
+    r: _Dual,
+    delta: _Dual,
+    sway: _Dual,
+    after: dict[str, _Dual],
     L: Any,
-) -> tuple[Dual, Dual, Dual]:
+) -> tuple[_Dual, _Dual, _Dual]:
     """Return F, e and x of an axle; its states after the sample go into `after`."""
     front = axle == "f"
     # Slip.
     d, vy, vx, yaw, k, s, shift = (ca.SX.sym(n) for n in ("d", "vy", "vx", "r", "k", "s", "cg"))
     arm = (car.l_f - shift) if front else -(car.l_r + shift)
-    (alpha,) = Stage([d, vy, vx, yaw, k, s, shift], [d - ca.atan((vy + arm * yaw) / vx) + k * s])(
+    (alpha,) = _Stage([d, vy, vx, yaw, k, s, shift], [d - ca.atan((vy + arm * yaw) / vx) + k * s])(
         [delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"]]
     )
     # Relaxation: the exact step of a first-order lag for α linear over it.
@@ -339,7 +339,7 @@ def _axle(
     h = vx * dt / sigma
     e = ca.exp(-h)
     x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
-    (x,) = Stage([x0, a0, a1, C, give, vx], [ca.if_else(first > 0, a1, x1)])(
+    (x,) = _Stage([x0, a0, a1, C, give, vx], [ca.if_else(first > 0, a1, x1)])(
         [
             before[f"x_{axle}"],
             before[f"alpha_{axle}"],
@@ -353,12 +353,12 @@ def _axle(
     # Curve.
     numbers, at, phi, slope = curve_symbols()
     road = p["ln_road"]
-    ln_m = Dual(road.value + signals["road"].value, road.slopes)
+    ln_m = _Dual(road.value + signals["road"].value, road.slopes)
     floor = LEAST_SLOPE * ca.exp(numbers[0])
     names = ("ln_stiffness", "ln_grip", "shape", "curvature")
     given = [p[f"{name}_{axle}"] for name in names]
     given += [p[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
-    curve = Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
+    curve = _Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
     value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
     # Load and ellipse.
     phi0, height, brake, drive, cg, down, felt, speed = (
@@ -372,7 +372,7 @@ def _axle(
     load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
     use = ca.if_else(f > 0, drive, brake) * f
     left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
-    (force,) = Stage([phi0, height, brake, drive, cg, down, felt, speed], [phi0 * load * left])(
+    (force,) = _Stage([phi0, height, brake, drive, cg, down, felt, speed], [phi0 * load * left])(
         [
             value,
             p["load_transfer"],
@@ -397,8 +397,8 @@ def _axle(
     mean = (1 - fall) / (RATE * dt)
     z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
     z = ca.if_else(first > 0, 0, z)
-    bank = Dual(signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
-    balance = Stage(
+    bank = _Dual(signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
+    balance = _Stage(
         [z0, xi0, u0, F0, angle, ln_I, push, vx, vy, yaw, cg], [z, xi, u, across, RATE * z]
     )
     found = balance(
@@ -428,7 +428,7 @@ REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
 
 
 @cache
-def replay_step() -> ca.Function:
+def _replay_step() -> ca.Function:
     """Return the model as a step: axle_force [N], lagged slip and the larger slip [rad], (2,)."""
     ports, s = symbols(
         gate=GateState,
@@ -470,5 +470,5 @@ def replay_step() -> ca.Function:
 
 @cache
 def replay_scan() -> Scan:
-    """Return `replay_step` as a compiled loop."""
-    return Scan(replay_step(), carry=REPLAY_CARRY, over=REPLAY_OVER)
+    """Return `_replay_step` as a compiled loop."""
+    return Scan(_replay_step(), carry=REPLAY_CARRY, over=REPLAY_OVER)
