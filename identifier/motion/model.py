@@ -20,7 +20,7 @@ Slopes run along by the chain rule from stage to stage (forward differentiation)
 few inputs, so that no stage but the last knows all parameters.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -78,22 +78,18 @@ class _Dual(NamedTuple):
     slopes: Any
 
 
-class _Stage:
-    """Equations from a few inputs to a few outputs, differentiated once.
-    outputs : expressions of them, and of symbols without slopes.
+def _staged(equations: Callable[..., Sequence[Any]], *inputs: _Dual) -> list[_Dual]:
+    """Return what equations make of a few inputs, differentiated once, and its slopes.
+    equations : of symbols in place of the inputs, and of others, which have no slopes.
     """
-
-    def __init__(self, inputs: list[Any], outputs: list[Any]) -> None:
-        x, y = ca.vertcat(*inputs), ca.vertcat(*outputs)
-        names = {one.name() for one in inputs}
-        self._free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
-        self._function = ca.Function("stage", [x, self._free], [y, ca.jacobian(y, x)])
-
-    def __call__(self, inputs: list[_Dual]) -> list[_Dual]:
-        """Return the outputs and their slopes."""
-        value, J = self._function(ca.vertcat(*(one.value for one in inputs)), self._free)
-        slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
-        return [_Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
+    symbols = [ca.SX.sym(f"stage_{i}") for i in range(len(inputs))]
+    x, y = ca.vertcat(*symbols), ca.vertcat(*equations(*symbols))
+    names = {one.name() for one in symbols}
+    free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
+    stage = ca.Function("stage", [x, free], [y, ca.jacobian(y, x)])
+    value, J = stage(ca.vertcat(*(one.value for one in inputs)), free)
+    slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
+    return [_Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
 
 
 @cache
@@ -128,7 +124,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     while True:  # which parameters each state can depend on
         tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
         before = {name: _Dual(old[name], tangents[name]) for name in CARRIED}
-        after, out = _step(before, fixed, duals, s.car, s.dt, first)
+        after, out = _step(_At(before, fixed, duals, s.car, s.dt, first))
         grown = {
             name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
         }
@@ -176,42 +172,34 @@ def _unit(name: str, columns: Columns) -> Any:
     return slopes
 
 
-def _step(
-    before: dict[str, _Dual],
-    signals: dict[str, _Dual],
-    p: dict[str, _Dual],
-    car: CarNumbers,
-    dt: Any,
-    first: Any,
-) -> tuple[dict[str, _Dual], dict[str, tuple[_Dual, _Dual]]]:
+class _At(NamedTuple):
+    """A sample: states before it, signals and parameters by name, numbers of the car, dt [s], and
+    whether nothing is known of the sample before.
+    """
+
+    before: dict[str, _Dual]
+    signals: dict[str, _Dual]
+    p: dict[str, _Dual]
+    car: CarNumbers
+    dt: Any
+    first: Any
+
+
+def _step(at: _At) -> tuple[dict[str, _Dual], dict[str, tuple[_Dual, _Dual]]]:
     """Return the state after a sample, and F, e, x of both axles."""
-    after: dict[str, _Dual] = {}
-    L = car.l_f + car.l_r
-    v_x, v_y, r, delta = _sensors(signals, p)
-    after["rate"], after["rho"], sway = _sway(before, p, car, dt, first, v_x, r)
-    out: dict[str, tuple[_Dual, _Dual]] = {}
-    found = [
-        _axle(
-            axle,
-            before,
-            signals,
-            p,
-            car,
-            dt,
-            first,
-            v_x=v_x,
-            v_y=v_y,
-            r=r,
-            delta=delta if axle == "f" else signals["delta_r"],
-            sway=sway,
-            after=after,
-            L=L,
-        )
-        for axle in "fr"
-    ]
-    for k, name in enumerate(("F", "e", "x")):
-        out[name] = (found[0][k], found[1][k])
-    return after, out
+    v_x, v_y, r, delta = _sensors(at)
+    after, sway = _sway(at, v_x, r)
+    found: dict[str, list[_Dual]] = {"F": [], "e": [], "x": []}
+    for axle, angle in (("f", delta), ("r", at.signals["delta_r"])):
+        slips, x = _slip(axle, at, v_x, v_y, r, angle, sway)
+        after |= slips
+        forces, force = _force(axle, at, v_x, x)
+        after |= forces
+        balance, across, e = _missed(axle, at, v_x, v_y, r, angle, force)
+        after |= balance
+        for name, one in zip(found, (across, e, x), strict=True):
+            found[name].append(one)
+    return after, {name: (front, rear) for name, (front, rear) in found.items()}
 
 
 def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
@@ -228,44 +216,39 @@ def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, An
     return true_v_x, true_v_y, true_r, true_delta
 
 
-def _sensors(signals: dict[str, _Dual], p: dict[str, _Dual]) -> tuple[_Dual, _Dual, _Dual, _Dual]:
+def _sensors(at: _At) -> list[_Dual]:
     """Return v_x, v_y, r and δ_f without the sensors' errors."""
-    logged, errors = ([ca.SX.sym(name) for name in names] for names in (SENSED, SENSORS))
-    stage = _Stage([*logged, *errors], list(true_signals(logged, errors)))
-    found = stage([signals[name] for name in SENSED] + [p[name] for name in SENSORS])
-    return found[0], found[1], found[2], found[3]
+
+    def true(*given: Any) -> tuple[Any, ...]:
+        return true_signals(given[: len(SENSED)], given[len(SENSED) :])
+
+    logged, errors = (at.signals[name] for name in SENSED), (at.p[name] for name in SENSORS)
+    return _staged(true, *logged, *errors)
 
 
-def _sway(
-    before: dict[str, _Dual],
-    p: dict[str, _Dual],
-    car: CarNumbers,
-    dt: Any,
-    first: Any,
-    v_x: _Dual,
-    r: _Dual,
-) -> tuple[_Dual, _Dual, _Dual]:
-    """Return ρ', ρ and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
+def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
+    """Return ρ' and ρ, and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
+    car, dt, first = at.car, at.dt, at.first
+
+    def equations(
+        rho: Any, rate: Any, f_f: Any, f_r: Any, C_f: Any, C_r: Any, k_f: Any, k_r: Any,
+        ln_sway: Any, shift: Any, speed: Any, yaw: Any,
+    ) -> list[Any]:  # fmt: skip
+        L = car.l_f + car.l_r
+        front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
+        omega = car.omega * ca.exp(ln_sway)
+        a = GRAVITY * (front * f_f + rear * f_r)
+        eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
+        moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
+        moved = ca.if_else(first > 0, 0, moved)
+        place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
+        return [moved, place, -moved / (omega**2 * speed)]
+
     names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
-    rho, rate, f_f, f_r, C_f, C_r = (ca.SX.sym(name) for name in names)
-    k_f, k_r, ln_sway, shift, speed, yaw = (
-        ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw")
-    )
-    L = car.l_f + car.l_r
-    front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
-    omega = car.omega * ca.exp(ln_sway)
-    a = GRAVITY * (front * f_f + rear * f_r)
-    eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
-    moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
-    moved = ca.if_else(first > 0, 0, moved)
-    place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
-    inputs = [rho, rate, f_f, f_r, C_f, C_r, k_f, k_r, ln_sway, shift, speed, yaw]
-    outputs = [moved, place, -moved / (omega**2 * speed)]
     of = ("sway_share_f", "sway_share_r", "ln_sway", "cg_shift")
-    found = _Stage(inputs, outputs)(
-        [before[name] for name in names] + [p[name] for name in of] + [v_x, r]
-    )
-    return found[0], found[1], found[2]
+    inputs = [*(at.before[name] for name in names), *(at.p[name] for name in of), v_x, r]
+    rate, rho, slip = _staged(equations, *inputs)
+    return {"rate": rate, "rho": rho}, slip
 
 
 def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
@@ -273,9 +256,14 @@ def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
 
     The numbers are ln C, ln μ, c, E, q (4) and ln m, (9,); forces in static axle loads.
     """
-    numbers = [ca.SX.sym(n) for n in ("lnC", "lnmu", "c", "E", "q0", "q1", "q2", "q3", "lnm")]
-    ln_C, ln_mu, c, E, *q, ln_m = numbers
-    x = ca.SX.sym("x")
+    names = ("lnC", "lnmu", "c", "E", *(f"q{j}" for j in range(len(SLIPS))), "lnm")
+    numbers, x = [ca.SX.sym(name) for name in names], ca.SX.sym("x")
+    return numbers, x, *_curve(*numbers, x)
+
+
+def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, Any]:
+    """Return φ and dφ/dx.   others : q (4), ln m, and the slip x."""
+    *q, ln_m, x = others
     m = ca.exp(ln_m)
     y = x / m
     mu = ca.exp(ln_mu)
@@ -288,15 +276,19 @@ def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
     slope = mu * c * ca.cos(at) / (1 + u * u) * du + sum(
         weight * (1 - t * t) / slip for weight, t, slip in zip(q, T, SLIPS, strict=True)
     )
-    return numbers, x, m * phi, slope
+    return m * phi, slope
+
+
+def curve_names(axle: str) -> list[str]:
+    """Return the numbers of `curve_symbols` of an axle but for the road, (8,)."""
+    names = ["ln_stiffness", "ln_grip", "shape", "curvature"]
+    return [f"{name}_{axle}" for name in (*names, *(f"residual{j}" for j in range(len(SLIPS))))]
 
 
 @cache
 def curve_index(axle: str) -> list[int]:
     """Return where the numbers of `curve_symbols` of an axle stand among the parameters, (9,)."""
-    names = [f"{name}_{axle}" for name in ("ln_stiffness", "ln_grip", "shape", "curvature")]
-    names += [f"residual{j}_{axle}" for j in range(len(SLIPS))]
-    return [INDEX[name] for name in (*names, "ln_road")]
+    return [INDEX[name] for name in (*curve_names(axle), "ln_road")]
 
 
 @cache
@@ -308,116 +300,83 @@ def curve_function() -> ca.Function:
     return ca.Function("curve", [vector, x], [phi, slope, gradient])
 
 
-def _axle(
-    axle: str,
-    before: dict[str, _Dual],
-    signals: dict[str, _Dual],
-    p: dict[str, _Dual],
-    car: CarNumbers,
-    dt: Any,
-    first: Any,
-    *,
-    v_x: _Dual,
-    v_y: _Dual,
-    r: _Dual,
-    delta: _Dual,
-    sway: _Dual,
-    after: dict[str, _Dual],
-    L: Any,
-) -> tuple[_Dual, _Dual, _Dual]:
-    """Return F, e and x of an axle; its states after the sample go into `after`."""
-    front = axle == "f"
-    # Slip.
-    d, vy, vx, yaw, k, s, shift = (ca.SX.sym(n) for n in ("d", "vy", "vx", "r", "k", "s", "cg"))
-    arm = (car.l_f - shift) if front else -(car.l_r + shift)
-    (alpha,) = _Stage([d, vy, vx, yaw, k, s, shift], [d - ca.atan((vy + arm * yaw) / vx) + k * s])(
-        [delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"]]
-    )
-    # Relaxation: the exact step of a first-order lag for α linear over it.
-    x0, a0, a1, C, give = (ca.SX.sym(n) for n in ("x", "a0", "a1", "C", "s"))
-    sigma = give * C + SHORTEST * L
-    h = vx * dt / sigma
-    e = ca.exp(-h)
-    x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
-    (x,) = _Stage([x0, a0, a1, C, give, vx], [ca.if_else(first > 0, a1, x1)])(
-        [
-            before[f"x_{axle}"],
-            before[f"alpha_{axle}"],
-            alpha,
-            before[f"slope_{axle}"],
-            p[f"compliance_{axle}"],
-            v_x,
-        ]
-    )
-    after[f"x_{axle}"], after[f"alpha_{axle}"] = x, alpha
-    # Curve.
-    numbers, at, phi, slope = curve_symbols()
-    road = p["ln_road"]
-    ln_m = _Dual(road.value + signals["road"].value, road.slopes)
-    floor = LEAST_SLOPE * ca.exp(numbers[0])
-    names = ("ln_stiffness", "ln_grip", "shape", "curvature")
-    given = [p[f"{name}_{axle}"] for name in names]
-    given += [p[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
-    curve = _Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
-    value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
-    # Load and ellipse.
-    phi0, height, brake, drive, cg, down, felt, speed = (
-        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "down", "a_x", "v")
-    )
-    f = (felt + car.drag * speed**2) / GRAVITY
-    other = (car.l_r + cg) if front else (car.l_f - cg)
-    shifted = (-height if front else height) * L / other * f
-    press = car.press_f if front else car.press_r
-    load = 1 + shifted + (press + down) * speed**2
-    load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
-    use = ca.if_else(f > 0, drive, brake) * f
-    left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
-    (force,) = _Stage([phi0, height, brake, drive, cg, down, felt, speed], [phi0 * load * left])(
-        [
-            value,
-            p["load_transfer"],
-            p[f"braking_{axle}"],
-            p[f"driving_{axle}"],
-            p["cg_shift"],
-            p[f"downforce_{axle}"],
-            signals["a_x"],
-            v_x,
-        ]
-    )
-    after[f"force_{axle}"] = force
-    # What the balance misses.
-    z0, xi0, u0, F0, angle, ln_I, push = (
-        ca.SX.sym(n) for n in ("z", "xi", "u", "F", "d", "I", "bank")
-    )
-    J = car.inertia * ca.exp(ln_I) / (other if front else -other)
-    across = F0 * ca.cos(angle)
-    xi = vy / GRAVITY + J * yaw
-    u = across - vx * yaw / GRAVITY + push
-    fall = ca.exp(-RATE * dt)
-    mean = (1 - fall) / (RATE * dt)
-    z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
-    z = ca.if_else(first > 0, 0, z)
-    bank = _Dual(signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
-    balance = _Stage(
-        [z0, xi0, u0, F0, angle, ln_I, push, vx, vy, yaw, cg], [z, xi, u, across, RATE * z]
-    )
-    found = balance(
-        [
-            before[f"z_{axle}"],
-            before[f"xi_{axle}"],
-            before[f"u_{axle}"],
-            force,
-            delta,
-            p["ln_inertia"],
-            bank,
-            v_x,
-            v_y,
-            r,
-            p["cg_shift"],
-        ]
-    )
-    after[f"z_{axle}"], after[f"xi_{axle}"], after[f"u_{axle}"] = found[0], found[1], found[2]
-    return found[3], found[4], x
+def _slip(
+    axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, sway: _Dual
+) -> tuple[dict[str, _Dual], _Dual]:
+    """Return slip and lagged slip of an axle after the sample, and the latter by itself."""
+    car, p = at.car, at.p
+
+    def slip(d: Any, vy: Any, vx: Any, yaw: Any, k: Any, s: Any, shift: Any) -> list[Any]:
+        arm = (car.l_f - shift) if axle == "f" else -(car.l_r + shift)
+        return [d - ca.atan((vy + arm * yaw) / vx) + k * s]
+
+    def lagged(x0: Any, a0: Any, a1: Any, C: Any, give: Any, vx: Any) -> list[Any]:
+        """Exact for α linear over the step."""
+        h = vx * at.dt / (give * C + SHORTEST * (car.l_f + car.l_r))
+        e = ca.exp(-h)
+        x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
+        return [ca.if_else(at.first > 0, a1, x1)]
+
+    (alpha,) = _staged(slip, delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"])
+    last, was, slope = (at.before[f"{name}_{axle}"] for name in ("x", "alpha", "slope"))
+    (x,) = _staged(lagged, last, was, alpha, slope, p[f"compliance_{axle}"], v_x)
+    return {f"x_{axle}": x, f"alpha_{axle}": alpha}, x
+
+
+def _force(axle: str, at: _At, v_x: _Dual, x: _Dual) -> tuple[dict[str, _Dual], _Dual]:
+    """Return slope and force at a lagged slip, of curve, load and ellipse; the latter by itself."""
+    front, car, p, road = axle == "f", at.car, at.p, at.p["ln_road"]
+
+    def curve(*numbers: Any) -> list[Any]:
+        phi, slope = _curve(*numbers)
+        return [phi, ca.fmax(slope, LEAST_SLOPE * ca.exp(numbers[0]))]
+
+    def pressed(
+        phi: Any, height: Any, brake: Any, drive: Any, cg: Any, down: Any, a_x: Any, speed: Any
+    ) -> list[Any]:
+        f = (a_x + car.drag * speed**2) / GRAVITY
+        other = (car.l_r + cg) if front else (car.l_f - cg)
+        shifted = (-height if front else height) * (car.l_f + car.l_r) / other * f
+        load = 1 + shifted + ((car.press_f if front else car.press_r) + down) * speed**2
+        load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
+        use = ca.if_else(f > 0, drive, brake) * f
+        return [phi * load * ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))]
+
+    ln_m = _Dual(road.value + at.signals["road"].value, road.slopes)
+    numbers = [p[name] for name in curve_names(axle)]
+    value, slope = _staged(curve, *numbers, ln_m, x)
+    of = ("load_transfer", f"braking_{axle}", f"driving_{axle}", "cg_shift", f"downforce_{axle}")
+    (force,) = _staged(pressed, value, *(p[name] for name in of), at.signals["a_x"], v_x)
+    return {f"slope_{axle}": slope, f"force_{axle}": force}, force
+
+
+def _missed(
+    axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, force: _Dual
+) -> tuple[dict[str, _Dual], _Dual, _Dual]:
+    """Return the states of the balance of an axle after the sample, F, and e."""
+    car, dt, p = at.car, at.dt, at.p
+
+    def balance(
+        z0: Any, xi0: Any, u0: Any, F0: Any, angle: Any, ln_I: Any, push: Any,
+        vx: Any, vy: Any, yaw: Any, cg: Any,
+    ) -> list[Any]:  # fmt: skip
+        other = (car.l_r + cg) if axle == "f" else -(car.l_f - cg)
+        J = car.inertia * ca.exp(ln_I) / other
+        across = F0 * ca.cos(angle)
+        xi = vy / GRAVITY + J * yaw
+        u = across - vx * yaw / GRAVITY + push
+        fall = ca.exp(-RATE * dt)
+        mean = (1 - fall) / (RATE * dt)
+        z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
+        z = ca.if_else(at.first > 0, 0, z)
+        return [z, xi, u, across, RATE * z]
+
+    bank = _Dual(at.signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
+    names = [f"{name}_{axle}" for name in ("z", "xi", "u")]
+    last = (at.before[name] for name in names)
+    inputs = (force, delta, p["ln_inertia"], bank, v_x, v_y, r, p["cg_shift"])
+    *kept, across, e = _staged(balance, *last, *inputs)
+    return dict(zip(names, kept, strict=True)), across, e
 
 
 # The same, sample by sample in a car: no smoothing, a gate before it, a_x from v_x alone.
@@ -451,7 +410,7 @@ def _replay_step() -> ca.Function:
     fixed = _constant((*SIGNALS, *RATES), [*values, 0, 0, 0], 0)
     duals = _constant(NAMES, ca.vertsplit(s.parameters), 0)
     before = _constant(CARRIED, [old.get(name, 0) for name in CARRIED], 0)
-    after, out = _step(before, fixed, duals, s.car, s.dt, g.first)
+    after, out = _step(_At(before, fixed, duals, s.car, s.dt, g.first))
     slip = ca.vertcat(*(axis.value for axis in out["x"]))
     alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
     motion = [ca.if_else(g.on, after[name].value, 0) for name in CARRIED[:10]]

@@ -24,9 +24,10 @@ from identifier.motion.model import (
     QUICK,
     CarNumbers,
     Columns,
+    curve_names,
     curve_symbols,
 )
-from identifier.motion.parameters import NAMES, SLIPS
+from identifier.motion.parameters import NAMES
 from models.vehicle import GRAVITY, LIGHTEST
 
 STATES = ("v_y", "r", "x_f", "x_r", "e_f", "e_r", "bank", "bank_rate")
@@ -131,9 +132,7 @@ class _Instant:
         """Return φ and the slope of the curve at a slip, at least what the carcass keeps."""
         numbers, at, phi, slope = curve_symbols()
         one = ca.Function("curve", [ca.vertcat(*numbers), at], [phi, slope])
-        names = ("ln_stiffness", "ln_grip", "shape", "curvature")
-        own = [self.p[f"{name}_{axle}"] for name in names]
-        own += [self.p[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
+        own = [self.p[name] for name in curve_names(axle)]
         value, tangent = one(ca.vertcat(*own, self.p["ln_road"]), x)
         return value, ca.fmax(tangent, LEAST_SLOPE * ca.exp(own[0]))
 
