@@ -284,7 +284,7 @@ class Scan:
         """
         layout = self.layout
         kept: list[NDArray[Any]] = [np.empty(layout.sz_iw, dtype=np.int64), np.empty(layout.sz_w)]
-        arguments = [
+        arguments: list[object] = [
             ctypes.c_long(n),
             ctypes.c_long(every),
             _pointers([packed[port] for port in self._size_in]),

@@ -65,17 +65,20 @@ def symbols(**shapes: Any) -> tuple[dict[str, Any], SimpleNamespace]:
     shapes : of each port its rows, or (rows, columns); a NamedTuple or dataclass in place of a
         length says what is in the vector, or in the columns: these are the numbers of the port.
     """
-    ports, numbers = {}, {}
+    ports: dict[str, Any] = {}
+    numbers: dict[str, Any] = {}
     for name, shape in shapes.items():
-        *rows, last = shape if isinstance(shape, tuple) else (shape,)
-        if isinstance(last, int):
-            ports[name] = numbers[name] = ca.SX.sym(name, *rows, last)
-            continue
-        fields = last.__dataclass_fields__ if is_dataclass(last) else last._fields
-        ports[name] = ca.SX.sym(name, *rows, len(fields))
-        split = (ca.horzsplit if rows else ca.vertsplit)(ports[name])
-        named = dict(zip(fields, split, strict=True))
-        numbers[name] = SimpleNamespace(**named) if is_dataclass(last) else last(**named)
+        rows, last = shape if isinstance(shape, tuple) else (None, shape)
+        fields: tuple[str, ...] = ()
+        if not isinstance(last, int):
+            fields = tuple(last.__dataclass_fields__) if is_dataclass(last) else last._fields
+        k = len(fields) or last
+        port = ca.SX.sym(name, k) if rows is None else ca.SX.sym(name, rows, k)
+        ports[name] = numbers[name] = port
+        if fields:
+            split = ca.vertsplit(port) if rows is None else ca.horzsplit(port)
+            named = dict(zip(fields, split, strict=True))
+            numbers[name] = SimpleNamespace(**named) if is_dataclass(last) else last(**named)
     return ports, SimpleNamespace(**numbers)
 
 
@@ -84,8 +87,8 @@ def step_function(
 ) -> ca.Function:
     """Return a step: what it carries comes out as `port_next`, before its outputs."""
     out = {f"{port}_next": value for port, value in carried.items()} | outputs
-    values = [list(ports.values()), list(out.values())]
-    return ca.Function(name, *values, list(ports), list(out), {"cse": True})
+    given, found = list(ports.values()), list(out.values())
+    return ca.Function(name, given, found, list(ports), list(out), {"cse": True})
 
 
 # Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.

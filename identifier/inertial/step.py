@@ -327,8 +327,9 @@ def _noise(s: SimpleNamespace, gated: Gate, goes_on: Any) -> _Noise:
     rest = [ca.if_else(turn, 0, one) for turn, one in zip(turns, waiting, strict=True)]
     share = [1 / larger(one, 1) for one in waiting]
     counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
-    columns = (*zip(*state, strict=True), variance, rest)
-    following = _Readings(*(ca.vertcat(*one) for one in columns), left=last.left)
+    newest, before = zip(*state, strict=True)
+    columns = [ca.vertcat(*one) for one in (newest, before, variance, rest)]
+    following = _Readings(*columns, *[last.left])
     return _Noise(first, counts, turns, share, fresh, following)
 
 
