@@ -123,6 +123,11 @@ class Scan:
         self._size_in = {p: step.size_in(p) for p in names_in}
         self._size_out = {p: step.size_out(p) for p in names_out}
 
+    def zeros(self) -> dict[str, Array]:
+        """Return zeros of every carried port, in its shape."""
+        sizes = {port: self._size_in[port] for port in self.carry}
+        return {p: np.zeros(n if m == 1 else (n, m)) for p, (n, m) in sizes.items()}
+
     def __getstate__(self) -> dict[str, object]:
         """Return what it is made of: what points into this process is loaded anew in another."""
         return {name: value for name, value in vars(self).items() if name not in _ADDRESSES}

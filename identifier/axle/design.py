@@ -18,20 +18,19 @@ from identifier.axle.car import car_numbers, downforce_numbers, symbols
 from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
-from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.gate import Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
     Regression,
     RoadChange,
-    RoadState,
     bounded,
     rising_shares,
 )
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.slip import SHORTEST, SensitivityState, Sensors, Sway, SwayState
+from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
@@ -175,21 +174,17 @@ class AxleIdentifier(Method):
                 P = _within_prior(P, prior_P, n)
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self.within_bounds(W, own, P)
+        scan = self._scan(vehicle)
         return Setup(
-            scan=self._scan(vehicle),
+            scan=scan,
             carry={
+                **scan.zeros(),
                 "W": W,
                 "own": own,
                 "UD": packed(narrowed(P, widest)),
-                "gate": np.zeros(len(GateState._fields)),
-                "sway": np.zeros(len(SwayState._fields)),
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
-                "sensitivity": np.zeros((2, len(SensitivityState._fields))),
-                "filters": np.zeros((2, n + 5)),
                 "errors": np.tile([0.0, 1.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
-                "change": np.zeros(len(RoadState._fields)),
-                "bank": np.zeros(len(SlopeState._fields)),
                 "sensors": np.array(sensors),
             },
             constants={

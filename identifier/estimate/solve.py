@@ -20,7 +20,7 @@ from identifier.axle.slip import Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_CAR, SEDAN, Priors
-from identifier.motion.model import CARRIED, CarNumbers, motion_scan
+from identifier.motion.model import CarNumbers, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
 
@@ -249,18 +249,13 @@ def _arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]
     if late.any():
         one, p = one.on_time(late), p.copy()
         p[DELAYS] = 0.0
-    more = {}
-    if "tangent" in scan.carry:
-        more = {"tangent": np.zeros(scan.step.numel_in("tangent"))}
     return {
-        "state": np.zeros(len(CARRIED)),
-        "was_on": np.zeros(1),
+        **scan.zeros(),
         "signals": one.signals,
         "rates": one.rates,
         "parameters": p,
         "car": car,
         "dt": np.array(one.dt),
-        **more,
     }
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
-from identifier.axle.covariance import packed, triangle, unpacked
+from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, tracks
-from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.gate import Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
@@ -23,7 +23,7 @@ from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import CURVES, MOVING, SENSORS, Along, Laws, Learnt
+from identifier.inertial.motion import CURVES, SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
     CARRY,
     OVER,
@@ -227,27 +227,19 @@ class InertialIdentifier(Method):
         trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
         curves, compliance = self._directions(W), own[:, 0]
         known = self._known(vehicle, P, curves, compliance)
-        q = len(self._learnt.names)
-        rest = len(triangle(MOVING + q)) - len(triangle(q))
+        pressed = vehicle.has_downforce
+        scan = _scan(doublings(self.ladder), tires=not self.held, pressed=pressed)
         return Setup(
-            scan=_scan(
-                doublings(self.ladder),
-                tires=not self.held,
-                pressed=vehicle.has_downforce,
-            ),
+            scan=scan,
             carry={
-                "motion": np.zeros(MOVING),
+                **scan.zeros(),  # the covariance of what moves begins with the first sample
                 "W": W,
                 "own": own[:, 0],
                 "sensors": sensors,
                 "UD": packed(known[None]),
-                "motion_UD": np.zeros(rest),  # begins with the first sample
-                "gate": np.zeros(len(GateState._fields)),
-                "body": np.zeros(2),
                 "readings": np.concatenate(
                     [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
-                "running": np.zeros(3),
                 "excitation": excitation,
             },
             constants={

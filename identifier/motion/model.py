@@ -279,6 +279,35 @@ def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, An
     return m * phi, slope
 
 
+def carcass_curve(*numbers: Any) -> tuple[Any, Any]:
+    """Return φ and its slope as far as the carcass stretches.   numbers : as of `_curve`."""
+    phi, slope = _curve(*numbers)
+    return phi, ca.fmax(slope, LEAST_SLOPE * ca.exp(numbers[0]))
+
+
+def pushed_names(axle: str) -> list[str]:
+    """Return the parameters of `load_and_ellipse` of an axle."""
+    of_axle = f"braking_{axle}", f"driving_{axle}"
+    return ["load_transfer", *of_axle, "cg_shift", f"downforce_{axle}"]
+
+
+def load_and_ellipse(
+    axle: str, car: CarNumbers, numbers: Sequence[Any], a_x: Any, v_x: Any
+) -> tuple[Any, Any]:
+    """Return λ, the load of an axle over the static one, and G, what the ellipse leaves [-].
+    numbers : of `pushed_names`.   a_x : [m/s²].   v_x : [m/s].
+    """
+    height, brake, drive, cg, down = numbers
+    f = (a_x + car.drag * v_x**2) / GRAVITY
+    front = axle == "f"
+    other, press = (car.l_r + cg, car.press_f) if front else (car.l_f - cg, car.press_r)
+    shifted = (-height if front else height) * (car.l_f + car.l_r) / other * f
+    load = 1 + shifted + (press + down) * v_x**2
+    use = ca.if_else(f > 0, drive, brake) * f
+    least = ca.if_else(load > LIGHTEST, load, LIGHTEST)
+    return least, ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
+
+
 def curve_names(axle: str) -> list[str]:
     """Return the numbers of `curve_symbols` of an axle but for the road, (8,)."""
     names = ["ln_stiffness", "ln_grip", "shape", "curvature"]
@@ -325,28 +354,18 @@ def _slip(
 
 def _force(axle: str, at: _At, v_x: _Dual, x: _Dual) -> tuple[dict[str, _Dual], _Dual]:
     """Return slope and force at a lagged slip, of curve, load and ellipse; the latter by itself."""
-    front, car, p, road = axle == "f", at.car, at.p, at.p["ln_road"]
+    car, p, road = at.car, at.p, at.p["ln_road"]
 
-    def curve(*numbers: Any) -> list[Any]:
-        phi, slope = _curve(*numbers)
-        return [phi, ca.fmax(slope, LEAST_SLOPE * ca.exp(numbers[0]))]
-
-    def pressed(
-        phi: Any, height: Any, brake: Any, drive: Any, cg: Any, down: Any, a_x: Any, speed: Any
-    ) -> list[Any]:
-        f = (a_x + car.drag * speed**2) / GRAVITY
-        other = (car.l_r + cg) if front else (car.l_f - cg)
-        shifted = (-height if front else height) * (car.l_f + car.l_r) / other * f
-        load = 1 + shifted + ((car.press_f if front else car.press_r) + down) * speed**2
-        load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
-        use = ca.if_else(f > 0, drive, brake) * f
-        return [phi * load * ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))]
+    def pushes(phi: Any, *of: Any) -> list[Any]:
+        *numbers, a_x, speed = of
+        load, left = load_and_ellipse(axle, car, numbers, a_x, speed)
+        return [phi * load * left]
 
     ln_m = _Dual(road.value + at.signals["road"].value, road.slopes)
     numbers = [p[name] for name in curve_names(axle)]
-    value, slope = _staged(curve, *numbers, ln_m, x)
-    of = ("load_transfer", f"braking_{axle}", f"driving_{axle}", "cg_shift", f"downforce_{axle}")
-    (force,) = _staged(pressed, value, *(p[name] for name in of), at.signals["a_x"], v_x)
+    value, slope = _staged(carcass_curve, *numbers, ln_m, x)
+    given = (p[name] for name in pushed_names(axle))
+    (force,) = _staged(pushes, value, *given, at.signals["a_x"], v_x)
     return {f"slope_{axle}": slope, f"force_{axle}": force}, force
 
 

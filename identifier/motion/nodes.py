@@ -19,16 +19,16 @@ from codegen import Scan
 from identifier.axle.car import step_function, symbols
 from identifier.axle.slip import SHORTEST
 from identifier.motion.model import (
-    LEAST_GRIP,
-    LEAST_SLOPE,
     QUICK,
     CarNumbers,
     Columns,
+    carcass_curve,
     curve_names,
-    curve_symbols,
+    load_and_ellipse,
+    pushed_names,
 )
 from identifier.motion.parameters import NAMES
-from models.vehicle import GRAVITY, LIGHTEST
+from models.vehicle import GRAVITY
 
 STATES = ("v_y", "r", "x_f", "x_r", "e_f", "e_r", "bank", "bank_rate")
 GIVEN = ("v_x", "delta_f", "delta_r", "a_x", "turning", "rho", "rho_rate", "jerk")
@@ -130,27 +130,18 @@ class _Instant:
 
     def curve(self, axle: str, x: Any) -> tuple[Any, Any]:
         """Return φ and the slope of the curve at a slip, at least what the carcass keeps."""
-        numbers, at, phi, slope = curve_symbols()
-        one = ca.Function("curve", [ca.vertcat(*numbers), at], [phi, slope])
-        own = [self.p[name] for name in curve_names(axle)]
-        value, tangent = one(ca.vertcat(*own, self.p["ln_road"]), x)
-        return value, ca.fmax(tangent, LEAST_SLOPE * ca.exp(own[0]))
+        numbers = [self.p[name] for name in curve_names(axle)]
+        return carcass_curve(*numbers, self.p["ln_road"], x)
 
     @property
     def force(self) -> list[Any]:
         """Lateral forces of both axles over their static loads, across the body."""
         p, v_x = self.p, self.given["v_x"]
         a_x = self.given["a_x"] - self.given["turning"] * self.v_y * self.r
-        f = (a_x + self.car.drag * v_x**2) / GRAVITY
-        use_of = ca.if_else(f > 0, 1, 0)
         found = []
         for i, axle in enumerate("fr"):
-            other = -self.arms[1] if i == 0 else self.arms[0]
-            shifted = (-1 if i == 0 else 1) * p["load_transfer"] * self.L / other * f
-            press = (self.car.press_f, self.car.press_r)[i] + p[f"downforce_{axle}"]
-            load = ca.fmax(1 + shifted + press * v_x**2, LIGHTEST)
-            use = (use_of * p[f"driving_{axle}"] + (1 - use_of) * p[f"braking_{axle}"]) * f
-            left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
+            numbers = [p[name] for name in pushed_names(axle)]
+            load, left = load_and_ellipse(axle, self.car, numbers, a_x, v_x)
             phi, _ = self.curve(axle, self.z[2 + i])
             found.append(phi * load * left * ca.cos(self.delta[i]) + self.z[4 + i])
         return found
