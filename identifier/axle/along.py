@@ -16,9 +16,9 @@ the signs of g_k.
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
-import casadi as ca
 import numpy as np
 
+from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.certificate import Design, corners, curve_facts, jump_by_learning
 from identifier.axle.covariance import unpacked
@@ -87,11 +87,14 @@ def lessons(design: _Learner, history: Run) -> Lessons:
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
     step = build_lesson(doublings(design.ladder), pressed=pressed)
-    parts, theta, begin = [], [], []
+    over = tuple(port for port in step.name_in() if port not in setup.constants)
+    scan, parts, theta, begin = Scan(step, carry=(), over=over), [], [], []
+    constants = {port: setup.constants[port] for port in scan.constants}
     for block in history.blocks(np.arange(max(n - MOST, 0), n)):
         seen = setup.shown(history.recording, block.part)
         signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
-        parts.append(_taught(step, {**setup.constants, **block.before, **signals}, setup.constants))
+        sampled = {port: _by_columns({**block.before, **signals}[port]) for port in over}
+        parts.append(scan(len(sampled["v_x"]), {**constants, **sampled}))
         theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
         begin.append(block.state["UD"][0])
     h, e, counts, gains, declared = (
@@ -103,29 +106,10 @@ def lessons(design: _Learner, history: Run) -> Lessons:
     return Lessons(h, e, counts, gains, declared, path, path[1:] - learnt, P)
 
 
-def _taught(
-    step: ca.Function, values: Mapping[str, Array], constants: Mapping[str, Array]
-) -> dict[str, Array]:
-    """Return the outputs of `build_lesson` for N samples, (N, ...).
-    values : of its ports, (N, ...) but for the constants.
-    """
-    N, names = len(values["v_x"]), step.name_in()
-    alike = [i for i, name in enumerate(names) if name in constants]
-    declared = []
-    for name in names:
-        value, (rows, columns) = np.asarray(values[name]), step.size_in(name)
-        if name not in constants:
-            value = value.reshape(N, rows, columns).transpose(1, 0, 2).reshape(rows, -1)
-        declared.append(value)
-    found = step.map("lessons", "serial", N, alike, [])(*declared)
-    return {name: _by_sample(np.array(value), N) for name, value in zip(LESSON, found, strict=True)}
-
-
-def _by_sample(value: Array, N: int) -> Array:
-    """Return (N, rows, columns) of values side by side (rows, N columns); (N, rows) of columns."""
-    rows, columns = value.shape[0], value.shape[1] // N
-    apart = value.reshape(rows, N, columns).transpose(1, 0, 2)
-    return apart[:, :, 0] if columns == 1 else apart
+def _by_columns(values: Array) -> Array:
+    """Return values of samples (N, ...) as rows (N, k), matrices by columns."""
+    apart = values.swapaxes(1, 2) if values.ndim == 3 else values
+    return apart.reshape(len(values), -1)
 
 
 def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint:

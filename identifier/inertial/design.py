@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 
+import casadi as ca
 import numpy as np
 
 from codegen import Scan
@@ -23,7 +24,7 @@ from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import CURVES, SENSORS, Along, Laws, Learnt
+from identifier.inertial.motion import MOVING, SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
     CARRY,
     OVER,
@@ -315,19 +316,12 @@ class InertialIdentifier(Method):
 
     def _into(self, curves: Array, compliance: Array) -> Array:
         """Return what steps of what is learnt move of each axle's [W, own], (2, n + 3, k)."""
-        n, names = len(self.ladder), self._learnt.names
-        E = np.zeros((2, n + 3, len(names)))
-        for k, name in enumerate(names):
-            if name == "grip":
-                E[:, :n, k] = curves[:2]
-            elif name in CURVES:
-                i = CURVES.index(name)
-                E[i % 2, :n, k] = curves[i]
-            elif name == "compliance":
-                E[:, n, k] = compliance
-            elif name == "steering":
-                E[0, n + 2, k] = 1.0
-        return E
+        n = len(self.ladder)
+        moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[MOVING:, MOVING:]
+        *weights, own, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
+        steering, nothing = sensors[SENSORS.index("steering")], np.zeros(sensors.shape[1])
+        front = np.vstack([weights[0], own[0], nothing, steering])
+        return np.array([front, np.vstack([weights[1], own[1], nothing, nothing])])
 
     def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
         """Return the covariance of what is learnt of covariances of both axles' [W, own], (k, k).
