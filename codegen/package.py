@@ -274,14 +274,6 @@ def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
     return json.dumps(data, indent=2) + "\n"
 
 
-def manifest_with_figures(manifest: str, figures: Sequence[Mapping[str, Any]]) -> str:
-    """Return <name>.json with what the package costs; its hashes are of the rest.
-    manifest : text of the JSON file.
-    figures : one of each processor and precision, ready for JSON.
-    """
-    return json.dumps({**json.loads(manifest), "figures": list(figures)}, indent=2) + "\n"
-
-
 def plain(value: Any) -> Any:
     """Return data with plain numbers, lists and texts; infinity becomes a text."""
     match value:
