@@ -240,8 +240,7 @@ def _digits(value: float) -> str:
 class Statements:
     """Statements that compute the outputs of a graph.
     graph : the scalars; choices and our own functions are nodes.
-    read : C expression of an entry of an input.
-    write : C lvalue of an entry of an output.
+    read : C expression of an entry of an input.   write : C lvalue of an entry of an output.
     sums : whether the sum of all that is written is returned, which is finite only where all is.
     """
 

@@ -64,8 +64,7 @@ def _polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
 
 def _where(condition: Any, a: Any, b: Any) -> Any:
     """Return a where the condition holds, else b.
-    a : expression, array or number.
-    b : expression, array or number.
+    a : expression, array or number.   b : expression, array or number.
     """
     symbolic = isinstance(condition, ca.SX | ca.MX | ca.DM)
     return ca.if_else(condition, a, b) if symbolic else np.where(condition, a, b)

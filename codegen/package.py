@@ -218,8 +218,7 @@ def cmake(
     files: Iterable[str], about: Values, *, flags: Sequence[str], so_that: str
 ) -> dict[str, str]:
     """Return CMakeLists.txt of a package by its path.
-    files : paths of the package; what lies in src/ is the library.
-    about : of `about_package`.
+    files : paths of the package; what lies in src/ is the library.   about : of `about_package`.
     """
     sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
     values = {"sources": "\n".join(f"  {path}" for path in sources), "flags": " ".join(flags)}

@@ -356,8 +356,7 @@ def _pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]"
 
 def _shaped(flat: Array, size: tuple[int, int]) -> Array:
     """Return rows of column-major numbers in their matrix shape; column vectors stay flat.
-    flat : numbers (..., rows columns).
-    size : rows and columns of the port.
+    flat : numbers (..., rows columns).   size : rows and columns of the port.
     """
     rows, columns = size
     if columns == 1:

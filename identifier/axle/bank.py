@@ -36,8 +36,7 @@ class RoadSlope:
     time : τ of its mean [s].
     level : sine of an angle by which the sensor may be off level [-]; from twice that on it is a
         bank, in full.
-    roll : ρ, of the body [rad per g], outwards.
-    most : sine of the steepest road [-].
+    roll : ρ, of the body [rad per g], outwards.   most : sine of the steepest road [-].
     step : largest difference from the mean that counts in full [-]: roads bend slowly, and what is
         more is a sensor that fails.
     largest : acceleration that no car has [m/s²]; what is not below it, as NaN, is absent.

@@ -30,17 +30,12 @@ class Plausibility:
     """Bounds of what a car can do; generous, since they are there for faults.
     min_speed : below this speed [m/s] forces read zero.
     learning_speed : below this speed [m/s] learning rests.
-    max_speed : no car is faster [m/s].
-    max_sideslip : largest |v_y|/v_x [-].
+    max_speed : no car is faster [m/s].   max_sideslip : largest |v_y|/v_x [-].
     slow : speed that stands for v_x in that ratio, where v_x is lower [m/s].
-    max_yaw_rate : [rad/s].
-    max_steering : [rad].
-    max_rate : largest acceleration [m/s²].
+    max_yaw_rate : [rad/s].   max_steering : [rad].   max_rate : largest acceleration [m/s²].
     jump : what noise may add to v_x and v_y from one sample to the next [m/s].
-    max_yaw_acceleration : [rad/s²].
-    yaw_jump : what noise may add to r [rad/s].
-    max_steering_rate : [rad/s].
-    steering_jump : what noise may add to the steering [rad].
+    max_yaw_acceleration : [rad/s²].   yaw_jump : what noise may add to r [rad/s].
+    max_steering_rate : [rad/s].   steering_jump : what noise may add to the steering [rad].
     hold : longest time to go on with the last good sample, or with values that do not change [s].
     settle : time to wait before learning [s].
     """

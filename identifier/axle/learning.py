@@ -32,8 +32,7 @@ from models.rules import require_positive_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Regression:
     """Filter, error model and memory; times belong to drivers and sensors, not to the car's size.
-    bandwidth : κ [1/s].
-    memory : of directional forgetting, in time with excitation [s].
+    bandwidth : κ [1/s].   memory : of directional forgetting, in time with excitation [s].
     error : additive error of y [static axle loads]: 0.02 is 0.2 m/s².
     relative_error : of y [-], the model's.
     correlation_time : of these errors [s]; it makes the result independent of the sampling.
@@ -350,10 +349,8 @@ class Bounds:
         reaches three.
     least_stiffness, most_stiffness : of the curve at no slip [static axle loads/rad]; tires of cars
         and of their models lie between 4 and 40.
-    weight : of each weight [static axle loads].
-    compliance : [m per static axle load].
-    steering : of the steering's zero [rad].
-    v_y : of the bias of v_y [m/s].
+    weight : of each weight [static axle loads].   compliance : [m per static axle load].
+    steering : of the steering's zero [rad].   v_y : of the bias of v_y [m/s].
 
     Raises
     ------

@@ -24,14 +24,11 @@ STEP = 1.2  # ratio over which log-derivatives are taken
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
     """Means and standard deviations before the first sample.
-    friction : of the road [-].
-    sd_stiffness : of ln C [-].
-    sd_friction : of ln μ [-].
-    sd_shape : of each weight on its own [static axle loads].
+    friction : of the road [-].   sd_stiffness : of ln C [-].
+    sd_friction : of ln μ [-].   sd_shape : of each weight on its own [static axle loads].
     compliance, sd_compliance : lateral deflection of the tire per static axle load [m].
     sway_share, sd_sway_share : share of the roll rate that moves the contact patch [-].
-    sd_steering : of the front steering's zero [rad].
-    sd_v_y : of the bias of v_y [m/s].
+    sd_steering : of the front steering's zero [rad].   sd_v_y : of the bias of v_y [m/s].
     """
 
     friction: float = 0.8
@@ -65,11 +62,10 @@ class Prior:
         n, mu = len(ladder), self.friction
         P = np.zeros((2, n + 3, n + 3))
         for i, c in enumerate(_relative_stiffness(vehicle)):
-            d_C = _log_derivative(
-                fiala_weights(c * STEP, mu, ladder), fiala_weights(c / STEP, mu, ladder)
-            )
-            d_mu = _log_derivative(
-                fiala_weights(c, mu * STEP, ladder), fiala_weights(c, mu / STEP, ladder)
+            d_C, d_mu = (
+                (fiala_weights(c * s, mu * m, ladder) - fiala_weights(c / s, mu / m, ladder))
+                / (2.0 * np.log(STEP))
+                for s, m in ((STEP, 1.0), (1.0, STEP))
             )
             P[i, :n, :n] = (
                 self.sd_stiffness**2 * np.outer(d_C, d_C)
@@ -125,7 +121,3 @@ def friction_direction(ladder: tuple[float, ...]) -> Array:
     """
     T = unit_matrix(SLIPS, ladder)
     return _projected(T - SLIPS[:, None] / np.array(ladder) * (1.0 - T * T), ladder)
-
-
-def _log_derivative(above: Array, below: Array) -> Array:
-    return np.asarray((above - below) / (2.0 * np.log(STEP)), dtype=np.float64)

@@ -150,8 +150,7 @@ def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sway:
     """Roll of the body as a second-order system.
-    frequency : ω [rad/s].
-    damping : ζ [-].
+    frequency : ω [rad/s].   damping : ζ [-].
 
     Raises
     ------

@@ -32,12 +32,9 @@ ACROSS, ALONG = (0.8, 1.2), (0.8, 1.25)  # its slope on that motion; a body roll
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drive:
     """Signals of n samples, for the forward model.
-    t : time in the recording's own clock [s], (n,).
-    dt : sampling interval [s].
-    signals : columns as `motion.model.SIGNALS`, (n, 9).
-    rates : d/dt of v_y, r and δ_f, (n, 3).
-    counts : samples that count, (n,).
-    begins : first samples of its segments, rising, (k,).
+    t : time in the recording's own clock [s], (n,).   dt : sampling interval [s].
+    signals : columns as `motion.model.SIGNALS`, (n, 9).   rates : d/dt of v_y, r and δ_f, (n, 3).
+    counts : samples that count, (n,).   begins : first samples of its segments, rising, (k,).
     """
 
     t: Array

@@ -64,8 +64,7 @@ def _on_grid() -> ca.Function:
 class Information:
     """What drives tell.
     matrix : Λ, zero of what was held (m, m).
-    vector : η (m,).
-    seconds : of driving that counts [s].
+    vector : η (m,).   seconds : of driving that counts [s].
 
     Raises
     ------

@@ -57,8 +57,7 @@ class _Trust:
     error_time : for which it stays alike [s].
     bank, bank_time : sine of the bank of a road [-], and for which it lasts [s].
     push, turn : what no tire pushes: v_y [sqrt(g L)/sqrt(s)], r [(g/L)^(3/4)].
-    lag : of lagged slip, from node to node [rad].
-    side_slip : at the first node [rad].
+    lag : of lagged slip, from node to node [rad].   side_slip : at the first node [rad].
     r, a_y : what no noise explains of sensors [rad/s], [m/s²].
     a_y_share : the same of a_y over it [-].
     r_noise, a_y_noise : noise before it is learnt, in the same units.

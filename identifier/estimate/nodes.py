@@ -41,10 +41,8 @@ class TooShortError(TireidError, ValueError):
 class Nodes:
     """Signals at n nodes.
     t : time in the recording's own clock [s], (n,).
-    dt : from a node to the next [s].
-    given : columns as `motion.nodes.GIVEN`, (n, 8).
-    measured : r [rad/s] and a_y [m/s²], (n, 2).
-    counts : where the car drives fast enough, (n,).
+    dt : from a node to the next [s].   given : columns as `motion.nodes.GIVEN`, (n, 8).
+    measured : r [rad/s] and a_y [m/s²], (n, 2).   counts : where the car drives fast enough, (n,).
     goes : whether the motion goes on to the next node, (n,).
     """
 

@@ -19,8 +19,7 @@ class Posterior:
     roads : ln of the friction of other roads than that of the curves (K,).
     road_sd : standard deviation of these (K,).
     scale : S of the residuals of both axles [-], (2,).
-    memory : T, their integrated autocorrelation time [s], (2,).
-    cost : J at the optimum [nats].
+    memory : T, their integrated autocorrelation time [s], (2,).   cost : J at the optimum [nats].
     """
 
     vehicle: Vehicle

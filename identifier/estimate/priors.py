@@ -87,8 +87,7 @@ class Priors:
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
-    typed : which numbers somebody typed.
-    data : what drives add to it
+    typed : which numbers somebody typed.   data : what drives add to it
     """
 
     mean: Array

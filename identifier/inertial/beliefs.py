@@ -77,8 +77,7 @@ class Trust:
     r : of the yaw rate then [rad/s].
     error, relative_error : what curves miss of a force [static axle loads], [-].
     correlation_time : of that [s].
-    bank : sine of the bank of a road [-].
-    bank_time : in which a road banks [s].
+    bank : sine of the bank of a road [-].   bank_time : in which a road banks [s].
     jerk : what pushes the yaw rate beside tires, as a random walk [(g/L)^(3/4)].
     r_error, a_y_error : what no noise explains of the yaw rate [rad/s] and of a_y [m/s²].
     a_y_share : of a_y, what no noise explains of it beside that [-].
