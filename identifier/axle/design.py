@@ -173,7 +173,7 @@ class AxleIdentifier(Method):
             if stored is not start:  # of another form: units can be what no curve of it could
                 P = _within_prior(P, prior_P, n)
         widest = per_variance(prior_P, n, self.regression.widest)
-        W, own = self.within_bounds(W, own, P)
+        W, own = self._within_bounds(W, own, P)
         scan = self._scan(vehicle)
         return Setup(
             scan=scan,
@@ -237,11 +237,8 @@ class AxleIdentifier(Method):
             },
         )
 
-    def within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
+    def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside.
-
-        Parameters
-        ----------
         W : weights [static axle loads], (2, n).
         own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
         P : covariance of both, (2, n + 3, n + 3): the least move is in its metric.
@@ -251,14 +248,11 @@ class AxleIdentifier(Method):
         numbers = self.bounds.of_ladder(self.ladder, self.rising_until)
         row = np.zeros(n) if slope is None else slope
         project = _projection(n, slope is not None)
-        kept = np.vstack(
-            [
-                np.array(
-                    project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
-                )
-                for i, offset in enumerate((numbers.steering, numbers.v_y))
-            ]
-        )
+        rows = [
+            project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
+            for i, offset in enumerate((numbers.steering, numbers.v_y))
+        ]
+        kept = np.array(ca.vertcat(*rows))
         return kept[:, :n], kept[:, n:]
 
     def _rising(self) -> dict[str, Array]:
