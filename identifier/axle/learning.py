@@ -351,11 +351,6 @@ class Bounds:
         and of their models lie between 4 and 40.
     weight : of each weight [static axle loads].   compliance : [m per static axle load].
     steering : of the steering's zero [rad].   v_y : of the bias of v_y [m/s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive, or least_grip is not below most_grip.
     """
 
     least_grip: float = 0.1

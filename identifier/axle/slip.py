@@ -151,11 +151,6 @@ def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, 
 class Sway:
     """Roll of the body as a second-order system.
     frequency : ω [rad/s].   damping : ζ [-].
-
-    Raises
-    ------
-    ValueError
-        Where a number is none of a body on springs: 0.1 to 100 rad/s, damping 0.01 to 10.
     """
 
     frequency: float

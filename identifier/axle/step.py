@@ -295,6 +295,7 @@ def build_step(
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is given, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
+    pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
     ports, s = symbols(

@@ -65,11 +65,6 @@ class Information:
     """What drives tell.
     matrix : Λ, zero of what was held (m, m).
     vector : η (m,).   seconds : of driving that counts [s].
-
-    Raises
-    ------
-    ValueError
-        Where shapes do not fit or a number is not finite.
     """
 
     matrix: Array

@@ -60,11 +60,6 @@ class InertialIdentifier(Method):
     sensors : errors of sensors that were known before; that of the steering is taken out.
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
-
-    Raises
-    ------
-    ValueError
-        Where the ladder does not rise by powers of two, or a number is none of a car.
     """
 
     prior: Prior
