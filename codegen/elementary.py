@@ -43,9 +43,7 @@ Q = (
 
 
 def tanh(x: Any) -> Any:
-    """Return tanh, entry by entry.
-    x : CasADi expression, array or number.
-    """
+    """Return tanh of a CasADi expression, array or number, entry by entry."""
     x = _where(x > LIMIT, LIMIT, x)
     x = _where(x < -LIMIT, -LIMIT, x)
     s = x * x
@@ -63,17 +61,13 @@ def _polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
 
 
 def _where(condition: Any, a: Any, b: Any) -> Any:
-    """Return a where the condition holds, else b.
-    a : expression, array or number.   b : expression, array or number.
-    """
+    """Return a where the condition holds, else b: expressions, arrays or numbers."""
     symbolic = isinstance(condition, ca.SX | ca.MX | ca.DM)
     return ca.if_else(condition, a, b) if symbolic else np.where(condition, a, b)
 
 
 def _floor(x: Any) -> Any:
-    """Return the largest whole number that is not above x, entry by entry; exact everywhere.
-    x : expression, array or number.
-    """
+    """Return the largest whole number that is not above x, entry by entry; exact everywhere."""
     return ca.floor(x) if isinstance(x, ca.SX | ca.MX | ca.DM) else np.floor(x)
 
 
@@ -115,9 +109,7 @@ TURN = 2.0 * math.pi
 
 
 def exp(y: Any) -> Any:
-    """Return e^y, entry by entry.
-    y : CasADi expression, array or number.
-    """
+    """Return e^y of a CasADi expression, array or number, entry by entry."""
     y = _where(y > _EXP_LIMIT, _EXP_LIMIT, y)
     y = _where(y < -_EXP_LIMIT, -_EXP_LIMIT, y)
     t = y * (1.0 / 2**_SQUARINGS)
@@ -130,9 +122,7 @@ def exp(y: Any) -> Any:
 
 
 def atan(x: Any) -> Any:
-    """Return the arc tangent [rad], entry by entry.
-    x : CasADi expression, array or number.
-    """
+    """Return the arc tangent [rad] of a CasADi expression, array or number, entry by entry."""
     steep = x * x > 1.0
     y = _where(steep, -1.0 / _where(steep, x, 1.0), x)
     s = y * y
@@ -142,8 +132,6 @@ def atan(x: Any) -> Any:
 
 
 def sin(x: Any) -> Any:
-    """Return the sine, entry by entry.
-    x : CasADi expression, array or number [rad].
-    """
+    """Return the sine of a CasADi expression, array or number [rad], entry by entry."""
     y = x - TURN * _floor(x * (1.0 / TURN) + 0.5)
     return y * _polynomial(_SIN_S, y * y)

@@ -436,14 +436,10 @@ def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
 
 
 def _softness(p: Array) -> tuple[Array, Array]:
-    """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
+    """Return how far both axles are softer at zero than a tire can be, and its slopes over p (p,).
 
-    No tire has less than a quarter of C there: play in the steering looks so.
-    p : (p,).
-
-    Returns
-    -------
-    (2,), in standard deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
+    No tire has less than a quarter of C there: play in the steering looks so. (2,), in standard
+    deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
     """
     found, slopes = np.zeros(2), np.zeros((2, p.size))
     for i, axle in enumerate("fr"):
