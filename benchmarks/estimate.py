@@ -36,7 +36,6 @@ from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.method import CannotFreezeError
 from identifier.methods import DEFAULT, LIVE, METHODS, make_method
-from identifier.motion.parameters import INDEX
 from identifier.run import DivergedError
 from identifier.tire_model import STIFFNESS, TireModel
 from models.maneuvers import StepSteer
@@ -364,10 +363,7 @@ def judge_circle(targets: Targets) -> None:
     ----------
     targets : collects what is missed.
     """
-    plain = Priors.of(DART, fixed=CIRCLE)
-    mean = plain.mean.copy()
-    mean[[INDEX[name] for name in CIRCLE]] = 0.0
-    slip_alone = replace(plain, mean=mean)
+    slip_alone = Priors.of(DART).without(CIRCLE)
     rows = []
     for floor, names in PULLED.items():
         for learn, ask in permutations(read("dart_2025.csv.gz", names)):

@@ -25,7 +25,6 @@ IN_MEMORY = 8 * 8 * LONG  # bytes, beyond which an array lies on disk
 
 def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
     """Yield consecutive parts of samples: one where there are at most `LONG`, else of `BLOCK`.
-
     n : samples, the end of the last part.
     """
     size = BLOCK if n > LONG else max(n, 1)
@@ -59,7 +58,6 @@ def on_disk(
     file: IO[bytes], dtype: np.dtype[Any], shape: tuple[int, ...], mode: Literal["r", "w+"]
 ) -> NDArray[Any]:
     """Return an array that is a file, of which memory holds what was used last alone.
-
     mode : "r", or "w+" to make the file as large as that.
     """
     mapped = np.memmap(file, dtype, mode=mode, shape=shape)
@@ -85,7 +83,6 @@ def filled(n: int, compute: Callable[[slice], Array]) -> Array:
     """Return values of samples, computed block by block, on disk where they are many (n,).
 
     Nobody may write them.
-
     compute : returns the values of a part of them (k,).
     """
     values = large((n,))

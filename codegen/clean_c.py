@@ -34,7 +34,6 @@ EXPANDED = {**BUILDERS, **OWN}
 
 def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
-
     whole : False leaves our own functions as the scalars that they are made of.
     """
     if not whole:
@@ -150,9 +149,8 @@ def _argument(graph: Graph, place: int, template: Graph, leaf: int) -> int | Non
 Unit = TypeVar("Unit")
 
 
-def in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
+def _in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
     """Return the units, each after those that it needs.
-
     needs : of each unit that is written, which others, each once; there is no circle.
     results : units that nobody needs, in the order in which they are wanted.
     """
@@ -222,7 +220,6 @@ MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS", "floor": "FLOOR"}
 
 def literal(value: float, prefix: str) -> str:
     """Return a number in C, which reads back as the same double; in float the nearest there is.
-
     value : finite.
     """
     size = abs(value)
@@ -242,10 +239,8 @@ def _digits(value: float) -> str:
 
 class Statements:
     """Statements that compute the outputs of a graph.
-
     graph : the scalars; choices and our own functions are nodes.
-    read : C expression of an entry of an input.
-    write : C lvalue of an entry of an output.
+    read : C expression of an entry of an input.   write : C lvalue of an entry of an output.
     sums : whether the sum of all that is written is returned, which is finite only where all is.
     """
 
@@ -323,7 +318,7 @@ class Statements:
             (unit, None): self._units(self._needs(unit), first_of) for unit in first_of.values()
         }
         needs |= {result: self._units(result[:1], first_of) for result in results}
-        return in_order(needs, results)
+        return _in_order(needs, results)
 
     def _units(self, places: Sequence[int], first_of: Mapping[int, int]) -> list[tuple[int, None]]:
         """Return what is written on its own of what places are made of, each once."""

@@ -201,14 +201,11 @@ def load_library(
 
 
 def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) -> Path | None:
-    """Compile C source to a shared library in the cache folder, or find it there.
+    """Compile C source to a shared library in the cache folder, or find it there; return its path.
 
+    None where there is no compiler.
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
     flags : of the compiler; None takes `FLAGS`.
-
-    Returns
-    -------
-    The library's path, or None where there is no compiler.
     """
     compiler = find_compiler()
     if compiler is None:

@@ -43,19 +43,15 @@ Q = (
 
 
 def tanh(x: Any) -> Any:
-    """Return tanh, entry by entry.
-
-    x : CasADi expression, array or number.
-    """
-    x = where(x > LIMIT, LIMIT, x)
-    x = where(x < -LIMIT, -LIMIT, x)
+    """Return tanh of a CasADi expression, array or number, entry by entry."""
+    x = _where(x > LIMIT, LIMIT, x)
+    x = _where(x < -LIMIT, -LIMIT, x)
     s = x * x
-    return x * polynomial(P, s) / polynomial(Q, s)
+    return x * _polynomial(P, s) / _polynomial(Q, s)
 
 
-def polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
+def _polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
     """Return Σ c_k s^k by Horner's rule.
-
     coefficients : c_0 first.
     """
     *lower, value = coefficients
@@ -64,21 +60,14 @@ def polynomial(coefficients: tuple[float, ...], s: Any) -> Any:
     return value
 
 
-def where(condition: Any, a: Any, b: Any) -> Any:
-    """Return a where the condition holds, else b.
-
-    a : expression, array or number.
-    b : expression, array or number.
-    """
+def _where(condition: Any, a: Any, b: Any) -> Any:
+    """Return a where the condition holds, else b: expressions, arrays or numbers."""
     symbolic = isinstance(condition, ca.SX | ca.MX | ca.DM)
     return ca.if_else(condition, a, b) if symbolic else np.where(condition, a, b)
 
 
-def floor(x: Any) -> Any:
-    """Return the largest whole number that is not above x, entry by entry; exact everywhere.
-
-    x : expression, array or number.
-    """
+def _floor(x: Any) -> Any:
+    """Return the largest whole number that is not above x, entry by entry; exact everywhere."""
     return ca.floor(x) if isinstance(x, ca.SX | ca.MX | ca.DM) else np.floor(x)
 
 
@@ -120,15 +109,12 @@ TURN = 2.0 * math.pi
 
 
 def exp(y: Any) -> Any:
-    """Return e^y, entry by entry.
-
-    y : CasADi expression, array or number.
-    """
-    y = where(y > _EXP_LIMIT, _EXP_LIMIT, y)
-    y = where(y < -_EXP_LIMIT, -_EXP_LIMIT, y)
+    """Return e^y of a CasADi expression, array or number, entry by entry."""
+    y = _where(y > _EXP_LIMIT, _EXP_LIMIT, y)
+    y = _where(y < -_EXP_LIMIT, -_EXP_LIMIT, y)
     t = y * (1.0 / 2**_SQUARINGS)
     s = t * t
-    even, odd = polynomial(PADE[0::2], s), t * polynomial(PADE[1::2], s)
+    even, odd = _polynomial(PADE[0::2], s), t * _polynomial(PADE[1::2], s)
     result = (even + odd) / (even - odd)
     for _ in range(_SQUARINGS):
         result = result * result
@@ -136,22 +122,16 @@ def exp(y: Any) -> Any:
 
 
 def atan(x: Any) -> Any:
-    """Return the arc tangent [rad], entry by entry.
-
-    x : CasADi expression, array or number.
-    """
+    """Return the arc tangent [rad] of a CasADi expression, array or number, entry by entry."""
     steep = x * x > 1.0
-    y = where(steep, -1.0 / where(steep, x, 1.0), x)
+    y = _where(steep, -1.0 / _where(steep, x, 1.0), x)
     s = y * y
-    value = y * polynomial(_ATAN_P, s) / polynomial(_ATAN_Q, s)
-    quarter = where(x > 0.0, 0.5 * math.pi, -0.5 * math.pi)
-    return value + where(steep, quarter, 0.0)
+    value = y * _polynomial(_ATAN_P, s) / _polynomial(_ATAN_Q, s)
+    quarter = _where(x > 0.0, 0.5 * math.pi, -0.5 * math.pi)
+    return value + _where(steep, quarter, 0.0)
 
 
 def sin(x: Any) -> Any:
-    """Return the sine, entry by entry.
-
-    x : CasADi expression, array or number [rad].
-    """
-    y = x - TURN * floor(x * (1.0 / TURN) + 0.5)
-    return y * polynomial(_SIN_S, y * y)
+    """Return the sine of a CasADi expression, array or number [rad], entry by entry."""
+    y = x - TURN * _floor(x * (1.0 / TURN) + 0.5)
+    return y * _polynomial(_SIN_S, y * y)

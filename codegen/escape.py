@@ -36,7 +36,6 @@ def shown(value: Any) -> str:
 
 def c_comment(text: str) -> str:
     """Return text for the inside of a C comment between /* and */, with a blank on either side.
-
     text : any; it can neither end the comment nor seem to begin another.
     """
     inside = visible(text)
@@ -48,7 +47,6 @@ def c_comment(text: str) -> str:
 
 def c_string(text: str) -> str:
     """Return text for the inside of a C string literal, which then holds it in UTF-8.
-
     text : any; halves of surrogate pairs are shown as escapes.
     """
     data = text.encode("utf-8", "backslashreplace")
@@ -60,7 +58,6 @@ def c_string(text: str) -> str:
 
 def cmake_comment(text: str) -> str:
     """Return text for a line comment of CMake, behind the # and a space.
-
     text : any; it stays on its line and begins no bracket.
     """
     return visible(text).replace("[", "(").replace("]", ")")
@@ -68,7 +65,6 @@ def cmake_comment(text: str) -> str:
 
 def markdown(text: str) -> str:
     """Return text for a paragraph or a table of Markdown.
-
     text : any; it is shown as it stands, without marks, links, formulas or HTML.
     """
     return "".join(f"&#{ord(one)};" if one in MARKDOWN else one for one in visible(text))
@@ -76,7 +72,6 @@ def markdown(text: str) -> str:
 
 def html(text: str) -> str:
     """Return text for an element or a quoted attribute of HTML.
-
     text : any; ends of lines stay.
     """
     return standard_html.escape(visible(text, keep="\n"))

@@ -69,7 +69,6 @@ class Graph:
 
     def add(self, node: Node) -> int:
         """Return the place of a node, which is added unless it is there.
-
         node : its `args` are places in this graph.
         """
         place = self._known.setdefault(node, len(self.nodes))
@@ -151,7 +150,6 @@ def _canonical(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
 @contextmanager
 def simplifying(on: bool) -> Iterator[None]:
     """Build SX expressions with or without CasADi's own simplifications, such as c/x for c (1/x).
-
     on : whether CasADi simplifies.
     """
     before = ca.GlobalOptions.getSimplificationOnTheFly()
@@ -211,7 +209,6 @@ def decision(graph: Graph, ports: set[int]) -> int | None:
 
 def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
     """Return the graph where a condition is known; its choices are taken when it is simplified.
-
     holds : whether it holds.
     """
     known = {condition: holds}
@@ -263,7 +260,6 @@ def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function,
 
     It computes the same bits, operation by operation; functions that differ in their constants
     alone become the same function.
-
     port : name of the input that is added, the last; constants (n,) in their order in `function`.
     """
     graph, n_in = graph_of(function), function.n_in()

@@ -36,7 +36,6 @@ class PackageNameError(TireidError, ValueError):
 
 def check_name(name: str, ending: str = "") -> None:
     """Refuse a name that cannot begin the symbols of a C library.
-
     name : in lower case.
     """
     if not NAME.fullmatch(name.removesuffix(ending)):
@@ -54,7 +53,6 @@ def check_name(name: str, ending: str = "") -> None:
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """Return C, or the name of one of its files, with the beginnings of words changed, once.
-
     text : of the repository; `tireid_step`, `TIREID_OK` and `tireid.h` are words with a beginning,
         `tireid` alone is none. So has `test_tireid.c`.
     names : new beginnings by old ones, in lower case; macros get them in upper case.
@@ -67,7 +65,6 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 
 def c_files(folder: Path, places: Mapping[str, str], names: Mapping[str, str]) -> dict[str, str]:
     """Return C files of the repository under the names of a package, by their path in it.
-
     places : their folder in the package by name of the file.
     """
     return {
@@ -101,7 +98,6 @@ def generated(about: Values) -> str:
 
 def in_comment(words: str | Words) -> str:
     """Return words for the inside of a C comment.
-
     words : from data, which are escaped, or a text of ours.
     """
     return c_comment(words.text) if isinstance(words, Words) else words
@@ -109,7 +105,6 @@ def in_comment(words: str | Words) -> str:
 
 def header(file: str, about: str, parts: Iterable[str]) -> str:
     """Return a generated header.
-
     about : comment at its beginning, of lines that are escaped for C.
     """
     guard = re.sub(r"\W", "_", file).upper()
@@ -120,7 +115,6 @@ def header(file: str, about: str, parts: Iterable[str]) -> str:
 
 def precision(prefix: str, *, single: bool) -> str:
     """Return the switch of the precision and the type that it gives.
-
     single : whether float is the default.
     """
     macro = f"{prefix.upper()}_SINGLE"
@@ -133,7 +127,6 @@ def precision(prefix: str, *, single: bool) -> str:
 
 def defines(prefix: str, values: Mapping[str, tuple[object, str]]) -> str:
     """Return macros, one a line.
-
     values : value and comment by the name of the macro, without the prefix.
     """
     return "".join(
@@ -144,7 +137,6 @@ def defines(prefix: str, values: Mapping[str, tuple[object, str]]) -> str:
 
 def rows(table: Array) -> str:
     """Return the rows of a C initializer of doubles, which read back as the same ones.
-
     table : (n, m); NaN is the NAN of <math.h>.
     """
     text = "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
@@ -163,7 +155,6 @@ FUNCTIONS: Mapping[str, tuple[str, str]] = {  # in float and in double
 
 def _own_functions(prefix: str, called: Collection[str]) -> str:
     """Return those of our own functions that are called, each over an array, from one expression.
-
     called : their names, of `OWN`.
     """
     texts = []
@@ -184,7 +175,6 @@ def _entry(_port: int, _entry: int) -> str:
 
 def used_macros(prefix: str, text: str) -> str:
     """Return the definitions of the functions of both precisions that a text calls.
-
     text : in C.
     """
     capital = prefix.upper()
@@ -228,9 +218,7 @@ def cmake(
     files: Iterable[str], about: Values, *, flags: Sequence[str], so_that: str
 ) -> dict[str, str]:
     """Return CMakeLists.txt of a package by its path.
-
-    files : paths of the package; what lies in src/ is the library.
-    about : of `about_package`.
+    files : paths of the package; what lies in src/ is the library.   about : of `about_package`.
     """
     sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
     values = {"sources": "\n".join(f"  {path}" for path in sources), "flags": " ".join(flags)}
@@ -242,13 +230,12 @@ def cmake(
 
 def content_head(form: str, name: str, *, single: bool) -> dict[str, Any]:
     """Return what every manifest begins with.
-
     single : whether float is the default precision.
     """
     return {
         "format": form,
         "name": name,
-        "tireid": tireid_version(),
+        "tireid": _tireid_version(),
         "precision": "float" if single else "double",
     }
 
@@ -256,7 +243,7 @@ def content_head(form: str, name: str, *, single: bool) -> dict[str, Any]:
 def about_package(content: Mapping[str, Any], title: str) -> dict[str, str | Words]:
     """Return what texts say about a package: title, versions, hash, names and precision."""
     name, version, single = content["name"], content["tireid"], content["precision"] == "float"
-    short = digest(content)[:12]
+    short = _digest(content)[:12]
     return {
         "title": Words(title),
         "version": version,
@@ -269,9 +256,8 @@ def about_package(content: Mapping[str, Any], title: str) -> dict[str, str | Wor
     }
 
 
-def digest(content: Any) -> str:
+def _digest(content: Any) -> str:
     """Return the SHA-256 of data as JSON, 64 hexadecimal digits.
-
     content : ready for JSON.
     """
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
@@ -280,21 +266,11 @@ def digest(content: Any) -> str:
 
 def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
     """Return <name>.json.
-
     content : everything that went in, ready for JSON.
     """
     hashes = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
-    data = {**content, "hash": digest(content), "files_sha256": dict(sorted(hashes.items()))}
+    data = {**content, "hash": _digest(content), "files_sha256": dict(sorted(hashes.items()))}
     return json.dumps(data, indent=2) + "\n"
-
-
-def manifest_with_figures(manifest: str, figures: Sequence[Mapping[str, Any]]) -> str:
-    """Return <name>.json with what the package costs; its hashes are of the rest.
-
-    manifest : text of the JSON file.
-    figures : one of each processor and precision, ready for JSON.
-    """
-    return json.dumps({**json.loads(manifest), "figures": list(figures)}, indent=2) + "\n"
 
 
 def plain(value: Any) -> Any:
@@ -314,7 +290,7 @@ def plain(value: Any) -> Any:
             return str(value)
 
 
-def tireid_version() -> str:
+def _tireid_version() -> str:
     """Return the version of tireid."""
     try:
         return version("tireid")

@@ -4,6 +4,7 @@ A recording runs through the package; what comes back is a hash of every state a
 and, from QEMU, what a step costs. QEMU lets one instruction take 1 ns, and SysTick counts.
 """
 
+import json
 import shutil
 import subprocess
 import tempfile
@@ -14,7 +15,7 @@ from typing import Any, NamedTuple
 
 from codegen.compiler import CompilationError
 from codegen.errors import TireidError
-from codegen.package import manifest_with_figures, renamed
+from codegen.package import renamed
 from codegen.writing import write_file
 
 _TARGET = Path(__file__).parent / "target"
@@ -24,7 +25,7 @@ _WRAPPED = tuple(f"-Wl,--wrap=__aeabi_{name}" for name in ("dadd", "dsub", "drsu
 TIMEOUT = 120.0  # s
 
 
-class Processor(NamedTuple):
+class _Processor(NamedTuple):
     """A processor: name, machine of QEMU, flags of the compiler, whether it computes in double."""
 
     name: str
@@ -34,13 +35,13 @@ class Processor(NamedTuple):
 
 
 PROCESSORS = (
-    Processor(
+    _Processor(
         "Cortex-M4F",
         "mps2-an386",
         ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
         False,
     ),
-    Processor(
+    _Processor(
         "Cortex-M7",
         "mps2-an500",
         ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
@@ -51,7 +52,6 @@ PROCESSORS = (
 
 class Program(NamedTuple):
     """A package and what is replayed through it.
-
     name : of the package.   prefix : of its C as it lies in this repository.
     files : its texts by path.   replayed : the `replayed.h` of its kind.
     samples : rows of the inputs in double, as `replayed.h` reads them; None where it reads none.
@@ -68,7 +68,6 @@ class Program(NamedTuple):
 
 class Replay(NamedTuple):
     """What a machine made of a program.
-
     hash : of every state and status.   steps : taken.   faults : steps that were refused.
     state, params, work : sizes [bytes].   stack : of one step [bytes].
     instructions, most_instructions : of a step, mean while driving and largest; 0 where the machine
@@ -106,14 +105,13 @@ def _has_newlib() -> bool:
 
 def replay(
     program: Program,
-    where: Processor | str,
+    where: _Processor | str,
     *,
     single: bool,
     flags: Sequence[str] = FLAGS,
     corrected: bool = False,
 ) -> Replay:
     """Run a program on a processor in QEMU, or on this machine.
-
     where : one of `PROCESSORS`, or the C compiler of this machine.
     single : whether to compute in float.
     corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
@@ -180,18 +178,17 @@ def _result(command: Sequence[str], folder: Path) -> Replay:
     return Replay(hash=found["hash"], **numbers)
 
 
-class Size(NamedTuple):
+class _Size(NamedTuple):
     """Memory of a package itself [bytes]: code and constants, and data that may change."""
 
     flash: int
     static_ram: int
 
 
-def size_on(
-    processor: Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
-) -> Size:
+def _size_on(
+    processor: _Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
+) -> _Size:
     """Return the memory that a package takes on a processor, instances not included.
-
     single : whether to compute in float.
     """
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
@@ -207,7 +204,7 @@ def size_on(
         )
         rows = [line.split() for line in answer.stdout.splitlines()[1:]]
         text, data, bss = (sum(int(row[i]) for row in rows) for i in range(3))
-        return Size(flash=text + data, static_ram=data + bss)
+        return _Size(flash=text + data, static_ram=data + bss)
 
 
 @cache
@@ -222,7 +219,6 @@ def compiler_version(command: str) -> str:
 
 class Cost(NamedTuple):
     """What a package costs on a processor.
-
     compiler : what it says of itself.   flash : code and constants [bytes].
     replay : what a replay tells.
     static_ram : data that may change and is not the caller's [bytes].
@@ -255,12 +251,11 @@ class Cost(NamedTuple):
         )
 
 
-def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
+def cost_on(program: Program, processor: _Processor, *, single: bool) -> Cost:
     """Return what a program costs on a processor.
-
     single : whether to compute in float.
     """
-    size = size_on(processor, program.name, program.files, single=single)
+    size = _size_on(processor, program.name, program.files, single=single)
     run = replay(program, processor, single=single)
     version = compiler_version(CROSS_COMPILER)
     return Cost(processor.name, version, single, size.flash, run, size.static_ram)
@@ -268,7 +263,6 @@ def cost_on(program: Program, processor: Processor, *, single: bool) -> Cost:
 
 def cost_table(costs: Sequence[Cost], about: str) -> str:
     """Return costs as Markdown; a line that they were not measured where there are none.
-
     about : over what instructions and stack were measured, and what else is to be said.
     """
     if not costs:
@@ -293,7 +287,6 @@ def cost_table(costs: Sequence[Cost], about: str) -> str:
 
 def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
     """Return <name>.json with the costs; its hashes are of the rest.
-
     manifest : text of the JSON file.
     """
     figures = [
@@ -313,4 +306,4 @@ def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
         }
         for cost in costs
     ]
-    return manifest_with_figures(manifest, figures)
+    return json.dumps({**json.loads(manifest), "figures": figures}, indent=2) + "\n"

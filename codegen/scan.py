@@ -7,10 +7,11 @@ import ctypes
 import logging
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.compiler import CompilationError, load_library
@@ -63,7 +64,7 @@ _Longs: TypeAlias = "ctypes.Array[ctypes.c_long]"
 _ADDRESSES = ("loop", "layout")  # of a scan, found when they are asked for
 
 
-class Layout(NamedTuple):
+class _Layout(NamedTuple):
     """What is alike in every call of a compiled loop: places and sizes of ports, for C."""
 
     arg_step: _Longs
@@ -72,7 +73,6 @@ class Layout(NamedTuple):
     carry_size: _Longs
     out_res: _Longs
     out_size: _Longs
-    out_sizes: list[int]
     sz_arg: int
     sz_res: int
     sz_iw: int
@@ -81,7 +81,6 @@ class Layout(NamedTuple):
 
 class Scan:
     """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
-
     step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
         of the same shape. Its name becomes part of a C identifier.
     over : inputs with one row a sample. Every other input is constant.
@@ -124,6 +123,11 @@ class Scan:
         self._size_in = {p: step.size_in(p) for p in names_in}
         self._size_out = {p: step.size_out(p) for p in names_out}
 
+    def zeros(self) -> dict[str, Array]:
+        """Return zeros of every carried port, in its shape."""
+        sizes = {port: self._size_in[port] for port in self.carry}
+        return {p: np.zeros(n if m == 1 else (n, m)) for p, (n, m) in sizes.items()}
+
     def __getstate__(self) -> dict[str, object]:
         """Return what it is made of: what points into this process is loaded anew in another."""
         return {name: value for name, value in vars(self).items() if name not in _ADDRESSES}
@@ -144,20 +148,18 @@ class Scan:
         return None if library is None else library[f"{name}_scan"]
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> _Layout:
         """Places and sizes of the ports, as the loop wants them."""
         step = self.step
         names_in, names_out = list(self._size_in), list(self._size_out)
-        out_sizes = [step.numel_out(p) for p in self.outputs]
         strides = [step.numel_in(p) if p in self.over else 0 for p in names_in]
-        return Layout(
+        return _Layout(
             arg_step=_longs([*strides, -1]),
             carry_arg=_longs([names_in.index(p) for p in self.carry]),
             carry_res=_longs([names_out.index(f"{p}_next") for p in self.carry]),
             carry_size=_longs([step.numel_in(p) for p in self.carry]),
             out_res=_longs([names_out.index(p) for p in self.outputs]),
-            out_size=_longs(out_sizes),
-            out_sizes=out_sizes,
+            out_size=_longs([step.numel_out(p) for p in self.outputs]),
             sz_arg=max(step.sz_arg(), len(names_in)),
             sz_res=max(step.sz_res(), len(names_out)),
             sz_iw=max(step.sz_iw(), 1),
@@ -173,7 +175,6 @@ class Scan:
         ports: Collection[str] | None = None,
     ) -> dict[str, Array]:
         """Run `n` samples.
-
         n : number of samples.
         values : one array for every input of the step: carried ports their start, ports of `over`
             one row a sample (n, size), constants their value. Matrices have the port's shape.
@@ -206,7 +207,6 @@ class Scan:
 
     def packed(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
         """Check shapes; flatten matrices by columns, as CasADi stores them.
-
         n : number of samples.
         """
         if values.keys() != self._size_in.keys():
@@ -237,15 +237,15 @@ class Scan:
 
     def _shape_all(self, record: dict[str, Array], last: dict[str, Array]) -> dict[str, Array]:
         """Return records, of carried ports with a row after the last, in the shapes of ports."""
-        found = {f"{p}_final": shaped(flat, self._size_in[p]) for p, flat in last.items()}
+        found = {f"{p}_final": _shaped(flat, self._size_in[p]) for p, flat in last.items()}
         for port, flat in record.items():
             if port in self.carry:
                 flat[-1] = last[port]
-                everything = shaped(flat, self._size_in[port])
+                everything = _shaped(flat, self._size_in[port])
                 found[f"{port}_all"] = everything
                 found[port] = everything[:-1]
             else:
-                found[port] = shaped(flat, self._size_out[port])
+                found[port] = _shaped(flat, self._size_out[port])
         return found
 
     def _run_compiled(
@@ -256,48 +256,61 @@ class Scan:
         every: int,
         recorded: Collection[str],
     ) -> dict[str, Array]:
-        layout, n_rows = self.layout, -(-n // every)
+        n_rows = -(-n // every)
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
         record = {
             p: np.empty((n_rows + 1, a.size))
             for p, a in zip(self.carry, now, strict=True)
             if p in recorded
-        } | {
-            p: np.empty((n_rows, size))
-            for p, size in zip(self.outputs, layout.out_sizes, strict=True)
-            if p in recorded
-        }
-        scratch = [np.empty(size) for size in layout.out_sizes]
-        arrays = [packed[p] for p in self._size_in]
-        integer_work, work = np.empty(layout.sz_iw, dtype=np.int64), np.empty(layout.sz_w)
-        now_pointers, next_pointers = pointers(now), pointers(following)
-        failed = loop(
+        } | {p: np.empty((n_rows, self.step.numel_out(p))) for p in self.outputs if p in recorded}
+        scratch = [np.empty(self.step.numel_out(p)) for p in self.outputs]
+        arguments, kept = self.arguments(n, every, packed, now, following, scratch, record)
+        failed = loop(*arguments)
+        del kept  # which the loop alone knows
+        if failed:
+            raise RuntimeError(f"{self.step.name()} reported a failure")
+        last = dict(zip(self.carry, following if n % 2 else now, strict=True))
+        return self._shape_all(record, last)
+
+    def arguments(
+        self,
+        n: int,
+        every: int,
+        packed: Mapping[str, Array],
+        now: Sequence[Array],
+        following: Sequence[Array],
+        scratch: Sequence[Array],
+        record: Mapping[str, Array],
+    ) -> tuple[list[object], list[NDArray[Any]]]:
+        """Return the arguments of the compiled loop, and what must live as long as these.
+        now, following : of carried ports, before and after a sample.   scratch : of the outputs.
+        record : of ports that are recorded.
+        """
+        layout = self.layout
+        kept: list[NDArray[Any]] = [np.empty(layout.sz_iw, dtype=np.int64), np.empty(layout.sz_w)]
+        arguments: list[object] = [
             ctypes.c_long(n),
             ctypes.c_long(every),
-            pointers(arrays),
+            _pointers([packed[port] for port in self._size_in]),
             layout.arg_step,
             ctypes.c_long(len(self.carry)),
             layout.carry_arg,
             layout.carry_res,
             layout.carry_size,
-            now_pointers,
-            next_pointers,
-            pointers([record.get(p) for p in self.carry]),
+            _pointers(now),
+            _pointers(following),
+            _pointers([record.get(port) for port in self.carry]),
             ctypes.c_long(len(self.outputs)),
             layout.out_res,
             layout.out_size,
-            pointers([record.get(p) for p in self.outputs]),
-            pointers(scratch),
+            _pointers([record.get(port) for port in self.outputs]),
+            _pointers(scratch),
             (ctypes.c_void_p * layout.sz_arg)(),
             (ctypes.c_void_p * layout.sz_res)(),
-            integer_work.ctypes.data_as(ctypes.c_void_p),
-            work.ctypes.data_as(ctypes.c_void_p),
-        )
-        if failed:
-            raise RuntimeError(f"{self.step.name()} reported a failure")
-        last = dict(zip(self.carry, following if n % 2 else now, strict=True))
-        return self._shape_all(record, last)
+            *(one.ctypes.data_as(ctypes.c_void_p) for one in kept),
+        ]
+        return arguments, kept
 
     def _run_virtual_machine(
         self, n: int, packed: dict[str, Array], every: int, recorded: Collection[str]
@@ -333,20 +346,17 @@ class Scan:
         return self._shape_all(record, last)
 
 
-def pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
+def _pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
     """Return where arrays begin, as C wants it.
-
     arrays : contiguous; the caller keeps them alive. None is nowhere.
     """
     places = (None if a is None else a.ctypes.data for a in arrays)
     return (ctypes.c_void_p * max(len(arrays), 1))(*places)
 
 
-def shaped(flat: Array, size: tuple[int, int]) -> Array:
+def _shaped(flat: Array, size: tuple[int, int]) -> Array:
     """Return rows of column-major numbers in their matrix shape; column vectors stay flat.
-
-    flat : numbers (..., rows columns).
-    size : rows and columns of the port.
+    flat : numbers (..., rows columns).   size : rows and columns of the port.
     """
     rows, columns = size
     if columns == 1:
@@ -370,7 +380,6 @@ class Stepper:
     Attributes `inputs` and `outputs` hold one array a port, always the same ones: of the ports of
     `over`, flat (size,) or, of several samples at once, one row a sample; and of the outputs that
     are not carried, those of the last sample, flat. Matrices lie by columns.
-
     values : start of the carried ports and the constants, by name.
     """
 
@@ -388,35 +397,11 @@ class Stepper:
         self._before = {port: np.empty_like(array) for port, array in self._now.items()}
         self._loop = scan.loop
         if self._loop is not None:
-            self._arguments = self._laid_out(packed)
-
-    def _laid_out(self, packed: dict[str, Array]) -> list[object]:
-        """Return the arguments of the loop, which records nothing and swaps the carried arrays."""
-        scan, layout = self._scan, self._scan.layout
-        self._kept = [*packed.values(), work := np.empty(layout.sz_w)]  # that only the loop knows
-        self._integer_work = np.empty(layout.sz_iw, dtype=np.int64)
-        return [
-            ctypes.c_long(self._samples),
-            ctypes.c_long(self._samples),
-            pointers([packed[port] for port in scan.step.name_in()]),
-            layout.arg_step,
-            ctypes.c_long(len(scan.carry)),
-            layout.carry_arg,
-            layout.carry_res,
-            layout.carry_size,
-            pointers(list(self._now.values())),
-            pointers(list(self._before.values())),
-            pointers([None] * len(scan.carry)),
-            ctypes.c_long(len(scan.outputs)),
-            layout.out_res,
-            layout.out_size,
-            pointers([None] * len(scan.outputs)),
-            pointers(list(self.outputs.values())),
-            (ctypes.c_void_p * layout.sz_arg)(),
-            (ctypes.c_void_p * layout.sz_res)(),
-            self._integer_work.ctypes.data_as(ctypes.c_void_p),
-            work.ctypes.data_as(ctypes.c_void_p),
-        ]
+            now, before, out = (
+                list(one.values()) for one in (self._now, self._before, self.outputs)
+            )
+            self._arguments, kept = scan.arguments(samples, samples, packed, now, before, out, {})
+            self._kept = [*packed.values(), *kept]  # that only the loop knows
 
     def advance(self) -> None:
         """Take the samples that `inputs` holds; leave what the last one tells in `outputs`."""
@@ -439,14 +424,13 @@ class Stepper:
 
     def begin(self, port: str, value: Array) -> None:
         """Go on from another value of a carried port.
-
         value : (rows, columns) of the port, flat where it is a column.
         """
         self._now[port][:] = np.ravel(value, order="F")
 
     def before(self, port: str) -> Array:
         """Return the value of one carried port before the last sample, in its shape; a copy."""
-        return shaped(self._before[port], self._sizes[port]).copy()
+        return _shaped(self._before[port], self._sizes[port]).copy()
 
     def state(self) -> dict[str, Array]:
         """Return the carried values in effect, by port, in their shapes; copies."""
@@ -454,4 +438,4 @@ class Stepper:
 
     def value(self, port: str) -> Array:
         """Return the value of one carried port in effect, in its shape; a copy."""
-        return shaped(self._now[port], self._sizes[port]).copy()
+        return _shaped(self._now[port], self._sizes[port]).copy()

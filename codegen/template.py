@@ -17,7 +17,6 @@ LANGUAGES: Mapping[str, Callable[[str], str]] = {  # by the ending of the templa
 @dataclass(frozen=True, slots=True)
 class Words:
     """Words from data, such as the name of a car: no text of any language.
-
     text : any; a template takes it into comments and prose, escaped for its language.
     """
 
@@ -29,7 +28,6 @@ Values = Mapping[str, str | Words]
 
 def filled(template: Path, values: Values) -> str:
     """Return a template with every `@key@` replaced, once.
-
     template : a file; its ending tells the language.
     values : by key: text of that language, or `Words`, which are escaped for it.
     """

@@ -15,7 +15,6 @@ KEPT = 16  # functions whose forms are kept: who exports again often asks for th
 
 class Tuned(NamedTuple):
     """A function in the form in which it is exported; all have the ports of the original.
-
     function : everything; it equals the original up to rounding, and the C to the last bit.
     condition : 1 where `where_true` holds, else 0; it reads the sampled ports only.
     where_true, where_false : what `function` returns in either case; the second is None where
@@ -30,7 +29,6 @@ class Tuned(NamedTuple):
 
 def tuned(function: ca.Function, *, sampled: tuple[str, ...]) -> Tuned:
     """Return a function with our own tanh, exp and atan and without needless operations.
-
     sampled : inputs that may decide which part of the function is computed.
     """
     return _tuned(function.serialize(), sampled)

@@ -20,7 +20,6 @@ def naming(path: str | PathLike[str]) -> Iterator[None]:
 
 def write_file(path: Path, content: str | bytes) -> None:
     """Write a file.
-
     content : all of it, text in UTF-8 with line ends as they are.
     """
     with naming(path):

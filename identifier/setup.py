@@ -150,9 +150,33 @@ class Setup(NamedTuple):
         v_y = math.nan if recording.v_y is None else recording.v_y[0]
         return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
-    def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
-        judges = judges_samples(self.carry)
-        return shown(recording, self.scan.over, rest=self.rest, judges=judges, part=part)
+    def shown(self, recording: Recording, part: slice = ALL) -> "_Shown":
+        """Return a recording as the step is shown it: before each segment but the first it rests.
+
+        A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
+        that no difference over the gap is ever taken for one over a sampling interval.
+        part : samples that are shown; a segment that begins with the first of them has its rest.
+        """
+        first, last, _ = part.indices(len(recording))
+        v_x, n = recording.v_x[part], last - first
+        v_y, a_y = (
+            np.full(n, np.nan) if signal is None else signal[part]
+            for signal in (recording.v_y, recording.a_y)
+        )
+        signals = {
+            "x": np.column_stack([v_y, recording.r[part]]),
+            "u": np.column_stack([recording.delta_f[part], recording.delta_r[part]]),
+            "v_x": v_x,
+            "a_y": a_y,
+        }
+        breaks = [k - first for k in recording.breaks if first <= k < last]
+        if not breaks:
+            return _Shown({port: signals[port] for port in self.scan.over}, n, None)
+        rows, resting, at = with_rests(n, breaks, self.rest)
+        padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
+        padded["v_x"][resting] = NOWHERE if judges_samples(self.carry) else 0.0
+        padded["a_y"][resting] = np.nan
+        return _Shown({port: padded[port] for port in self.scan.over}, rows.size, at)
 
 
 class Block(NamedTuple):
@@ -171,10 +195,10 @@ class Block(NamedTuple):
     @property
     def before(self) -> Mapping[str, Array]:
         """Carried values in effect at each sample, by port, (k, ...)."""
-        return Before(self.state)
+        return _Before(self.state)
 
 
-class Before(Mapping[str, Array]):
+class _Before(Mapping[str, Array]):
     """Carried values in effect at each sample, of those that have a row after the last.
     state : by port (k + 1, ...).
     """
@@ -193,7 +217,7 @@ class Before(Mapping[str, Array]):
         return len(self._state)
 
 
-class Shown(NamedTuple):
+class _Shown(NamedTuple):
     """What a step is shown of a part of a recording: samples, and rests between its segments.
     signals : by port of `over`, (N, ...).   samples : N, rests included.
     at : which of these each sample of the part is (n,); None where there is no rest.
@@ -203,14 +227,6 @@ class Shown(NamedTuple):
     samples: int
     at: NDArray[np.intp] | None
 
-    def place(self, k: int) -> int:
-        """Return which of what is shown a sample of the part is.
-        k : from 0 to n, that after the last.
-        """
-        if self.at is None:
-            return k
-        return int(self.at[k]) if k < self.at.size else self.samples
-
     def of_recording(self, values: Array) -> Array:
         """Return what was recorded at the samples of the part, without rests.
         values : of all that was shown, (N, ...) or (N + 1, ...) with that after the last.
@@ -219,47 +235,3 @@ class Shown(NamedTuple):
             return values
         after = len(values) == self.samples + 1
         return values[np.append(self.at, self.samples) if after else self.at]
-
-    def with_rests(self, values: Array) -> Array:
-        """Return values of the part's samples with zeros at rests, (N, ...).
-        values : (n, ...).
-        """
-        if self.at is None:
-            return values
-        padded = np.zeros((self.samples, *values.shape[1:]))
-        padded[self.at] = values
-        return padded
-
-
-def shown(
-    recording: Recording, over: Iterable[str], *, rest: int, judges: bool, part: slice = ALL
-) -> Shown:
-    """Return a recording as a step is shown it: before each segment but the first it rests.
-
-    A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
-    that no difference over the gap is ever taken for one over a sampling interval.
-    over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
-        there is none.
-    judges : whether the step judges samples itself.
-    part : samples that are shown; a segment that begins with the first of them has its rest.
-    """
-    first, last, _ = part.indices(len(recording))
-    v_x, n = recording.v_x[part], last - first
-    v_y, a_y = (
-        np.full(n, np.nan) if signal is None else signal[part]
-        for signal in (recording.v_y, recording.a_y)
-    )
-    signals = {
-        "x": np.column_stack([v_y, recording.r[part]]),
-        "u": np.column_stack([recording.delta_f[part], recording.delta_r[part]]),
-        "v_x": v_x,
-        "a_y": a_y,
-    }
-    breaks = [k - first for k in recording.breaks if first <= k < last]
-    if not breaks:
-        return Shown({port: signals[port] for port in over}, n, None)
-    rows, resting, at = with_rests(n, breaks, rest)
-    padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
-    padded["v_x"][resting] = NOWHERE if judges else 0.0
-    padded["a_y"][resting] = np.nan
-    return Shown({port: padded[port] for port in over}, rows.size, at)

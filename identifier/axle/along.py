@@ -16,9 +16,9 @@ the signs of g_k.
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
-import casadi as ca
 import numpy as np
 
+from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.certificate import Design, corners, curve_facts, jump_by_learning
 from identifier.axle.covariance import unpacked
@@ -39,7 +39,7 @@ TINY = 1e-30  # keeps a quotient finite
 ROUNDING = 1e-9  # of a bound
 
 
-class Learner(Design, Protocol):
+class _Learner(Design, Protocol):
     """What of an `AxleIdentifier` a run is certified with."""
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
@@ -51,7 +51,6 @@ class Learner(Design, Protocol):
 
 class Lessons(NamedTuple):
     """What N samples taught, rows front and rear, as of `identifier.axle.step.build_lesson`.
-
     theta : parameters before each sample and after the last (N + 1, 2, q).
     moved : m, what learning does not explain (N, 2, q).
     begin : covariance of the parameters before the first sample (2, q, q).
@@ -74,7 +73,6 @@ class Lessons(NamedTuple):
 
 class Adjoint(NamedTuple):
     """What reaches the force of an axle at m slips, static axle loads, rows front and rear.
-
     begin : p_0, of the first error of the parameters (2, m, q).   moved : M (2, m).
     g : of the error of y at each sample (N, 2, m).
     """
@@ -84,16 +82,19 @@ class Adjoint(NamedTuple):
     g: Array
 
 
-def lessons(design: Learner, history: Run) -> Lessons:
+def lessons(design: _Learner, history: Run) -> Lessons:
     """Return what the samples of a run taught; of a long one those at its end."""
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
     step = build_lesson(doublings(design.ladder), pressed=pressed)
-    parts, theta, begin = [], [], []
+    over = tuple(port for port in step.name_in() if port not in setup.constants)
+    scan, parts, theta, begin = Scan(step, carry=(), over=over), [], [], []
+    constants = {port: setup.constants[port] for port in scan.constants}
     for block in history.blocks(np.arange(max(n - MOST, 0), n)):
         seen = setup.shown(history.recording, block.part)
         signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
-        parts.append(_taught(step, {**setup.constants, **block.before, **signals}, setup.constants))
+        sampled = {port: _by_columns({**block.before, **signals}[port]) for port in over}
+        parts.append(scan(len(sampled["v_x"]), {**constants, **sampled}))
         theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
         begin.append(block.state["UD"][0])
     h, e, counts, gains, declared = (
@@ -105,39 +106,14 @@ def lessons(design: Learner, history: Run) -> Lessons:
     return Lessons(h, e, counts, gains, declared, path, path[1:] - learnt, P)
 
 
-def _taught(
-    step: ca.Function, values: Mapping[str, Array], constants: Mapping[str, Array]
-) -> dict[str, Array]:
-    """Return the outputs of `build_lesson` for N samples, (N, ...).
-
-    Parameters
-    ----------
-    values : of its ports, (N, ...) but for the constants.
-    """
-    N, names = len(values["v_x"]), step.name_in()
-    alike = [i for i, name in enumerate(names) if name in constants]
-    declared = []
-    for name in names:
-        value, (rows, columns) = np.asarray(values[name]), step.size_in(name)
-        if name not in constants:
-            value = value.reshape(N, rows, columns).transpose(1, 0, 2).reshape(rows, -1)
-        declared.append(value)
-    found = step.map("lessons", "serial", N, alike, [])(*declared)
-    return {name: _by_sample(np.array(value), N) for name, value in zip(LESSON, found, strict=True)}
-
-
-def _by_sample(value: Array, N: int) -> Array:
-    """Return (N, rows, columns) of values side by side (rows, N columns); (N, rows) of columns."""
-    rows, columns = value.shape[0], value.shape[1] // N
-    apart = value.reshape(rows, N, columns).transpose(1, 0, 2)
-    return apart[:, :, 0] if columns == 1 else apart
+def _by_columns(values: Array) -> Array:
+    """Return values of samples (N, ...) as rows (N, k), matrices by columns."""
+    apart = values.swapaxes(1, 2) if values.ndim == 3 else values
+    return apart.reshape(len(values), -1)
 
 
 def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint:
     """Return what reaches the force of each axle after a drive, from its end to its beginning.
-
-    Parameters
-    ----------
     slips : at which the force is looked at, of each axle (2, m) [rad].
     ladder : slip scales of the units [rad].
     """
@@ -154,7 +130,7 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
     return Adjoint(p, moved, g)
 
 
-def certified_along(design: Learner, history: Run) -> tuple[Property, ...]:
+def certified_along(design: _Learner, history: Run) -> tuple[Property, ...]:
     """Return what is proven of the curves that a drive taught."""
     model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
     taught = lessons(design, history)
@@ -186,12 +162,8 @@ def _of_axle(
     i: int, model: AxleModel, taught: Lessons, reach: Adjoint, slips: Array, box: Array
 ) -> tuple[Property, ...]:
     """Return what is proven of the curve of axle i.
-
-    Parameters
-    ----------
     reach : of errors, at the slips of both axles (2, m).
-    slips : [rad], up to the range that is known (m,).
-    box : corners of the set of weights (k, n).
+    slips : [rad], up to the range that is known (m,).   box : corners of the set of weights (k, n).
     """
     axle, known = AXLES[i], float(model.known_slip[i])
     facts = curve_facts(model.W[i : i + 1], model.ladder, max(known, SMALLEST))
@@ -257,9 +229,6 @@ def _of_axle(
 
 def begin_error(taught: Lessons, reach: Adjoint) -> Array:
     """Return the force error that the beginning leaves, within `BEGIN` deviations (2, m).
-
-    Parameters
-    ----------
     reach : of errors, at m slips.
     """
     variance = np.einsum("ami,aij,amj->am", reach.begin, taught.begin, reach.begin)

@@ -44,9 +44,6 @@ class BandNumbers(NamedTuple):
 
 def band_numbers(calibration: BandCalibration, froude_speed: float) -> BandNumbers:
     """Return the numbers of a step.
-
-    Parameters
-    ----------
     froude_speed : sqrt(g L) [m/s].
     """
     return BandNumbers(
@@ -62,23 +59,15 @@ def hinges(values: Array, at: Sequence[float]) -> Array:
     """Return [value at the first center, changes of slope at each but the last], (2, k).
 
     What is straight between centers is a sum of hinges: no table is searched.
-
-    Parameters
-    ----------
-    values : at the centers (2, k).
-    at : the centers (k,).
+    values : at the centers (2, k).   at : the centers (k,).
     """
     slopes = np.diff(values, axis=1) / np.diff(np.array(at))
     return np.column_stack([values[:, 0], np.diff(slopes, axis=1, prepend=0.0)])
 
 
-def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
+def _hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
     """Return what `hinges` describe, level beyond the last center.
-
-    Parameters
-    ----------
-    numbers : of an axle, k entries.
-    at : the centers (k,).
+    numbers : of an axle, k entries.   at : the centers (k,).
     """
     x, value = smaller(x, at[-1]), numbers[0]
     for change, begin in zip(numbers[1:], at[:-1], strict=True):
@@ -88,7 +77,6 @@ def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
 
 class AtSample(NamedTuple):
     """An axle at a sample.
-
     units : t, n entries.   slope : φ' [1/rad].   force : φ [static axle loads].   slip : |x| [rad].
     per_v_x : 1/v_x [s/m].   e : of the lag.   by_offset : of slip to its zero, 1 or 1/v_x.
     """
@@ -111,9 +99,6 @@ def half_band(
     speeds: list[Any],
 ) -> Any:
     """Return half the width of the band of an axle [static axle loads].
-
-    Parameters
-    ----------
     at : the axle at the sample.
     P, prior : factors of the covariance now and before the first sample.
     """
@@ -126,8 +111,8 @@ def half_band(
     stretch = within(numbers.speed * at.per_v_x, *STRETCH)
     total = ((RELATIVE * at.force) ** 2 + FLOOR**2) * stretch**2 + left
     unknown = smaller(left * per_before / UNKNOWN**2, 1)
-    factor = hinged(slips, CENTERS, at.slip)
-    factor = factor * hinged(speeds, AT_SPEEDS, numbers.per_froude * reciprocal(at.per_v_x))
+    factor = _hinged(slips, CENTERS, at.slip)
+    factor = factor * _hinged(speeds, AT_SPEEDS, numbers.per_froude * reciprocal(at.per_v_x))
     narrow, wide = factor**2, larger(factor, 1) ** 2
     slip_noise = numbers.sideways * at.per_v_x**2 + numbers.steering
     passed = at.slope**2 * slip_noise * (1 - at.e) * reciprocal(1 + at.e)

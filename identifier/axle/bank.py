@@ -33,16 +33,12 @@ UNPROVEN = 0.5  # of the force that teaches curves: the most that an unproven ch
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadSlope:
     """What of the difference between accelerometer and motion is a road that is not level.
-
-    Parameters
-    ----------
     time : τ of its mean [s].
-    level : sine of an angle by which the sensor may be off level [-]; from twice that on it is
-        a bank, in full.
-    roll : ρ, of the body [rad per g], outwards.
-    most : sine of the steepest road [-].
-    step : largest difference from the mean that counts in full [-]: roads bend slowly, and what
-        is more is a sensor that fails.
+    level : sine of an angle by which the sensor may be off level [-]; from twice that on it is a
+        bank, in full.
+    roll : ρ, of the body [rad per g], outwards.   most : sine of the steepest road [-].
+    step : largest difference from the mean that counts in full [-]: roads bend slowly, and what is
+        more is a sensor that fails.
     largest : acceleration that no car has [m/s²]; what is not below it, as NaN, is absent.
     share : of the fast motion that the channel may miss [-].
     doubt : what it may miss beside, noise and the changes of the road [-].
@@ -64,9 +60,6 @@ class RoadSlope:
 
     def at(self, dt: float) -> "SlopeNumbers":
         """Return the numbers of a step.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         return SlopeNumbers(
@@ -117,11 +110,7 @@ def slope_step(
     learns: Any,
 ) -> Any:
     """Return the state after the sample, (4,).
-
-    Parameters
-    ----------
-    a_y : of the accelerometer [m/s²], or NaN.
-    motion : m = L(dv_y/dt + v_x r)/g [-].
+    a_y : of the accelerometer [m/s²], or NaN.   motion : m = L(dv_y/dt + v_x r)/g [-].
     on : 1 where the car drives, else 0; at rest all stays as it is.
     """
     there = ca.fabs(a_y) < numbers.largest
@@ -141,9 +130,6 @@ def slope_step(
 
 def road_push(numbers: SlopeNumbers, state: SlopeState, offsets_alone: Any) -> Any:
     """Return what the road pushes to the left [weights], 0 where nothing tells it.
-
-    Parameters
-    ----------
     offsets_alone : force that teaches the sensors' offsets alone, the most that is believed of a
         channel that has not explained any motion yet [weights].
     """

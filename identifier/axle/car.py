@@ -5,7 +5,9 @@ Rows are axles, front and rear.   F_z = m g l_o/L: static load [N], l_o distance
 dξ_i/dt = φ_i cos δ_i - v_x r/g exactly: one axle, one equation, no stiffness in it.
 """
 
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import is_dataclass
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -16,7 +18,6 @@ from models.vehicle import GRAVITY, Vehicle
 
 class Car(NamedTuple):
     """Columns (2, 1), numbers or symbols: front and rear.
-
     arm : l_f and -l_r [m].   share : of the weight on the axle [-].
     inertia : ±I_z/(L F_z) [s²/rad].   load : F_z [N].
     """
@@ -38,11 +39,7 @@ def car_numbers(vehicle: Vehicle) -> Array:
 
 def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
     """Return ξ [s], (2,).
-
-    Parameters
-    ----------
-    v_y : lateral velocity [m/s].
-    r : yaw rate [rad/s].
+    v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
     """
     return v_y / GRAVITY + car.inertia * r
 
@@ -53,9 +50,6 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
 
 def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
     """Return the constant that a step of a car with downforce has beside; {} of one without.
-
-    Parameters
-    ----------
     vehicle : the car; `downforce` holds its κ (2,) [s²/m²].
     """
     return {"downforce": np.array(vehicle.downforce)} if vehicle.has_downforce else {}
@@ -65,19 +59,36 @@ def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
 #
 # Numbers are computed once in Python and read by name in the equations, where they are symbols.
 
-Record = TypeVar("Record", bound=tuple[Any, ...])
+
+def symbols(**shapes: Any) -> tuple[dict[str, Any], SimpleNamespace]:
+    """Return the symbols of a step by port, in order, and its numbers by the name of the port.
+    shapes : of each port its rows, or (rows, columns); a NamedTuple or dataclass in place of a
+        length says what is in the vector, or in the columns: these are the numbers of the port.
+    """
+    ports: dict[str, Any] = {}
+    numbers: dict[str, Any] = {}
+    for name, shape in shapes.items():
+        rows, last = shape if isinstance(shape, tuple) else (None, shape)
+        fields: tuple[str, ...] = ()
+        if not isinstance(last, int):
+            fields = tuple(last.__dataclass_fields__) if is_dataclass(last) else last._fields
+        k = len(fields) or last
+        port = ca.SX.sym(name, k) if rows is None else ca.SX.sym(name, rows, k)
+        ports[name] = numbers[name] = port
+        if fields:
+            split = ca.vertsplit(port) if rows is None else ca.horzsplit(port)
+            named = dict(zip(fields, split, strict=True))
+            numbers[name] = SimpleNamespace(**named) if is_dataclass(last) else last(**named)
+    return ports, SimpleNamespace(**numbers)
 
 
-def named_port(kind: type[Record], name: str) -> tuple[Any, Record]:
-    """Return a symbol (k,) and its k numbers by name."""
-    port = ca.SX.sym(name, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
-    return port, kind(*ca.vertsplit(port))
-
-
-def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
-    """Return a symbol (2, k), rows front and rear, and its k columns (2, 1) by name."""
-    port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
-    return port, kind(*ca.horzsplit(port))
+def step_function(
+    name: str, ports: dict[str, Any], carried: dict[str, Any], outputs: dict[str, Any]
+) -> ca.Function:
+    """Return a step: what it carries comes out as `port_next`, before its outputs."""
+    out = {f"{port}_next": value for port, value in carried.items()} | outputs
+    given, found = list(ports.values()), list(out.values())
+    return ca.Function(name, given, found, list(ports), list(out), {"cse": True})
 
 
 # Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.
@@ -87,9 +98,6 @@ def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
 
 def larger(a: Any, b: Any) -> Any:
     """Return the larger of two, where neither is NaN.
-
-    Parameters
-    ----------
     b : expression of the same shape, or a number.
     """
     return ca.if_else(a > b, a, b)
@@ -97,9 +105,6 @@ def larger(a: Any, b: Any) -> Any:
 
 def smaller(a: Any, b: Any) -> Any:
     """Return the smaller of two, where neither is NaN.
-
-    Parameters
-    ----------
     b : expression of the same shape, or a number.
     """
     return ca.if_else(a < b, a, b)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
+from identifier.axle.curve import unit_slopes
 from identifier.axle.learning import (
     FLOAT,
     LEAN,
@@ -27,7 +28,6 @@ from identifier.axle.learning import (
     Bounds,
     Regression,
     RoadChange,
-    unit_slopes,
 )
 from identifier.axle.prior import Prior
 from identifier.certificate import Property, at_least, at_most, statement
@@ -77,9 +77,6 @@ class Design(Protocol):
 @cache
 def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | None) -> Array:
     """Return the corners of the set that weights are kept in, (k, n) [static axle loads].
-
-    Parameters
-    ----------
     ladder : slip scales of the units [rad].
     rising_until : as of `AxleIdentifier`; None bounds no slope.
     """
@@ -87,7 +84,7 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
     slabs = [(np.ones(n), (bounds.least_grip, bounds.most_grip))]
     if rising_until is not None:
         least = 0.0 if rising_until else bounds.least_stiffness
-        slabs.append((unit_slopes(ladder, rising_until), (least, bounds.most_stiffness)))
+        slabs.append((unit_slopes(rising_until, ladder), (least, bounds.most_stiffness)))
     found = []
     for active in range(len(slabs) + 1):
         for chosen in combinations(slabs, active):
@@ -113,9 +110,8 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
     return points[inside]
 
 
-class CurveFacts(NamedTuple):
+class _CurveFacts(NamedTuple):
     """What holds of force curves on slips from 0 to `until`, proven cell by cell.
-
     opposes_until, rises_until : slip up to which φ/x and φ' are positive for certain [rad].
     flattest, steepest : secants φ/x lie between them [static axle loads/rad].
     """
@@ -133,22 +129,18 @@ def _cells(until: float) -> Array:
     return np.concatenate([[0.0], narrow])
 
 
-def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts:
+def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFacts:
     """Return what holds of every curve of a set.
 
     On a cell from a to b a falling function s of a unit is between s(b) and s(a), so that
     Σ w_j s_j is at least Σ_(w>0) w_j s_j(b) + Σ_(w<0) w_j s_j(a).
-
-    Parameters
-    ----------
-    W : weights of the curves (k, n) [static axle loads].
-    ladder : slip scales of the units [rad].
+    W : weights of the curves (k, n) [static axle loads].   ladder : slip scales of the units [rad].
     until : largest slip [rad].
     """
     edges = _cells(until)
     scales = np.array(ladder)
     at = edges[:, None] / scales
-    slopes = 1.0 / (scales * np.cosh(np.minimum(at, 300.0)) ** 2)
+    slopes = unit_slopes(edges, ladder)
     with np.errstate(invalid="ignore", divide="ignore"):
         secants = np.where(at > 0.0, np.tanh(at) / edges[:, None], 1.0 / scales)
     up, down = np.maximum(W, 0.0).T, np.minimum(W, 0.0).T
@@ -157,7 +149,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts
         return np.asarray((s[1:] @ up + s[:-1] @ down).min(axis=1))
 
     rising, opposing = least(slopes) > 0.0, least(secants)
-    return CurveFacts(
+    return _CurveFacts(
         until=until,
         opposes_until=_first(edges, opposing > 0.0),
         rises_until=_first(edges, rising),
@@ -171,13 +163,9 @@ def _first(edges: Array, good: NDArray[np.bool_]) -> float:
     return float(edges[-1] if good.all() else edges[int(np.argmin(good))])
 
 
-def widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
+def _widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
     """Return by how much two curves of a set may differ at one slip [static axle loads].
-
-    Parameters
-    ----------
-    W : corners of the set (k, n).
-    ladder : slip scales of the units [rad].
+    W : corners of the set (k, n).   ladder : slip scales of the units [rad].
     until : largest slip [rad].
     """
     units = np.tanh(_cells(until)[:, None] / np.array(ladder))
@@ -190,9 +178,6 @@ def widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionDrop:
     """A drop of friction in a steady corner, for which the time to follow it is proven.
-
-    Parameters
-    ----------
     to : friction after it over that before [-].
     left : share of the change that may still be missing when it counts as followed [-].
     seen : least |φ - x φ'| of the regressor: what a change of ln μ makes [static axle loads].
@@ -217,11 +202,7 @@ class FrictionDrop:
         least, are given the largest and are cut; what is then believed takes that off the error.
         That is of errors that are one change of ln μ at both axles, but for `RoadChange.explains`
         of their squares. inf where it does not end within a minute.
-
-        Parameters
-        ----------
-        friction : before the drop [-].
-        v_x : speed [m/s].
+        friction : before the drop [-].   v_x : speed [m/s].
         """
         r, dt = design.regression, design.dt
         at = design.change.at(dt, r.rate)
@@ -253,7 +234,7 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     b, dt = design.bounds, design.dt
     set_ = corners(b, design.ladder, design.rising_until)
     facts = curve_facts(set_, design.ladder, LARGEST_SLIP)
-    apart = widest_range(set_, design.ladder, LARGEST_SLIP)
+    apart = _widest_range(set_, design.ladder, LARGEST_SLIP)
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
     lean = _lean_over_rounding(design)

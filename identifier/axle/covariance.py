@@ -45,9 +45,6 @@ def triangle(q: int) -> list[tuple[int, int]]:
 
 def packed(P: Array) -> Array:
     """Return factors (k, q (q + 1)/2) of positive definite P: D on the diagonal, U above it.
-
-    Parameters
-    ----------
     P : symmetric matrices (k, q, q).
     """
     return np.array([_factored(one)[tuple(np.array(triangle(len(one))).T)] for one in P])
@@ -65,9 +62,6 @@ def _factored(P: Array) -> Array:
 
 def unpacked(packed: Array, q: int) -> Array:
     """Return P (k, q, q) of factors (k, q (q + 1)/2).
-
-    Parameters
-    ----------
     packed : D on the diagonal, U above it, by rows, (k, q (q + 1)/2).
     """
     F = np.zeros((len(packed), q, q))
@@ -80,11 +74,7 @@ def unpacked(packed: Array, q: int) -> Array:
 
 def per_variance(prior: Array, n: int, widest: float) -> Array:
     """Return 1/limit of the trace of the weights and of each other variance, (2, q - n + 1).
-
-    Parameters
-    ----------
-    prior : covariance before the first sample, (2, q, q).
-    widest : limit over the prior's [-].
+    prior : covariance before the first sample, (2, q, q).   widest : limit over the prior's [-].
     """
     variances = np.einsum("aii->ai", prior)
     sizes = np.column_stack([variances[:, :n].sum(axis=1), variances[:, n:]])
@@ -93,11 +83,7 @@ def per_variance(prior: Array, n: int, widest: float) -> Array:
 
 def narrowed(P: Array, limits: Array) -> Array:
     """Return P, scaled down where it is wider than allowed.
-
-    Parameters
-    ----------
-    P : covariances (2, q, q).
-    limits : from `per_variance`.
+    P : covariances (2, q, q).   limits : from `per_variance`.
     """
     n = P.shape[1] - limits.shape[1] + 1
     variances = np.einsum("aii->ai", P)
@@ -107,9 +93,6 @@ def narrowed(P: Array, limits: Array) -> Array:
 
 def factors_of(packed: list[Any], q: int) -> Factors:
     """Return the factors that a row holds.
-
-    Parameters
-    ----------
     packed : q (q + 1)/2 entries.
     """
     by_place = dict(zip(triangle(q), packed, strict=True))
@@ -125,9 +108,6 @@ def row_of(factors: Factors) -> list[Any]:
 
 def entry(factors: Factors, i: int, k: int) -> Any:
     """Return P = U D U' at row i and column k.
-
-    Parameters
-    ----------
     i, k : place, from 0, i <= k.
     """
     U, D = factors
@@ -137,9 +117,6 @@ def entry(factors: Factors, i: int, k: int) -> Any:
 
 def spread(factors: Factors, n: int) -> Spread:
     """Return P = U D U' in the block of the weights, and its variances.
-
-    Parameters
-    ----------
     n : number of weights, which stand first.
     """
     weights = {(i, k): entry(factors, i, k) for i, k in triangle(n)}
@@ -150,9 +127,6 @@ def spread(factors: Factors, n: int) -> Spread:
 
 def width(trace: Any, others: list[Any], limits: list[Any]) -> Any:
     """Return the largest of the bounded variances over its limit.
-
-    Parameters
-    ----------
     others : variances of the other parameters.
     limits : 1/limit of the trace and of each other variance.
     """
@@ -164,9 +138,6 @@ def width(trace: Any, others: list[Any], limits: list[Any]) -> Any:
 
 def scaled(factors: Factors, wide: Any) -> Factors:
     """Return the factors of P/wide where wide > 1, else of P.
-
-    Parameters
-    ----------
     wide : from `width`.
     """
     scale = reciprocal(larger(wide, 1))
@@ -175,11 +146,7 @@ def scaled(factors: Factors, wide: Any) -> Factors:
 
 def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
     """Return the factors of P + amount d d' in the block of the weights (Agee and Turner).
-
-    Parameters
-    ----------
-    direction : d, n entries.
-    amount : variance to add, not negative.
+    direction : d, n entries.   amount : variance to add, not negative.
     """
     U, D, v, c = dict(factors.U), list(factors.D), list(direction), amount
     for j in reversed(range(len(v))):
@@ -193,31 +160,7 @@ def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
     return Factors(U, D)
 
 
-def loosened(
-    factors: Factors, spread: Spread, amount: Any, limits: list[Any]
-) -> tuple[Factors, Spread]:
-    """Return the factors and the spread of P + amount u u', u the last column of U.
-
-    The last parameter becomes less sure, and the others by what they owe to it. Where P would grow
-    beyond its limits it stays as it is.
-
-    Parameters
-    ----------
-    spread : of P.
-    amount : variance to add to the last parameter, not negative.
-    """
-    U, D = factors
-    q, n = len(D), len(D) - len(spread.others)
-    u = [*(U[i, q - 1] for i in range(q - 1)), 1.0]
-    squares = [sum(one * one for one in u[:n]), *(one * one for one in u[n:])]
-    sizes = [spread.trace, *spread.others]
-    trace, *others = (a + amount * b for a, b in zip(sizes, squares, strict=True))
-    amount = amount * (width(trace, others, limits) <= 1)
-    trace, *others = (a + amount * b for a, b in zip(sizes, squares, strict=True))
-    return Factors(U, [*D[:-1], D[-1] + amount]), spread._replace(trace=trace, others=others)
-
-
-class Excited(NamedTuple):
+class _Excited(NamedTuple):
     """A regressor seen through the covariance: f = U'h, g = D f, v = P h, a = h'P h > 0."""
 
     f: list[Any]
@@ -226,11 +169,8 @@ class Excited(NamedTuple):
     a: Any
 
 
-def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
+def excited(factors: Factors, h: list[Any], least: Any) -> _Excited:
     """Return what a regressor excites.
-
-    Parameters
-    ----------
     h : regressor, q entries.
     """
     U, D = factors
@@ -240,17 +180,14 @@ def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
     v: list[Any] = []
     for j in range(q):  # in the order of `updated`, where its terms are found again
         v = [*(v[i] + U[i, j] * g[j] for i in range(j)), g[j]]
-    return Excited(f, g, v, sum(a * b for a, b in zip(f, g, strict=True)) + least)
+    return _Excited(f, g, v, sum(a * b for a, b in zip(f, g, strict=True)) + least)
 
 
-def updated(factors: Factors, direction: Excited, c: Any) -> Factors:
+def updated(factors: Factors, direction: _Excited, c: Any) -> Factors:
     """Return the factors of P - c P h h'P/(1 + c a) (Bierman).
 
     D_j is multiplied by β_(j-1)/β_j, β_j = 1 + c Σ_(i<=j) f_i g_i, which is positive whatever
     rounding does; c < 0 makes P grow, c = 0 leaves every bit of it.
-
-    Parameters
-    ----------
     c : more than -1/a by more than rounding.
     """
     U, D = dict(factors.U), list(factors.D)

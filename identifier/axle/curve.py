@@ -15,13 +15,13 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.elementary import tanh
 from identifier.axle.car import larger, smaller
+from identifier.setup import NOT_NEGATIVE, Port
 
 LADDER = (0.016, 0.064, 0.128, 0.256)  # rad: from where a tire bends to where it slides
 
 
 class Curve(NamedTuple):
     """Static force curve at one slip, per axle (2,).
-
     units : tanh(x/α_j) (2, n).   force : φ [-].   slope : dφ/dx [1/rad].
     carcass_slope : C = slope [1/rad], but at least 2 % of that at zero, for the lag.
     bend : dC/dx [1/rad²], zero where C is held up.
@@ -35,9 +35,6 @@ class Curve(NamedTuple):
 
     def under(self, load: Any) -> "Curve":
         """Return the curve of axles under another load than the static one.
-
-        Parameters
-        ----------
         load : over the static one, λ (2,) [-].
         """
         units = self.units * ca.repmat(load, 1, self.units.shape[1])
@@ -46,9 +43,6 @@ class Curve(NamedTuple):
 
 def doublings(ladder: tuple[float, ...]) -> tuple[int, ...]:
     """Return by how many doublings of its argument each unit follows from the next wider one.
-
-    Parameters
-    ----------
     ladder : slip scales [rad], rising.
 
     Raises
@@ -69,12 +63,7 @@ def doublings(ladder: tuple[float, ...]) -> tuple[int, ...]:
 
 def hidden_units(x: Any, scales: Any, steps: tuple[int, ...]) -> Any:
     """Return tanh(x/α_j) (2, n).
-
-    Parameters
-    ----------
-    x : slip angles [rad], (2,).
-    scales : 1/α_j [1/rad], (1, n).
-    steps : from `doublings`.
+    x : slip angles [rad], (2,).   scales : 1/α_j [1/rad], (1, n).   steps : from `doublings`.
     """
     T = tanh(scales[0, len(steps)] * x)
     E = (1 + T) / (1 - T)  # exp(2 x/α) of the widest unit, the same bits on every machine
@@ -88,24 +77,15 @@ def hidden_units(x: Any, scales: Any, steps: tuple[int, ...]) -> Any:
 
 def curve(x: Any, W: Any, scales: Any, steps: tuple[int, ...]) -> Curve:
     """Return the static force curve at a slip.
-
-    Parameters
-    ----------
-    x : slip angles [rad], (2,).
-    W : weights [static axle loads], (2, n).
-    scales : 1/α_j [1/rad], (1, n).
-    steps : from `doublings`.
+    x : slip angles [rad], (2,).   W : weights [static axle loads], (2, n).
+    scales : 1/α_j [1/rad], (1, n).   steps : from `doublings`.
     """
     return of_units(hidden_units(x, scales, steps), W, scales)
 
 
 def of_units(T: Any, W: Any, scales: Any) -> Curve:
     """Return the static force curve where its units are known.
-
-    Parameters
-    ----------
-    T : from `hidden_units`, (2, n).
-    W : weights [static axle loads], (2, n).
+    T : from `hidden_units`, (2, n).   W : weights [static axle loads], (2, n).
     scales : 1/α_j of the units [1/rad], (1, n).
     """
     inverse = ca.repmat(scales, 2, 1)
@@ -124,14 +104,19 @@ def of_units(T: Any, W: Any, scales: Any) -> Curve:
 
 def unit_matrix(alpha: Array, ladder: tuple[float, ...]) -> Array:
     """Return tanh(α/α_j) (k, n) in numpy.
-
-    Parameters
-    ----------
-    alpha : slip angles [rad], (k,).
-    ladder : slip scales [rad], (n,).
+    alpha : slip angles [rad], (k,).   ladder : slip scales [rad], (n,).
     """
     units: Array = np.tanh(np.asarray(alpha)[:, None] / np.array(ladder))
     return units
+
+
+def unit_slopes(alpha: Array | float, ladder: tuple[float, ...]) -> Array:
+    """Return the derivatives of tanh(α/α_j) over α in numpy, (..., n) [1/rad].
+    alpha : slip angles [rad], (...).   ladder : slip scales [rad], (n,).
+    """
+    scales = np.array(ladder)
+    at = np.minimum(np.asarray(alpha)[..., None] / scales, 300.0)  # whose cosh² is a number
+    return np.asarray(1.0 / (scales * np.cosh(at) ** 2), dtype=np.float64)
 
 
 # Where the model has been: how long it learnt, by range of slip.
@@ -140,15 +125,18 @@ def unit_matrix(alpha: Array, ladder: tuple[float, ...]) -> Array:
 # what a reader of the recording sees, the second is what made the force.
 
 EDGES = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # rad
+EXCITATION = Port(
+    "excitation",
+    "rad; s",
+    "largest slip, then time of learning above each edge, per axle",
+    learnt=True,
+    rule=NOT_NEGATIVE,
+)
 
 
 def excited(state: Any, size: Any, *, dt: Any, samples: Any, learns: Any) -> Any:
     """Return the next state (2, 1 + edges): largest slip [rad], then time above `EDGES` [s].
-
-    Parameters
-    ----------
-    size : of slip [rad], (2,).
-    dt : sampling interval [s].
+    size : of slip [rad], (2,).   dt : sampling interval [s].
     samples : in which errors are correlated: one alone does not make a range known.
     learns : 1 where the axle learns, else 0, (2,).
     """

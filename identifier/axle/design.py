@@ -14,24 +14,23 @@ from identifier.axle.along import certified_along
 from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
-from identifier.axle.car import car_numbers, downforce_numbers, named_port
+from identifier.axle.car import car_numbers, downforce_numbers, symbols
 from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
-from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.gate import Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
     Regression,
     RoadChange,
-    RoadState,
     bounded,
     rising_shares,
 )
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.slip import SHORTEST, SensitivityState, Sensors, Sway, SwayState
+from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
@@ -174,22 +173,18 @@ class AxleIdentifier(Method):
             if stored is not start:  # of another form: units can be what no curve of it could
                 P = _within_prior(P, prior_P, n)
         widest = per_variance(prior_P, n, self.regression.widest)
-        W, own = self.within_bounds(W, own, P)
+        W, own = self._within_bounds(W, own, P)
+        scan = self._scan(vehicle)
         return Setup(
-            scan=self._scan(vehicle),
+            scan=scan,
             carry={
+                **scan.zeros(),
                 "W": W,
                 "own": own,
                 "UD": packed(narrowed(P, widest)),
-                "gate": np.zeros(len(GateState._fields)),
-                "sway": np.zeros(len(SwayState._fields)),
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
-                "sensitivity": np.zeros((2, len(SensitivityState._fields))),
-                "filters": np.zeros((2, n + 5)),
                 "errors": np.tile([0.0, 1.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
-                "change": np.zeros(len(RoadState._fields)),
-                "bank": np.zeros(len(SlopeState._fields)),
                 "sensors": np.array(sensors),
             },
             constants={
@@ -242,11 +237,8 @@ class AxleIdentifier(Method):
             },
         )
 
-    def within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
+    def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside.
-
-        Parameters
-        ----------
         W : weights [static axle loads], (2, n).
         own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
         P : covariance of both, (2, n + 3, n + 3): the least move is in its metric.
@@ -256,14 +248,11 @@ class AxleIdentifier(Method):
         numbers = self.bounds.of_ladder(self.ladder, self.rising_until)
         row = np.zeros(n) if slope is None else slope
         project = _projection(n, slope is not None)
-        kept = np.vstack(
-            [
-                np.array(
-                    project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
-                )
-                for i, offset in enumerate((numbers.steering, numbers.v_y))
-            ]
-        )
+        rows = [
+            project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
+            for i, offset in enumerate((numbers.steering, numbers.v_y))
+        ]
+        kept = np.array(ca.vertcat(*rows))
         return kept[:, :n], kept[:, n:]
 
     def _rising(self) -> dict[str, Array]:
@@ -279,14 +268,7 @@ class AxleIdentifier(Method):
         ----------
         state : W (k, 2, n) and own (k, 2, 3) at each of k instants.
         """
-        W, compliance = state["W"], state["own"][:, :, 0]
-        slope = (W / np.array(self.ladder)).sum(axis=2)
-        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
-        return (
-            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
-            Track("relaxation length", "m", lag),
-            Track("force at saturation", "static load", W.sum(axis=2)),
-        )
+        return tracks(self.ladder, vehicle, state["W"], state["own"][:, :, 0])
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
         """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth.
@@ -354,6 +336,21 @@ class AxleIdentifier(Method):
         )
 
 
+def tracks(
+    ladder: tuple[float, ...], vehicle: Vehicle, W: Array, compliance: Array
+) -> tuple[Track, ...]:
+    """Return cornering stiffness, relaxation length, and the force that curves saturate at.
+    W : weights (k, 2, n) at each of k instants [static axle loads].   compliance : (k, 2) [m].
+    """
+    slope = (W / np.array(ladder)).sum(axis=2)
+    lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
+    return (
+        Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
+        Track("relaxation length", "m", lag),
+        Track("force at saturation", "static load", W.sum(axis=2)),
+    )
+
+
 def _within_prior(P: Array, prior: Array, n: int) -> Array:
     """Return covariances (2, q, q) whose weights are also believed as before any drive."""
     found = np.zeros_like(P)
@@ -365,16 +362,15 @@ def _within_prior(P: Array, prior: Array, n: int) -> Array:
 @cache
 def _projection(n: int, rises: bool) -> ca.Function:
     """Return `bounded` of one axle: [weights, own], P of the weights, numbers, offset, slope."""
-    theta, P, slope = ca.SX.sym("theta", n + 3), ca.SX.sym("P", n, n), ca.SX.sym("slope", n)
-    (port, numbers), offset = named_port(BoundNumbers, "numbers"), ca.SX.sym("offset")
+    ports, s = symbols(theta=n + 3, P=(n, n), numbers=BoundNumbers, offset=1, slope=n)
     kept = bounded(
-        numbers,
-        ca.vertsplit(theta),
-        {(j, k): P[j, k] for j, k in triangle(n)},
-        offset=offset,
-        slope=ca.vertsplit(slope) if rises else None,
+        s.numbers,
+        ca.vertsplit(s.theta),
+        {(j, k): s.P[j, k] for j, k in triangle(n)},
+        offset=s.offset,
+        slope=ca.vertsplit(s.slope) if rises else None,
     )
-    return ca.Function("bounded", [theta, P, port, offset, slope], [ca.horzcat(*kept)])
+    return ca.Function("bounded", list(ports.values()), [ca.horzcat(*kept)])
 
 
 @cache

@@ -18,33 +18,16 @@ from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY, Vehicle, load_ratio
 
 
-def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
-    """Return the force curve at a slip, in static axle loads.
-
-    Parameters
-    ----------
-    slip : (2,) [rad].
-    W : weights [static axle loads], (2, n).
-    ladder : slip scales [rad], (n,).
-    """
-    scales = ca.DM(1.0 / np.array(ladder)[None])
-    return curve(slip, ca.DM(W), scales, doublings(ladder))
-
-
 def curve_at_speed(
     slip: Any, v_x: Any, W: Array, ladder: tuple[float, ...], vehicle: Vehicle
 ) -> Curve:
     """Return the force curve of a car at a slip and a speed, in static axle loads.
-
-    Parameters
-    ----------
-    slip : (2,) [rad].
-    v_x : longitudinal speed [m/s].
-    W : weights [static axle loads], (2, n).
+    slip : (2,) [rad].   v_x : longitudinal speed [m/s].   W : weights [static axle loads], (2, n).
     ladder : slip scales [rad], (n,).
     vehicle : whose downforce counts; without any the speed is not looked at.
     """
-    static = static_curve(slip, W, ladder)
+    scales = ca.DM(1.0 / np.array(ladder)[None])
+    static = curve(slip, ca.DM(W), scales, doublings(ladder))
     if not vehicle.has_downforce:
         return static
     return static.under(load_ratio(ca.DM(vehicle.downforce), v_x))
@@ -52,11 +35,7 @@ def curve_at_speed(
 
 def series_compliance(own: Array, roll_frequency: float) -> Array:
     """Return the deflection of carcass and body per static axle load [m], (2,).
-
-    Parameters
-    ----------
-    own : compliance, sway share and offset of the axles, (2, 3).
-    roll_frequency : ω [rad/s].
+    own : compliance, sway share and offset of the axles, (2, 3).   roll_frequency : ω [rad/s].
     """
     return own[:, 0] + GRAVITY / roll_frequency**2 * own[:, 1]
 
@@ -74,16 +53,10 @@ def lagged_force(
     least_lag: Any,
 ) -> tuple[Any, Any]:
     """Return the axle forces (2,) [N] and dα'/dt (2,) [rad/s].
-
-    Parameters
-    ----------
-    at : force curve at the lagged slip.
-    compliance : of `series_compliance`.
+    at : force curve at the lagged slip.   compliance : of `series_compliance`.
     offset : zero of the front steering [rad] and bias of v_y [m/s], (2,).
-    slip : lagged slip α' (2,) [rad].
-    x : [v_y, r] (2,).
-    delta : angle of the front wheels [rad].
-    v_x : longitudinal speed [m/s], positive.
+    slip : lagged slip α' (2,) [rad].   x : [v_y, r] (2,).
+    delta : angle of the front wheels [rad].   v_x : longitudinal speed [m/s], positive.
     least_lag : time under which no lag falls [s].
     """
     sideways = x[0] - offset[1] + ca.DM(car.arm) * x[1]

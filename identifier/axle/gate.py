@@ -6,37 +6,36 @@ after three bad samples in a row, and while v_y and r repeat to the last bit (a 
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import astuple, dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from identifier.axle.car import larger
+from identifier.setup import Port
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY, Vehicle
 
 BAD_IN_A_ROW = 3
+GATE_PORT = Port(
+    "gate",
+    "SI",
+    "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck samples "
+    "in a row",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plausibility:
     """Bounds of what a car can do; generous, since they are there for faults.
-
-    Parameters
-    ----------
     min_speed : below this speed [m/s] forces read zero.
     learning_speed : below this speed [m/s] learning rests.
-    max_speed : no car is faster [m/s].
-    max_sideslip : largest |v_y|/v_x [-].
+    max_speed : no car is faster [m/s].   max_sideslip : largest |v_y|/v_x [-].
     slow : speed that stands for v_x in that ratio, where v_x is lower [m/s].
-    max_yaw_rate : [rad/s].
-    max_steering : [rad].
-    max_rate : largest acceleration [m/s²].
+    max_yaw_rate : [rad/s].   max_steering : [rad].   max_rate : largest acceleration [m/s²].
     jump : what noise may add to v_x and v_y from one sample to the next [m/s].
-    max_yaw_acceleration : [rad/s²].
-    yaw_jump : what noise may add to r [rad/s].
-    max_steering_rate : [rad/s].
-    steering_jump : what noise may add to the steering [rad].
+    max_yaw_acceleration : [rad/s²].   yaw_jump : what noise may add to r [rad/s].
+    max_steering_rate : [rad/s].   steering_jump : what noise may add to the steering [rad].
     hold : longest time to go on with the last good sample, or with values that do not change [s].
     settle : time to wait before learning [s].
     """
@@ -78,40 +77,13 @@ class Plausibility:
 
     def rest(self, dt: float) -> int:
         """Return how many bad samples in a row end a run, so that the next good one begins anew.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         return math.floor(self.hold / dt) + 2
 
-    def numbers(self) -> "GateNumbers":
-        """Return the numbers of a step."""
-        return GateNumbers(**asdict(self))
-
-
-class GateNumbers(NamedTuple):
-    """The fields of `Plausibility`."""
-
-    min_speed: Any
-    learning_speed: Any
-    max_speed: Any
-    max_sideslip: Any
-    slow: Any
-    max_yaw_rate: Any
-    max_steering: Any
-    max_rate: Any
-    jump: Any
-    max_yaw_acceleration: Any
-    yaw_jump: Any
-    max_steering_rate: Any
-    steering_jump: Any
-    hold: Any
-    settle: Any
-
-    def possible_v_y(self, v_x: Any, v_y: Any) -> Any:
-        """Return whether v_y is one that a car may have at v_x, both [m/s]; NaN is not."""
-        return ca.fabs(v_y) < self.max_sideslip * larger(v_x, self.slow)
+    def numbers(self) -> tuple[float, ...]:
+        """Return the numbers of a step, whose port names them as the fields are."""
+        return astuple(self)
 
 
 class GateState(NamedTuple):
@@ -154,20 +126,15 @@ def _all(*conditions: Any) -> Any:
     return result
 
 
-def gate(limits: GateNumbers, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
+def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
     """Judge a sample.
-
-    Parameters
-    ----------
-    dt : sampling interval [s].
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
-    v_x : longitudinal speed [m/s].
+    limits : numbers of a `Plausibility`.   dt : sampling interval [s].   x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).   v_x : longitudinal speed [m/s].
     """
     v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
     possible = _all(
         ca.fabs(v_x) < limits.max_speed,
-        limits.possible_v_y(ca.fabs(v_x), v_y),
+        ca.fabs(v_y) < limits.max_sideslip * larger(ca.fabs(v_x), limits.slow),  # NaN is not
         ca.fabs(r) < limits.max_yaw_rate,
         ca.fabs(delta_f) < limits.max_steering,
         ca.fabs(delta_r) < limits.max_steering,

@@ -25,31 +25,28 @@ from identifier.axle.covariance import (
     updated,
     width,
 )
+from identifier.axle.curve import unit_slopes
 from models.rules import require_positive_fields
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Regression:
     """Filter, error model and memory; times belong to drivers and sensors, not to the car's size.
-
-    Parameters
-    ----------
-    bandwidth : κ [1/s].
-    memory : of directional forgetting, in time with excitation [s].
+    bandwidth : κ [1/s].   memory : of directional forgetting, in time with excitation [s].
     error : additive error of y [static axle loads]: 0.02 is 0.2 m/s².
     relative_error : of y [-], the model's.
     correlation_time : of these errors [s]; it makes the result independent of the sampling.
     lateness : by which steering and force may differ in time [s].
     noise : of v_y, which sits in the slip [m/s].
-    sure : force from which on samples teach the curve, and not the sensors' offset alone
-        [`error`]: a smaller one could be theirs.
+    sure : force from which on samples teach the curve, and not the sensors' offset alone [`error`]:
+        a smaller one could be theirs.
     moment : over which that force is meant [s]: noise is no force.
     sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
     clip : largest error that counts in full, over the standard deviation that y is declared to have
         times `ErrorState.slow` [-].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
-    rate : by which learning may change the force of a curve [static axle loads/s]; three times
-        what a change of friction asks for.
+    rate : by which learning may change the force of a curve [static axle loads/s]; three times what
+        a change of friction asks for.
     """
 
     bandwidth: float = 4.0
@@ -71,9 +68,6 @@ class Regression:
 
     def at(self, dt: float) -> "RegressionNumbers":
         """Return the numbers of a step.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         e = math.exp(-self.bandwidth * dt)
@@ -118,9 +112,6 @@ class RegressionNumbers(NamedTuple):
 
 def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[Any, Any]:
     """Return f and the next state of the filter.
-
-    Parameters
-    ----------
     u : its input now, which is also its output at a restart.
     """
     f = first * u + (1 - first) * (v + numbers.half * u)
@@ -135,7 +126,6 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
 
 class Learnt(NamedTuple):
     """Parameters (q entries) and factors of the covariance after an update.
-
     uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
     gains : Ph/(R + h'Ph), by which the innovation moves the parameters; 0 where nothing is learnt.
     """
@@ -164,15 +154,8 @@ def update(
     θ⁺ = θ + P h e/(R + a), a = h'Ph;  P⁺ = P - κ P h h'P/((R + a) a), κ = a - R (1 - λ)/λ, which
     keeps P positive definite for every a, also where κ < 0 and P grows: 1/h'P⁻¹h stays positive.
     No D of its factors falls below `LEAST_VARIANCE`: what would do so is learnt from, but P stays.
-
-    Parameters
-    ----------
-    theta : parameters, q entries.
-    P : factors of their covariance.
-    h : regressor, q entries.
-    innovation : e = y - h'θ, clipped.
-    R : its variance.
-    forgetting : (1 - λ)/λ.
+    theta : parameters, q entries.   P : factors of their covariance.   h : regressor, q entries.
+    innovation : e = y - h'θ, clipped.   R : its variance.   forgetting : (1 - λ)/λ.
     spread : of P, and of what is added to it otherwise in this step.
     limits : as in `width`; where P would grow beyond them it stays as it is.
     learns : whether to update at all.
@@ -220,9 +203,6 @@ MOST_SLOW = 4.0  # squared errors: above twice the declared they are no noise to
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadChange:
     """When another friction is believed, and which errors teach less.
-
-    Parameters
-    ----------
     evidence : from which another road is believed [nats].
     explains : share of the squared errors that it must take off, without its prior [-].
     time : over which evidence is collected [s].
@@ -247,9 +227,6 @@ class RoadChange:
 
     def at(self, dt: float, rate: float) -> "RoadNumbers":
         """Return the numbers of a step.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         rate : by which learning may change a force, and so ln μ at a grip of one [1/s].
         """
@@ -368,22 +345,12 @@ LEAN = 1e-4  # of a step that is limited: towards the center, by more than round
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
     """Limits of parameters.
-
-    Parameters
-    ----------
     least_grip, most_grip : of the saturated force [static axle loads]; a slick under downforce
         reaches three.
     least_stiffness, most_stiffness : of the curve at no slip [static axle loads/rad]; tires of cars
         and of their models lie between 4 and 40.
-    weight : of each weight [static axle loads].
-    compliance : [m per static axle load].
-    steering : of the steering's zero [rad].
-    v_y : of the bias of v_y [m/s].
-
-    Raises
-    ------
-    ValueError
-        Where a number is not positive, or least_grip is not below most_grip.
+    weight : of each weight [static axle loads].   compliance : [m per static axle load].
+    steering : of the steering's zero [rad].   v_y : of the bias of v_y [m/s].
     """
 
     least_grip: float = 0.1
@@ -402,16 +369,12 @@ class Bounds:
             if not least < most:
                 raise ValueError(f"least_{of} must be below most_{of}, they are {least}, {most}")
 
-    def at(self, n: int, slopes: float, rising_until: float | None) -> "BoundNumbers":
+    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
         """Return the numbers of a step.
 
         n products of weights that lie in the box sum up to within n + 8 roundings.
-
-        Parameters
-        ----------
-        n : number of units.
-        slopes : sum of their derivatives where the slope is bounded [1/rad].
-        rising_until : the slip of that [rad]; the least stiffness is one at zero slip.
+        ladder : slip scales of the n units [rad].
+        rising_until : slip at which the slope is bounded [rad]; the least stiffness is one at zero.
 
         Raises
         ------
@@ -419,6 +382,7 @@ class Bounds:
             Where n weights within their box, all equal, cannot carry the middle of the grip, or
             are stiffer or softer than they may.
         """
+        n, slopes = len(ladder), float(unit_slopes(rising_until or 0.0, ladder).sum())
         rounding = (n + 8) * FLOAT * self.weight
         least, most = self.least_grip + n * rounding, self.most_grip - n * rounding
         center = 0.5 * (least + most) / n
@@ -450,51 +414,17 @@ class Bounds:
             v_y=inward(self.v_y),
         )
 
-    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
-        """Return the numbers of a step with a ladder.
-
-        Parameters
-        ----------
-        ladder : slip scales of the units [rad].
-
-        Raises
-        ------
-        ValueError
-            As `at` does.
-        """
-        slopes = unit_slopes(ladder, rising_until or 0.0)
-        return self.at(len(ladder), float(slopes.sum()), rising_until)
-
-
-def unit_slopes(ladder: tuple[float, ...], slip: float) -> Array:
-    """Return the derivatives of the units at a slip, (n,) [1/rad].
-
-    Parameters
-    ----------
-    ladder : slip scales of the units [rad].
-    slip : [rad].
-    """
-    scales = np.array(ladder)
-    return np.asarray(1.0 / (scales * np.cosh(slip / scales) ** 2), dtype=np.float64)
-
 
 def rising_shares(ladder: tuple[float, ...], slip: float) -> Array:
     """Return the derivatives of the units at a slip over their sum, (n,), as `bounded` wants them.
-
-    Parameters
-    ----------
-    ladder : slip scales of the units [rad].
-    slip : until which curves shall not fall [rad].
+    ladder : slip scales of the units [rad].   slip : until which curves shall not fall [rad].
     """
-    slopes = unit_slopes(ladder, slip)
+    slopes = unit_slopes(slip, ladder)
     return np.asarray(slopes / slopes.sum(), dtype=np.float64)
 
 
 def inward(limit: float) -> float:
     """Return the largest float that is not above a limit.
-
-    Parameters
-    ----------
     limit : positive.
     """
     nearest = np.float32(limit)
@@ -531,9 +461,6 @@ def bounded(
     slope: list[Any] | None = None,
 ) -> list[Any]:
     """Return [w, s, k, offset] of an axle within its bounds; what is within them is not moved.
-
-    Parameters
-    ----------
     theta : parameters, n + 3 entries.
     P : covariance of the weights, the metric: upper triangle by place.
     slope : derivatives of the units at a slip over their sum, n entries; the curve's is bounded
@@ -614,9 +541,6 @@ def limited(numbers: BoundNumbers, per_step: Any, last: list[Any], w: list[Any])
     φ changes by Σ T_j Δw_j with 1 >= T_1 >= ... >= T_n >= 0 at any slip, the narrowest unit first:
     by no more than the largest partial sum |Σ_(j<=k) Δw_j| (Abel). What is within is not moved; a
     step that is cut leans to the center a little, so that rounding does not leave the bounds.
-
-    Parameters
-    ----------
     per_step : 1/the largest change of a force [1/static axle loads].
     last, w : weights before the sample and after it, both within their bounds, n entries.
     """

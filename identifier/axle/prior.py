@@ -24,17 +24,11 @@ STEP = 1.2  # ratio over which log-derivatives are taken
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prior:
     """Means and standard deviations before the first sample.
-
-    Parameters
-    ----------
-    friction : of the road [-].
-    sd_stiffness : of ln C [-].
-    sd_friction : of ln μ [-].
-    sd_shape : of each weight on its own [static axle loads].
+    friction : of the road [-].   sd_stiffness : of ln C [-].
+    sd_friction : of ln μ [-].   sd_shape : of each weight on its own [static axle loads].
     compliance, sd_compliance : lateral deflection of the tire per static axle load [m].
     sway_share, sd_sway_share : share of the roll rate that moves the contact patch [-].
-    sd_steering : of the front steering's zero [rad].
-    sd_v_y : of the bias of v_y [m/s].
+    sd_steering : of the front steering's zero [rad].   sd_v_y : of the bias of v_y [m/s].
     """
 
     friction: float = 0.8
@@ -53,9 +47,6 @@ class Prior:
 
     def means(self, vehicle: Vehicle, ladder: tuple[float, ...]) -> tuple[Array, Array]:
         """Return weights (2, n) and [compliance, sway share, offset] (2, 3).
-
-        Parameters
-        ----------
         vehicle : the car; its cornering stiffness enters here and nowhere else.
         ladder : slip scales of the units [rad].
         """
@@ -66,19 +57,15 @@ class Prior:
 
     def covariance(self, vehicle: Vehicle, ladder: tuple[float, ...]) -> Array:
         """Return the covariance of [weights, compliance, sway share, offset] (2, n + 3, n + 3).
-
-        Parameters
-        ----------
         ladder : slip scales of the units [rad].
         """
         n, mu = len(ladder), self.friction
         P = np.zeros((2, n + 3, n + 3))
         for i, c in enumerate(_relative_stiffness(vehicle)):
-            d_C = _log_derivative(
-                fiala_weights(c * STEP, mu, ladder), fiala_weights(c / STEP, mu, ladder)
-            )
-            d_mu = _log_derivative(
-                fiala_weights(c, mu * STEP, ladder), fiala_weights(c, mu / STEP, ladder)
+            d_C, d_mu = (
+                (fiala_weights(c * s, mu * m, ladder) - fiala_weights(c / s, mu / m, ladder))
+                / (2.0 * np.log(STEP))
+                for s, m in ((STEP, 1.0), (1.0, STEP))
             )
             P[i, :n, :n] = (
                 self.sd_stiffness**2 * np.outer(d_C, d_C)
@@ -98,24 +85,15 @@ def _relative_stiffness(vehicle: Vehicle) -> tuple[float, float]:
 
 def fiala_force(alpha: Array, stiffness: float, friction: float) -> Array:
     """Return F/F_z of a brush tire, α > 0, (k,).
-
-    Parameters
-    ----------
-    alpha : slip angles [rad], (k,).
-    stiffness : C/F_z [1/rad].
-    friction : μ [-].
+    alpha : slip angles [rad], (k,).   stiffness : C/F_z [1/rad].   friction : μ [-].
     """
     sliding = np.minimum(np.tan(alpha) * stiffness / (3.0 * friction), 1.0)
     return np.asarray(friction * (1.0 - (1.0 - sliding) ** 3), dtype=np.float64)
 
 
-def projected(force: Array, ladder: tuple[float, ...]) -> Array:
+def _projected(force: Array, ladder: tuple[float, ...]) -> Array:
     """Return the weights whose curves come closest to given ones, with a little ridge.
-
-    Parameters
-    ----------
-    force : curves at `SLIPS` (300,) or (300, k).
-    ladder : slip scales of the units [rad].
+    force : curves at `SLIPS` (300,) or (300, k).   ladder : slip scales of the units [rad].
     """
     weights: Array = _projector(ladder) @ force
     return weights
@@ -131,27 +109,15 @@ def _projector(ladder: tuple[float, ...]) -> Array:
 
 def fiala_weights(stiffness: float, friction: float, ladder: tuple[float, ...]) -> Array:
     """Return the weights (n,) of a brush tire.
-
-    Parameters
-    ----------
-    stiffness : C/F_z [1/rad].
-    friction : μ [-].
-    ladder : slip scales of the units [rad].
+    stiffness : C/F_z [1/rad].   friction : μ [-].   ladder : slip scales of the units [rad].
     """
-    return projected(fiala_force(SLIPS, stiffness, friction), ladder)
+    return _projected(fiala_force(SLIPS, stiffness, friction), ladder)
 
 
 @cache
 def friction_direction(ladder: tuple[float, ...]) -> Array:
     """Return M (n, n) with dw/d ln μ = M w for φ = μ φ₀(α/μ): friction changes, stiffness does not.
-
-    Parameters
-    ----------
     ladder : slip scales of the units [rad].
     """
     T = unit_matrix(SLIPS, ladder)
-    return projected(T - SLIPS[:, None] / np.array(ladder) * (1.0 - T * T), ladder)
-
-
-def _log_derivative(above: Array, below: Array) -> Array:
-    return np.asarray((above - below) / (2.0 * np.log(STEP)), dtype=np.float64)
+    return _projected(T - SLIPS[:, None] / np.array(ladder) * (1.0 - T * T), ladder)

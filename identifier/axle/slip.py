@@ -73,9 +73,6 @@ class Sensors(NamedTuple):
 
 def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
     """Return α without sway [rad], (2,).
-
-    Parameters
-    ----------
     offset : δ₀ [rad] and b [m/s], (2,).
     """
     sideways = gated.v_y - offset[1] + car.arm * gated.r
@@ -85,12 +82,7 @@ def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
 
 def hold(car: Car, v_x: Any, dt: Any, compliance: Any, slope: Any) -> Hold:
     """Return the numbers of one step of the lag.
-
-    Parameters
-    ----------
-    v_x : longitudinal speed [m/s].
-    dt : sampling interval [s].
-    compliance : s [m], (2,).
+    v_x : longitudinal speed [m/s].   dt : sampling interval [s].   compliance : s [m], (2,).
     slope : C(x) of the last sample [1/rad], (2,).
     """
     sigma = compliance * slope + SHORTEST * (car.arm[0] - car.arm[1])
@@ -101,11 +93,7 @@ def hold(car: Car, v_x: Any, dt: Any, compliance: Any, slope: Any) -> Hold:
 
 def lagged_slip(h: Hold, last: SlipState, alpha: Any, first: Any) -> Any:
     """Return x after the step [rad], (2,).
-
-    Parameters
-    ----------
-    h : numbers of the step.
-    alpha : slip angle now [rad], (2,).
+    h : numbers of the step.   alpha : slip angle now [rad], (2,).
     first : 1 at a restart, which begins without lag, else 0.
     """
     change = alpha - last.alpha
@@ -126,15 +114,8 @@ def sensitivity(
     wheelbase: Any,
 ) -> tuple[Any, Any]:
     """Return ∂x/∂s and ∂x/∂k after the step, (2,) each.
-
-    Parameters
-    ----------
-    h : numbers of the step.
-    compliance : s [m], (2,).
-    alpha : slip angle now [rad], (2,).
-    sway_before : ∂α/∂k at the last sample [rad].
-    sway_now : ∂α/∂k now [rad].
-    wheelbase : L [m].
+    h : numbers of the step.   compliance : s [m], (2,).   alpha : slip angle now [rad], (2,).
+    sway_before : ∂α/∂k at the last sample [rad].   sway_now : ∂α/∂k now [rad].   wheelbase : L [m].
     """
     p_s, p_k = lasting.of_compliance, lasting.of_share
     change = alpha - last.alpha
@@ -150,14 +131,8 @@ def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, 
     """Return g = ∂(φ cos δ)/∂[w, s, k, offset], (2, n + 3).
 
     The bias b of v_y is learnt at the rear axle: it acts on slip as b/v_x.
-
-    Parameters
-    ----------
-    c : force curve at x.
-    of_compliance : ∂x/∂s (2,).
-    of_share : ∂x/∂k (2,).
-    cos_delta : cos δ (2,).
-    v_x : longitudinal speed [m/s].
+    c : force curve at x.   of_compliance : ∂x/∂s (2,).   of_share : ∂x/∂k (2,).
+    cos_delta : cos δ (2,).   v_x : longitudinal speed [m/s].
     """
     slope = c.slope * cos_delta
     of_offset = ca.vertcat(1, 1 / v_x)
@@ -175,16 +150,7 @@ def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sway:
     """Roll of the body as a second-order system.
-
-    Parameters
-    ----------
-    frequency : ω [rad/s].
-    damping : ζ [-].
-
-    Raises
-    ------
-    ValueError
-        Where a number is none of a body on springs: 0.1 to 100 rad/s, damping 0.01 to 10.
+    frequency : ω [rad/s].   damping : ζ [-].
     """
 
     frequency: float
@@ -245,16 +211,10 @@ def sway(
     share: Any,
 ) -> SwayState:
     """Take one step, semi-implicit in ρ' so that it is stable at any speed.
-
-    Parameters
-    ----------
-    numbers : of the second-order system.
-    dt : sampling interval [s].
+    numbers : of the second-order system.   dt : sampling interval [s].
     first : 1 at a restart, which begins in steady cornering, else 0.
-    v_x : longitudinal speed [m/s].
-    r : yaw rate [rad/s].
-    force : φ of the last sample [-], (2,).
-    slope : dφ/dx of the last sample [1/rad], (2,).
+    v_x : longitudinal speed [m/s].   r : yaw rate [rad/s].
+    force : φ of the last sample [-], (2,).   slope : dφ/dx of the last sample [1/rad], (2,).
     share : k (2,).
     """
     a = GRAVITY * ca.dot(car.share, force)

@@ -32,15 +32,9 @@ ACROSS, ALONG = (0.8, 1.2), (0.8, 1.25)  # its slope on that motion; a body roll
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drive:
     """Signals of n samples, for the forward model.
-
-    Parameters
-    ----------
-    t : time in the recording's own clock [s], (n,).
-    dt : sampling interval [s].
-    signals : columns as `motion.model.SIGNALS`, (n, 9).
-    rates : d/dt of v_y, r and δ_f, (n, 3).
-    counts : samples that count, (n,).
-    begins : first samples of its segments, rising, (k,).
+    t : time in the recording's own clock [s], (n,).   dt : sampling interval [s].
+    signals : columns as `motion.model.SIGNALS`, (n, 9).   rates : d/dt of v_y, r and δ_f, (n, 3).
+    counts : samples that count, (n,).   begins : first samples of its segments, rising, (k,).
     """
 
     t: Array
@@ -67,11 +61,8 @@ class Drive:
         fastest: float = FASTEST,
     ) -> "Drive":
         """Return a recording with a v_y as the estimate reads it.
-
-        Parameters
-        ----------
-        replay : whether each sample is asked about, down to the lowest speed; else those that
-            come faster than `fastest` are averaged, and slow ones do not count.
+        replay : whether each sample is asked about, down to the lowest speed; else those that come
+            faster than `fastest` are averaged, and slow ones do not count.
         fastest : sampling interval to which they are averaged [s].
         """
         every = 1 if replay else max(1, round(fastest / recording.dt))
@@ -102,9 +93,6 @@ class Drive:
 
     def on_time(self, delays: Array) -> "Drive":
         """Return the drive with late signals read later, and their rates there.
-
-        Parameters
-        ----------
         delays : of v_y, r and the front steering angle [s], (3,); at the end of a segment a late
             signal keeps its last value.
         """
@@ -121,9 +109,6 @@ class Drive:
 
     def on(self, ln_m: Array | float) -> "Drive":
         """Return the drive on roads of other frictions.
-
-        Parameters
-        ----------
         ln_m : ln of each sample's friction over that of the curves, (n,) or one.
         """
         signals = self.signals.copy()
@@ -171,11 +156,7 @@ def thinned(signal: Array, every: int) -> Array:
 
 def gradient(signal: Array, dt: float) -> Array:
     """Return d/dt by central differences, (n,).
-
-    Parameters
-    ----------
-    signal : (n,).
-    dt : [s].
+    signal : (n,).   dt : [s].
     """
     slope: Array = np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
     return slope
@@ -183,9 +164,6 @@ def gradient(signal: Array, dt: float) -> Array:
 
 def box(signal: Array, count: float) -> Array:
     """Return the centered mean over an odd count of samples, edges held, (n,).
-
-    Parameters
-    ----------
     signal : (n,).
     """
     width = max(1, int(count) | 1)
@@ -237,9 +215,6 @@ def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], d
 
 def hardest(recording: Recording, seconds: float) -> slice:
     """Return which samples are the time of hardest cornering, of all that are not longer.
-
-    Parameters
-    ----------
     seconds : how long it is at most [s].
     """
     n = min(round(seconds / recording.dt), len(recording))

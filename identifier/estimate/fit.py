@@ -33,9 +33,8 @@ REACHED = 0.25  # [s] for which a slip must have been exceeded to count as drive
 LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
-class Fit(NamedTuple):
+class _Fit(NamedTuple):
     """What logs taught: the model, the estimate behind it, and each block's own information.
-
     parts : when blocks begin, by the clock of their first log [s], and what they alone tell.
     """
 
@@ -52,11 +51,8 @@ def fit(
     block: float = BLOCK,
     coarse: bool = False,
     progress: Callable[[float], None] | None = None,
-) -> Fit:
+) -> _Fit:
     """Estimate the tires of a car from logs, with the same sensors.
-
-    Parameters
-    ----------
     recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
     block : longest time that is estimated at once [s].
@@ -142,7 +138,7 @@ def fit(
     ]
     if falling:  # as where a servo has play: such a curve is no tire, the formula alone is one
         return fit(recordings, vehicle, before.without(falling), block=block, coarse=coarse)
-    return Fit(model, found, parts)
+    return _Fit(model, found, parts)
 
 
 def _after(beliefs: Priors, found: Posterior) -> Priors:
@@ -174,7 +170,6 @@ def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
 
 class Reach(NamedTuple):
     """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²].
-
     alike, pairs : sum of products of what the model misses, over its size, at two times `LASTS`
     apart, (2,), and how many there are: white noise of the sensors has no part in it.
     """
@@ -207,35 +202,29 @@ class Reach(NamedTuple):
 
     @classmethod
     def of(
-        cls, drives: Sequence[Drive], roads: Roads | None, found: Posterior, vehicle: Vehicle
+        cls, drives: Sequence[Drive], roads: Roads | None, posterior: Posterior, vehicle: Vehicle
     ) -> "Reach":
         """Return what drives reached, by the estimate of them."""
-        nothing = cls()
-        slip, speeds, a_x, alike = (
-            np.array(one) for one in (nothing.slip, nothing.speeds, nothing.a_x, nothing.alike)
-        )
-        pairs = 0
+        found = cls()
         later = LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
         for i, one in enumerate(drives):
             on = one.counts
             if not on.any():
                 continue
             if roads is not None:
-                here = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
-            driven = simulate(one if roads is None else here, found.p, vehicle)
+                one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+            driven = simulate(one, posterior.p, vehicle)
             size = np.abs(driven["slip"][on])
             force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
             e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
             n = max(round(max(later, STRIDE) / one.dt), 1)
             together = on[n:] & on[:-n]
-            alike += (e[n:] * e[:-n])[together].sum(axis=0)
-            pairs += int(np.count_nonzero(together))
             k = min(max(round(REACHED / one.dt), 1), len(size))
-            slip = np.maximum(slip, np.partition(size, len(size) - k, axis=0)[-k])
-            for both, column in ((speeds, 0), (a_x, 5)):
-                low, high = np.quantile(one.signals[on, column], [0.005, 0.995])
-                both[:] = min(both[0], low), max(both[1], high)
-        return cls(slip, speeds, a_x, alike, pairs)
+            speeds, a_x = np.quantile(one.signals[on][:, [0, 5]], [0.005, 0.995], axis=0).T
+            slip = np.partition(size, len(size) - k, axis=0)[-k]
+            alike = (e[n:] * e[:-n])[together].sum(axis=0)
+            found = found.with_(cls(slip, speeds, a_x, alike, float(np.count_nonzero(together))))
+        return found
 
     @classmethod
     def of_states(cls, learnt: Learnt) -> "Reach":

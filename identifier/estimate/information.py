@@ -39,9 +39,6 @@ def coordinates(p: Array) -> tuple[Array, Array]:
     """Return u (m,), and its slopes over the parameters (m, p).
 
     The road moves the forces, so that its slopes are those of another friction.
-
-    Parameters
-    ----------
     p : parameters (p,).
     """
     u, slopes = np.zeros(SIZE), np.zeros((SIZE, len(NAMES)))
@@ -66,17 +63,8 @@ def _on_grid() -> ca.Function:
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Information:
     """What drives tell.
-
-    Parameters
-    ----------
     matrix : Λ, zero of what was held (m, m).
-    vector : η (m,).
-    seconds : of driving that counts [s].
-
-    Raises
-    ------
-    ValueError
-        Where shapes do not fit or a number is not finite.
+    vector : η (m,).   seconds : of driving that counts [s].
     """
 
     matrix: Array
@@ -103,11 +91,7 @@ class Information:
         cls, p: Array, slope: Array, curvature: Array, sd: Array, driven: Array, seconds: float
     ) -> "Information":
         """Return what drives tell by their loss about their optimum.
-
-        Parameters
-        ----------
-        p : the optimum (p,).
-        slope, curvature : of the loss there (p,), (p, p).
+        p : the optimum (p,).   slope, curvature : of the loss there (p,), (p, p).
         sd : standard deviations of the prior (p,).
         driven : largest slip of each axle [rad], (2,).
         """
@@ -145,11 +129,7 @@ class Information:
         """Return the same where u was off by errors of these drives alone.
 
         Their errors d ~ N(0, D) along A: Λ - ΛA (D⁻¹ + A'ΛA)⁻¹ A'Λ.
-
-        Parameters
-        ----------
-        along : A (m, k).
-        sd : root of D (k,).
+        along : A (m, k).   sd : root of D (k,).
         """
         moved = self.matrix @ along
         gain = np.linalg.solve(np.diag(sd**-2.0) + along.T @ moved, moved.T).T

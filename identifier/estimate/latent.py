@@ -51,17 +51,13 @@ SHORTEST = 50  # nodes from which noise is learnt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trust:
+class _Trust:
     """How far curves, road and sensors are trusted; times and sensors as of a sedan.
-
-    Parameters
-    ----------
     error, relative : what curves miss of a force [static axle loads], [-].
     error_time : for which it stays alike [s].
     bank, bank_time : sine of the bank of a road [-], and for which it lasts [s].
     push, turn : what no tire pushes: v_y [sqrt(g L)/sqrt(s)], r [(g/L)^(3/4)].
-    lag : of lagged slip, from node to node [rad].
-    side_slip : at the first node [rad].
+    lag : of lagged slip, from node to node [rad].   side_slip : at the first node [rad].
     r, a_y : what no noise explains of sensors [rad/s], [m/s²].
     a_y_share : the same of a_y over it [-].
     r_noise, a_y_noise : noise before it is learnt, in the same units.
@@ -95,7 +91,7 @@ class Trust:
     lasting: float = 2.0
 
 
-TRUST = Trust()
+TRUST = _Trust()
 
 
 class LateralVelocity(NamedTuple):
@@ -109,7 +105,7 @@ class LateralVelocity(NamedTuple):
     beside: Array
 
 
-class Around(NamedTuple):
+class _Around(NamedTuple):
     """Gauss-Newton's matrix and gradient: of states, of neighbors, border, of parameters."""
 
     A: Array
@@ -121,7 +117,7 @@ class Around(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Smoothed:
+class _Smoothed:
     """States (n, 8) and all parameters (p + 4,) at an optimum, its cost J [nats], R (2,), and
     covariances: of the states alone (n, 8, 8), of the parameters that move (m, m); dz/dp of v_y
     (n, m).
@@ -138,9 +134,6 @@ class Smoothed:
 
 def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Priors:
     """Return beliefs with those of the accelerometer behind, and of yaw rate and inertia.
-
-    Parameters
-    ----------
     beliefs : of the car, of one of these, or of a log that came before.
     late : whether a delay of a_y was found and taken out, so that more of it may be left.
     """
@@ -171,11 +164,8 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     )
 
 
-class Latent:
+class _Latent:
     """The problem of a drive: its cost, and how it is minimized.
-
-    Parameters
-    ----------
     priors : of `latent_priors`; what is to be held does not move.
     columns : which parameters slopes are taken over, (m,): those that move, and others whose doubt
         is to be given.
@@ -187,7 +177,7 @@ class Latent:
         vehicle: Vehicle,
         priors: Priors,
         columns: NDArray[np.intp] | None = None,
-        trust: Trust = TRUST,
+        trust: _Trust = TRUST,
     ) -> None:
         self.nodes, self.vehicle, self.trust = nodes, vehicle, trust
         self.index = np.flatnonzero(priors.moves) if columns is None else columns
@@ -285,7 +275,7 @@ class Latent:
         parts = (("moves", "of_moves"), ("shows", "of_shows"), ("begins", "of_begins"))
         return 0.5 * sum(float(np.sum(weights[w] * out[name] ** 2)) for name, w in parts)
 
-    def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[Around, Array]:
+    def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[_Around, Array]:
         """Return matrix and gradient at a point, and the slopes of what sensors show (n, 2, 8)."""
         m = len(self.index)
         sums = {"sums": np.zeros((m, m)), "slopes": np.zeros(m)}
@@ -299,9 +289,9 @@ class Latent:
         gradient, curvature = around_beliefs(self.priors, p)
         C = out["sums_final"] + curvature[np.ix_(self.index, self.index)]
         g_p = out["slopes_final"].ravel() + gradient[self.index]
-        return Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
+        return _Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
 
-    def _eliminated(self, at: Around, damping: float) -> tuple[Array, Array]:
+    def _eliminated(self, at: _Around, damping: float) -> tuple[Array, Array]:
         """Return A⁻¹ g (8n,) and A⁻¹ B (8n, m)."""
         n = len(at.A)
         banded = np.zeros((2 * N, n * N))
@@ -317,7 +307,7 @@ class Latent:
         X = cho_solve_banded((factor, True), right, overwrite_b=True, check_finite=False)
         return X[:, 0], X[:, 1:]
 
-    def _step(self, at: Around, p: Array, damping: float) -> tuple[Array, Array]:
+    def _step(self, at: _Around, p: Array, damping: float) -> tuple[Array, Array]:
         """Return the steps of states (n, 8) and of parameters that move."""
         x, X = self._eliminated(at, damping)
         free, index = self.free, self.index[self.free]
@@ -332,9 +322,6 @@ class Latent:
 
     def begin(self, stiffer: float = 0.0) -> tuple[Array, Array]:
         """Return states whose rear axle does not slip, and the parameters that are believed.
-
-        Parameters
-        ----------
         stiffer : by which ln C of both axles is larger.
         """
         v_x, delta = self.nodes.given[:, 0], self.nodes.given[:, 1]
@@ -443,11 +430,8 @@ class Latent:
             found[i] = max(density - known, 1e-10)
         return found
 
-    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> Smoothed:
+    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> _Smoothed:
         """Return the optimum from a start, its noise learnt in some rounds.
-
-        Parameters
-        ----------
         R : to begin with (2,); None takes that of good sensors.
         """
         R = self.R if R is None else R
@@ -459,12 +443,11 @@ class Latent:
         own, P, slopes, _ = self.spread(z, p, R)
         left = 2.0 * self.misfit(z, p, self.weights(z, p, R)) / max(self.nodes.counts.sum(), 1)
         wider = max(1.0, left / self.trust.usual)
-        return Smoothed(z, p, cost, R, wider * own, wider * P, slopes)
+        return _Smoothed(z, p, cost, R, wider * own, wider * P, slopes)
 
 
 class Learnt(NamedTuple):
     """What a drive without v_y taught: the posterior, where it is, and its states.
-
     parted : side slip by which the starts parted, rms [rad].
     """
 
@@ -479,13 +462,9 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
 
     It begins with soft and with stiff tires. Where they end elsewhere, the covariance has the
     distance between both, by how probable they are.
-
-    Parameters
-    ----------
-    beliefs : of the car, or what other drives of it left.
-    late : as of `latent_priors`.
+    beliefs : of the car, or what other drives of it left.   late : as of `latent_priors`.
     """
-    problem = Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
+    problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
     first = problem.smoothed(*problem.settled(STARTS[0]))
     z, p, cost = problem.descend(*problem.settled(STARTS[1]), first.R)
     best, other = first, (z, p, cost)
@@ -529,10 +508,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     It is the delay with which the minute of hardest cornering is explained best, found as a
     parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
     too little.
-
-    Parameters
-    ----------
-    priors : as of `Latent`.
+    priors : as of `_Latent`.
     """
     part = hardest(recording, ASKED)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
@@ -544,8 +520,8 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     information[delay, delay] = (ANY_DELAY * scale) ** -2
     open_ = replace(priors, information=information)
 
-    def problem(late: float, beliefs: Priors) -> Latent:
-        return Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
+    def problem(late: float, beliefs: Priors) -> _Latent:
+        return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
     on_time = problem(0.0, priors)
     z, p, least = on_time.descend(*on_time.settled(), on_time.R, FEW)
@@ -568,9 +544,6 @@ def estimate_v_y(
     recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
 ) -> LateralVelocity:
     """Return the v_y of a drive on tires that are known, and how well.
-
-    Parameters
-    ----------
     p, covariance : of the tires, as `motion.parameters` lists them (p,), (p, p).
     """
     again = np.array([LATENT_NAMES.index(name) for name in AGAIN])
@@ -594,7 +567,7 @@ def estimate_v_y(
         nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
         if not nodes.counts.any():
             continue
-        problem = Latent(nodes, vehicle, held(late != 0.0), columns)
+        problem = _Latent(nodes, vehicle, held(late != 0.0), columns)
         found = problem.smoothed(*problem.begin(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from codegen.arrays import Array
+from identifier.axle.gate import GATE_PORT
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
 from identifier.estimate.poor import on_time
@@ -19,12 +20,7 @@ PORTS = (
     AXLE_FORCE,
     Port("lagged_slip", "rad", "slip angles that make the forces, paper's sign"),
     Port("slip_size", "rad", "larger of the slip angle and its lag, without sign"),
-    Port(
-        "gate",
-        "SI",
-        "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "
-        "samples in a row",
-    ),
+    GATE_PORT,
     Port("motion", "SI", f"of the forward model: {', '.join(REPLAYED)}"),
 )
 
@@ -34,11 +30,7 @@ class FitMethod(Method):
     """Maximum a posteriori of tires, body and sensors over a whole log.
 
     By `estimate.solve`, without a v_y by `estimate.latent`.
-
-    Parameters
-    ----------
-    min_speed : below this speed [m/s] forces read zero.
-    dt : sampling interval of the log [s].
+    min_speed : below this speed [m/s] forces read zero.   dt : sampling interval of the log [s].
     """
 
     judged_by = "tireid predict on another drive"
@@ -82,9 +74,6 @@ class FitMethod(Method):
         progress: Callable[[float], None] | None = None,
     ) -> FittedModel:
         """Return the tires that a log taught.
-
-        Parameters
-        ----------
         start : a fit, or the prior of a fleet, that is believed before; None believes the table.
 
         Raises

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.axle.slip import Sway
 from identifier.estimate.drive import (
     ALONG,
     LONGITUDINAL,
@@ -39,14 +40,9 @@ class TooShortError(TireidError, ValueError):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Nodes:
     """Signals at n nodes.
-
-    Parameters
-    ----------
     t : time in the recording's own clock [s], (n,).
-    dt : from a node to the next [s].
-    given : columns as `motion.nodes.GIVEN`, (n, 8).
-    measured : r [rad/s] and a_y [m/s²], (n, 2).
-    counts : where the car drives fast enough, (n,).
+    dt : from a node to the next [s].   given : columns as `motion.nodes.GIVEN`, (n, 8).
+    measured : r [rad/s] and a_y [m/s²], (n, 2).   counts : where the car drives fast enough, (n,).
     goes : whether the motion goes on to the next node, (n,).
     """
 
@@ -66,9 +62,6 @@ class Nodes:
         a_y_late: float = 0.0,
     ) -> "Nodes":
         """Return the nodes of a recording.
-
-        Parameters
-        ----------
         a_y_late : by which a_y is late [s].
 
         Raises
@@ -133,7 +126,7 @@ def _piece(
         if slope_on(motion, felt, on, dt, ALONG) is not None:
             a_x, turning = felt, 0.0
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
-    omega = min(5.0 / vehicle.froude_time, 60.0)
+    omega = Sway.for_vehicle(vehicle).frequency
     rho, rate = _rolled(low_passed(a_y, ROLLS / scale, dt), omega, dt)
     jerk = gradient(low_passed(a_y, JERKS / scale, dt), dt)
     speed = mean(v_x)

@@ -38,9 +38,8 @@ BANKS = WANDERS * 10.0 ** np.arange(-3.0, 1.1, 1.0)
 ROUNDS = 5
 
 
-class Shown(NamedTuple):
+class _Shown(NamedTuple):
     """How a sensor shows v_y.
-
     interval : between new values [s].   late : [s].   noise : [m/s].
     push, wanders : variances of w [(m/s²)² s] and of b' [(m/s²)²/s].
     """
@@ -61,10 +60,10 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     if v_y is None:
         return recording
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
-    new = new_values(v_y)
+    new = _new_values(v_y)
     rare = len(new) < len(v_y) and _interval(new) * recording.dt > RARE * scale
     new = new if rare else np.arange(len(v_y))
-    shown = Shown(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
+    shown = _Shown(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
     if len(new) < FEWEST or (recording.a_y is None and not rare):
         return recording
     if recording.a_y is None:
@@ -72,14 +71,14 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     else:
         part = hardest(recording, min(ASKED, MOST * recording.dt))
         inside = new[(new >= part.start) & (new < part.stop)] - part.start
-        problem = Kinematics(recording.taken(part), inside)
+        problem = _Kinematics(recording.taken(part), inside)
         white = white_noise(problem.shown) if problem.shown.size > FEWEST else 0.0
         if not rare and not white * np.sqrt(shown.interval / SMOOTHED) > NOISY * scale:
             return recording
         shown = _likeliest(problem, shown._replace(noise=max(white, shown.noise)), scale)
         if not rare and not shown.push < PUSHES[-1]:
             return recording  # a_y does not show this motion
-    weights, whole = np.ones(len(new)), Kinematics(recording, new)
+    weights, whole = np.ones(len(new)), _Kinematics(recording, new)
     for _ in range(AGAIN):
         found, missed = whole.carried(shown, weights)
         weights = np.minimum(1.0, CLIP * shown.noise / np.maximum(np.abs(missed), 1e-12))
@@ -92,7 +91,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     return replace(recording, v_y=found, notes=(*recording.notes, note))
 
 
-def new_values(signal: Array) -> NDArray[np.intp]:
+def _new_values(signal: Array) -> NDArray[np.intp]:
     """Return which samples are new: not the last one held, nor on a straight line, (m,).
 
     All are new where neither is the rule.
@@ -115,11 +114,8 @@ def _interval(new: NDArray[np.intp]) -> float:
     return float(np.median(np.diff(new))) if new.size > 1 else np.inf
 
 
-class Kinematics:
+class _Kinematics:
     """v_y over a recording as least squares, its unknowns v_y and b of each sample in turn.
-
-    Parameters
-    ----------
     new : samples at which a value is new, (m,).
     """
 
@@ -143,10 +139,9 @@ class Kinematics:
         return np.searchsorted(np.array(self.recording.breaks), np.arange(self.n), side="right")
 
     def _solved(
-        self, s: Shown, weights: Array, late: float | None = None
+        self, s: _Shown, weights: Array, late: float | None = None
     ) -> tuple[Array, Array, float]:
         """Return v_y (n,), what it misses of what was shown (m,), and -ln of the likelihood.
-
         late : delay up to which values must have a past to count [s]; None takes that of `s`.
         """
         from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
@@ -201,17 +196,14 @@ class Kinematics:
         logs += steps * np.log(s.push * s.wanders)
         return v, np.where(there, missed, 0.0), 0.5 * float(squares + logs)
 
-    def carried(self, shown: Shown, weights: Array) -> tuple[Array, Array]:
+    def carried(self, shown: _Shown, weights: Array) -> tuple[Array, Array]:
         """Return v_y (n,) and what it misses of the values that were shown (m,) [m/s].
-
-        Parameters
-        ----------
         weights : of the values, at most 1 (m,).
         """
         v_y, missed, _ = self._solved(shown, weights)
         return v_y, missed
 
-    def cost(self, shown: Shown) -> float:
+    def cost(self, shown: _Shown) -> float:
         """Return -ln of the likelihood of how a sensor shows v_y [nats], but for a constant.
 
         The same values count for each delay.
@@ -219,7 +211,7 @@ class Kinematics:
         return self._solved(shown, np.ones(len(self.new)), float(DELAYS[-1]))[2]
 
 
-def _likeliest(problem: Kinematics, best: Shown, scale: float) -> Shown:
+def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
     """Return how v_y is shown, by the largest likelihood, from a beginning on."""
     least = problem.cost(best)
 

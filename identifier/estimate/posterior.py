@@ -12,9 +12,6 @@ from models.vehicle import Vehicle
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Posterior:
     """Gaussian around the optimum.
-
-    Parameters
-    ----------
     p : all parameters, as `motion.parameters` lists them (p,).
     covariance : of them, zero of those that did not move (p, p).
     slope, curvature : of the loss of the drives alone, without the priors (p,), (p, p).
@@ -22,8 +19,7 @@ class Posterior:
     roads : ln of the friction of other roads than that of the curves (K,).
     road_sd : standard deviation of these (K,).
     scale : S of the residuals of both axles [-], (2,).
-    memory : T, their integrated autocorrelation time [s], (2,).
-    cost : J at the optimum [nats].
+    memory : T, their integrated autocorrelation time [s], (2,).   cost : J at the optimum [nats].
     """
 
     vehicle: Vehicle

@@ -25,9 +25,8 @@ SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse of a given shar
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
 
-class Belief(NamedTuple):
+class _Belief(NamedTuple):
     """A prior: mean, standard deviation, bounds, and why.
-
     per : what mean, sd and bounds are multiples of: "" for SI, "L" for the wheelbase, "v" for the
     speed sqrt(L/2.7 m).
     """
@@ -41,30 +40,30 @@ class Belief(NamedTuple):
 
 
 INF = float("inf")
-OF_AXLES: dict[str, Belief] = {
-    "ln_stiffness": Belief(
+OF_AXLES: dict[str, _Belief] = {
+    "ln_stiffness": _Belief(
         np.log(14.0), 0.5, np.log(2.0), np.log(60.0), "", "road tires 8-25 loads/rad, 1:10 4-20"
     ),
-    "ln_grip": Belief(np.log(0.85), 0.25, np.log(0.1), np.log(3.0), "", "wet asphalt to slicks"),
-    "shape": Belief(1.35, 0.15, 1.0, 1.9, "", "Magic Formula fits of lateral forces"),
-    "curvature": Belief(0.0, 0.6, -4.0, 0.95, "", "beyond 0.95 the curve has no peak"),
+    "ln_grip": _Belief(np.log(0.85), 0.25, np.log(0.1), np.log(3.0), "", "wet asphalt to slicks"),
+    "shape": _Belief(1.35, 0.15, 1.0, 1.9, "", "Magic Formula fits of lateral forces"),
+    "curvature": _Belief(0.0, 0.6, -4.0, 0.95, "", "beyond 0.95 the curve has no peak"),
     **{
-        f"residual{j}": Belief(0.0, 0.08, -INF, INF, "", "what tires of one formula differ by")
+        f"residual{j}": _Belief(0.0, 0.08, -INF, INF, "", "what tires of one formula differ by")
         for j in range(len(SLIPS))
     },
-    "compliance": Belief(0.008, 0.008, 0.0, 0.1, "L", "relaxation of about a tenth wheelbase"),
-    "sway_share": Belief(0.2, 0.3, 0.0, 1.0, "", "roll center low to high"),
-    "braking": Belief(0.65, 0.3, 0.0, 2.0, "", "all four wheels brake"),
-    "driving": Belief(0.35, 0.4, 0.0, 3.0, "", "which axle drives is not known"),
+    "compliance": _Belief(0.008, 0.008, 0.0, 0.1, "L", "relaxation of about a tenth wheelbase"),
+    "sway_share": _Belief(0.2, 0.3, 0.0, 1.0, "", "roll center low to high"),
+    "braking": _Belief(0.65, 0.3, 0.0, 2.0, "", "all four wheels brake"),
+    "driving": _Belief(0.35, 0.4, 0.0, 3.0, "", "which axle drives is not known"),
 }
-OF_CAR: dict[str, Belief] = {
-    "load_transfer": Belief(0.18, 0.08, 0.0, 0.5, "", "height 0.5 m, less what tires lose"),
-    "ln_sway": Belief(0.0, 0.25, -INF, INF, "", "1.5 Hz for a sedan, 5 sqrt(g/L)"),
-    "steering_zero": Belief(0.0, 0.007, -0.2, 0.2, "", "a toe or a zero of 0.4 degrees"),
-    "steering_gain": Belief(0.0, 0.04, -0.6, 1.5, "", "a steering ratio that somebody typed"),
-    "v_y_bias": Belief(0.0, 0.07, -INF, INF, "v", "of optical and satellite sensors"),
-    "v_y_angle": Belief(0.0, 0.007, -INF, INF, "", "mounted to 0.4 degrees"),
-    "v_y_lever": Belief(0.0, 0.015, -INF, INF, "L", "place measured to 4 cm"),
+OF_CAR: dict[str, _Belief] = {
+    "load_transfer": _Belief(0.18, 0.08, 0.0, 0.5, "", "height 0.5 m, less what tires lose"),
+    "ln_sway": _Belief(0.0, 0.25, -INF, INF, "", "1.5 Hz for a sedan, 5 sqrt(g/L)"),
+    "steering_zero": _Belief(0.0, 0.007, -0.2, 0.2, "", "a toe or a zero of 0.4 degrees"),
+    "steering_gain": _Belief(0.0, 0.04, -0.6, 1.5, "", "a steering ratio that somebody typed"),
+    "v_y_bias": _Belief(0.0, 0.07, -INF, INF, "v", "of optical and satellite sensors"),
+    "v_y_angle": _Belief(0.0, 0.007, -INF, INF, "", "mounted to 0.4 degrees"),
+    "v_y_lever": _Belief(0.0, 0.015, -INF, INF, "L", "place measured to 4 cm"),
 }
 ALIKE = {  # standard deviation of front less rear
     "ln_stiffness": (0.35, ""),
@@ -85,14 +84,10 @@ TAILS = 1.0  # degrees of freedom of their priors
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Priors:
     """The beliefs for a car, as numbers.
-
-    Parameters
-    ----------
     mean, low, high : of all parameters, (p,).
     information : inverse covariance, (p, p); zero where a parameter does not move.
     moves : which are estimated, (p,).
-    typed : which numbers somebody typed.
-    data : what drives add to it
+    typed : which numbers somebody typed.   data : what drives add to it
     """
 
     mean: Array
@@ -118,12 +113,8 @@ class Priors:
         *,
         wide: Mapping[str, float] = {},
         apart: bool = False,
-        fixed: Collection[str] = (),
     ) -> "Priors":
         """Return the beliefs for a car.
-
-        Parameters
-        ----------
         wide : standard deviations in SI in place of those of the table, by parameter.
         apart : whether bias and angle of v_y are believed apart, without `SHARED_ERROR`.
         """
@@ -141,8 +132,6 @@ class Priors:
             mean[k], sd[k] = min(max(value, low[k]), high[k]), doubt
         for name, value in wide.items():
             sd[INDEX[name]] = value
-        for name in fixed:
-            sd[INDEX[name]] = 0.0
         information = np.zeros((p, p))
         moves = sd > 0.0
         information[moves, moves] = 1.0 / sd[moves] ** 2

@@ -29,7 +29,6 @@ ROUNDS = 2  # of finding segments anew at the better estimate
 
 class Roads(NamedTuple):
     """Which road each sample of each drive is on, and the estimate with them.
-
     labels : by drive, (n,); 0 is the road of the curves.   ln_m : of roads 1 to K (K,).   sd : of
     these.
     """
@@ -43,9 +42,6 @@ def with_roads(
     drives: Sequence[Drive], vehicle: Vehicle, priors: Priors, plain: Posterior
 ) -> tuple[Posterior, Roads | None]:
     """Return the estimate with a friction of each segment where that is worth its price.
-
-    Parameters
-    ----------
     plain : the estimate without segments.
     """
     best, roads = plain, None
@@ -83,7 +79,7 @@ def _segments(
         loss[k] = (weight / T * (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))).sum(axis=1)
     count = loss.shape[1]
     bins = np.arange(0, count, BIN)
-    path = cheapest(np.add.reduceat(loss, bins, axis=1), PRICE).repeat(BIN)[:count]
+    path = _cheapest(np.add.reduceat(loss, bins, axis=1), PRICE).repeat(BIN)[:count]
     found, begin = [], 0
     for k, one in enumerate(drives):
         length = problem.lengths[k]
@@ -97,11 +93,8 @@ def _segments(
     return _ranked(found)
 
 
-def cheapest(loss: Array, price: float) -> NDArray[np.intp]:
+def _cheapest(loss: Array, price: float) -> NDArray[np.intp]:
     """Return the states of least loss when each change has a price, (m,).
-
-    Parameters
-    ----------
     loss : of each state at each step (k, m) [nats].
     """
     states, steps = loss.shape

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.slip import Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_CAR, SEDAN, Priors
-from identifier.motion.model import CARRIED, CarNumbers, motion_scan
+from identifier.motion.model import CarNumbers, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
 
@@ -38,7 +39,7 @@ SETTLING, SETTLED = 60, 1e-4  # iterations and improvement [nats] where no drive
 Labels: TypeAlias = Sequence[NDArray[np.intp]]
 
 
-class Residuals(NamedTuple):
+class _Residuals(NamedTuple):
     """e over b (m, 2), and its slopes over the parameters that move (m, 2, n)."""
 
     e: Array
@@ -47,9 +48,6 @@ class Residuals(NamedTuple):
 
 class Problem:
     """Residuals of drives of one car as a function of the parameters.
-
-    Parameters
-    ----------
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     every : whether slopes over all parameters are at hand, for `under` other priors.
     """
@@ -125,18 +123,15 @@ class Problem:
         e = []
         for k, one in enumerate(self.drives):
             driven = one.on(road)
-            given = arguments(driven, p, self._car, scan)
+            given = _arguments(driven, p, self._car, scan)
             out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
             e.append(out["missed"][self._kept[k]])
         whole: Array = np.concatenate(e) / self.size[:, None]
         found: Array = np.nan_to_num(whole, nan=1e3, posinf=1e3)
         return found
 
-    def residuals(self, p: Array) -> Residuals:
+    def residuals(self, p: Array) -> _Residuals:
         """Return what the balance misses, and its slopes.
-
-        Parameters
-        ----------
         p : parameters, and behind them ln of the friction of other roads.
         """
         e, slopes = [], []
@@ -147,7 +142,7 @@ class Problem:
             driven = one if roads is None else one.on(ln_m[roads])
             out = self._scan(
                 len(driven.signals),
-                arguments(driven, p[: len(NAMES)], self._car, self._scan),
+                _arguments(driven, p[: len(NAMES)], self._car, self._scan),
                 every=stride,
                 ports=("missed", "missed_slopes"),
             )
@@ -166,16 +161,13 @@ class Problem:
         if shrunk < 1.0:
             slope[:, :, self.index == INDEX["v_x_factor"]] -= missed[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
-            return Residuals(
+            return _Residuals(
                 np.nan_to_num(missed / size, nan=1e3, posinf=1e3, neginf=-1e3),
                 np.nan_to_num(slope / size[..., None]),
             )
 
     def memory(self, e: Array) -> Array:
         """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
-
-        Parameters
-        ----------
         e : over b [-], (m, 2).
         """
         step, x = float(self.weight[0]), np.clip(e, -4.0, 4.0)
@@ -186,9 +178,6 @@ class Problem:
 
     def scale(self, e: Array) -> Array:
         """Return S² of both axles, (2,), by expectation maximization.
-
-        Parameters
-        ----------
         e : over b [-], (m, 2).
         """
         S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, LEAST_SCALE) ** 2
@@ -200,12 +189,7 @@ class Problem:
 
     def cost(self, e: Array, p: Array, T: Array) -> float:
         """Return J of residuals at parameters when a second of them counts 1/T times [nats].
-
-        Parameters
-        ----------
-        e : over b [-], (m, 2).
-        p : (p,).
-        T : [s], (2,).
+        e : over b [-], (m, 2).   p : (p,).   T : [s], (2,).
         """
         S2 = self.scale(e)
         scales = float((0.5 * np.log(S2) * self.weight.sum() / T).sum())
@@ -213,12 +197,7 @@ class Problem:
 
     def misfit(self, e: Array, S2: Array, T: Array) -> float:
         """Return Σ w/T ρ(e) [nats].
-
-        Parameters
-        ----------
-        e : over b [-], (m, 2).
-        S2 : [-], (2,).
-        T : [s], (2,).
+        e : over b [-], (m, 2).   S2 : [-], (2,).   T : [s], (2,).
         """
         loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
@@ -232,11 +211,7 @@ def error_size(force: Array) -> Array:
 
 def autocorrelation_time(pieces: Sequence[Array], step: float, lags: int) -> float:
     """Return the integrated autocorrelation time of a signal [s]; 2 s where it is zero.
-
-    Parameters
-    ----------
-    pieces : of the signal; such below 20 samples do not count.
-    step : between samples [s].
+    pieces : of the signal; such below 20 samples do not count.   step : between samples [s].
     lags : of which at most a third of a piece is looked at.
     """
     total = np.zeros(lags)
@@ -258,37 +233,29 @@ def autocorrelation_time(pieces: Sequence[Array], step: float, lags: int) -> flo
 def car_numbers(vehicle: Vehicle) -> Array:
     """Return the numbers of `CarNumbers`, (7,)."""
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
-    omega = min(5.0 * np.sqrt(GRAVITY / vehicle.wheelbase), 60.0)
+    omega = Sway.for_vehicle(vehicle).frequency
     return np.array(
         CarNumbers(l_f, l_r, I_z / (m * GRAVITY), omega, *vehicle.downforce, vehicle.drag)
     )
 
 
-def arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
+def _arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
     """Return the inputs of a compiled motion over a drive.
 
     Late signals are read on time; the rest of a delay is 0.
-
-    Parameters
-    ----------
     car : of `car_numbers`, (7,).
     """
     late = p[DELAYS]
     if late.any():
         one, p = one.on_time(late), p.copy()
         p[DELAYS] = 0.0
-    more = {}
-    if "tangent" in scan.carry:
-        more = {"tangent": np.zeros(scan.step.numel_in("tangent"))}
     return {
-        "state": np.zeros(len(CARRIED)),
-        "was_on": np.zeros(1),
+        **scan.zeros(),
         "signals": one.signals,
         "rates": one.rates,
         "parameters": p,
         "car": car,
         "dt": np.array(one.dt),
-        **more,
     }
 
 
@@ -297,7 +264,7 @@ def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
     scan = motion_scan()
     return scan(
         len(one.signals),
-        arguments(one, p, car_numbers(vehicle), scan),
+        _arguments(one, p, car_numbers(vehicle), scan),
         ports=("force", "missed", "slip"),
     )
 
@@ -312,9 +279,6 @@ def estimate(
     enough: float = ENOUGH,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
-
-    Parameters
-    ----------
     vehicle : the car; its stiffnesses are not looked at.
     priors : beliefs; None takes those of the car.
     begin : parameters to begin with (p,); None begins with the prior's mean, and where straights
@@ -360,9 +324,6 @@ def descend(
     enough: float = ENOUGH,
 ) -> Posterior:
     """Return the optimum that is found from a start.
-
-    Parameters
-    ----------
     start : parameters to begin with (p,).
     memory : T [s], (2,), where it is held, so that costs can be compared; None estimates it.
     enough : improvement below which it ends [nats].
@@ -437,9 +398,6 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     """Return the optimum (p,) of what is believed, and its covariance (p, p).
 
     With `Priors.after` these are the parameters of all drives together.
-
-    Parameters
-    ----------
     begin : parameters to begin with (p,).
     """
     index, p = np.flatnonzero(priors.moves), begin.copy()
@@ -466,29 +424,22 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
 
 def beliefs_cost(priors: Priors, p: Array) -> float:
     """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
-    soft, _ = softness(p)
+    soft, _ = _softness(p)
     return priors.cost(p) + 0.5 * float(soft @ soft)
 
 
 def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
     """Return gradient (p,) and positive curvature (p, p) of `beliefs_cost`."""
     gradient, curvature = priors.around(p)
-    soft, slopes = softness(p)
+    soft, slopes = _softness(p)
     return gradient + soft @ slopes, curvature + slopes.T @ slopes
 
 
-def softness(p: Array) -> tuple[Array, Array]:
-    """Return how far both axles are softer at zero than a tire can be, and its slopes over p.
+def _softness(p: Array) -> tuple[Array, Array]:
+    """Return how far both axles are softer at zero than a tire can be, and its slopes over p (p,).
 
-    No tire has less than a quarter of C there: play in the steering looks so.
-
-    Parameters
-    ----------
-    p : (p,).
-
-    Returns
-    -------
-    (2,), in standard deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
+    No tire has less than a quarter of C there: play in the steering looks so. (2,), in standard
+    deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
     """
     found, slopes = np.zeros(2), np.zeros((2, p.size))
     for i, axle in enumerate("fr"):
@@ -504,7 +455,7 @@ def softness(p: Array) -> tuple[Array, Array]:
     return found, slopes
 
 
-def normal(problem: Problem, at: Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
+def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
     w = problem.weight[:, None] / T * (NU + 1.0) / (NU * S2 + at.e**2)
     J = at.slopes.reshape(-1, at.slopes.shape[2])

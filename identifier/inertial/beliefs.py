@@ -16,7 +16,6 @@ TOLD_ROLL = 0.25  # standard deviation of the roll that a chassis tells, as a sh
 
 class Body(NamedTuple):
     """A body that rolls under lateral acceleration.
-
     frequency, damping : of its roll [rad/s], [-].   roll, sd_roll : outwards, as the accelerometer
     feels it, and the standard deviation of that [rad/g].
     """
@@ -39,11 +38,7 @@ class Body(NamedTuple):
 
     def step(self, rolls: tuple[float, float], level: float, dt: float) -> tuple[float, float]:
         """Return what it rolls by and the rate of that a sample later, implicit.
-
-        Parameters
-        ----------
-        level : acceleration in the plane of the road [m/s²].
-        dt : sampling interval [s].
+        level : acceleration in the plane of the road [m/s²].   dt : sampling interval [s].
         """
         now, rate = rolls
         stiff = dt * self.frequency**2
@@ -56,9 +51,6 @@ class Body(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beliefs:
     """Means and standard deviations of what is learnt beside the curves, before the first sample.
-
-    Parameters
-    ----------
     bias : of the accelerometer [g].
     roll, sd_roll : of the body, outwards, as the accelerometer feels it [rad per g]; 0 and nearly 0
         for an acceleration in the plane of the road.
@@ -81,15 +73,11 @@ class Beliefs:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trust:
     """How far motion, road and sensors are trusted; sensors as of a car with a wheelbase of 2.7 m.
-
-    Parameters
-    ----------
     v_y : of v_y at the first sample and below the lowest speed of learning [sqrt(g L)].
     r : of the yaw rate then [rad/s].
     error, relative_error : what curves miss of a force [static axle loads], [-].
     correlation_time : of that [s].
-    bank : sine of the bank of a road [-].
-    bank_time : in which a road banks [s].
+    bank : sine of the bank of a road [-].   bank_time : in which a road banks [s].
     jerk : what pushes the yaw rate beside tires, as a random walk [(g/L)^(3/4)].
     r_error, a_y_error : what no noise explains of the yaw rate [rad/s] and of a_y [m/s²].
     a_y_share : of a_y, what no noise explains of it beside that [-].
@@ -133,12 +121,7 @@ class Trust:
 
     def at(self, dt: float, wheelbase: float, froude_time: float) -> "TrustNumbers":
         """Return the numbers of a step.
-
-        Parameters
-        ----------
-        dt : sampling interval [s].
-        wheelbase : L [m].
-        froude_time : sqrt(L/g) [s].
+        dt : sampling interval [s].   wheelbase : L [m].   froude_time : sqrt(L/g) [s].
         """
         scale = math.sqrt(wheelbase / 2.7)
         speed = wheelbase / froude_time

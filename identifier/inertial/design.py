@@ -5,25 +5,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 
+import casadi as ca
 import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
-from identifier.axle.covariance import packed, triangle, unpacked
+from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
-from identifier.axle.design import AxleIdentifier
-from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.design import AxleIdentifier, tracks
+from identifier.axle.gate import Plausibility
 from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
-from identifier.axle.slip import FASTEST, SHORTEST, Sensors, Sway
+from identifier.axle.slip import FASTEST, Sensors, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import CURVES, MOVING, SENSORS, Along, Laws, Learnt
+from identifier.inertial.motion import MOVING, SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
     CARRY,
     OVER,
@@ -48,9 +49,6 @@ class InertialIdentifier(Method):
     """Lateral velocity and axle curves by one Kalman filter, from r, a_y, v_x and steering alone.
 
     What is learnt freezes to the same kind of model as that of the axle identifier.
-
-    Parameters
-    ----------
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
     held : whether tires, lag and steering stay those of the model that it begins with, but for
@@ -62,11 +60,6 @@ class InertialIdentifier(Method):
     sensors : errors of sensors that were known before; that of the steering is taken out.
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
-
-    Raises
-    ------
-    ValueError
-        Where the ladder does not rise by powers of two, or a number is none of a car.
     """
 
     prior: Prior
@@ -101,9 +94,6 @@ class InertialIdentifier(Method):
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "InertialIdentifier":
         """Return the design for a car: lengths scale with L, speeds with sqrt(g L) (Froude).
-
-        Parameters
-        ----------
         vehicle : only its wheelbase is used here; its cornering stiffness enters the prior.
         dt : sampling interval [s].
         """
@@ -127,9 +117,6 @@ class InertialIdentifier(Method):
         cls, model: FittedModel, vehicle: Vehicle, *, dt: float = 0.01
     ) -> "InertialIdentifier":
         """Return the design for a car whose tires are known: it begins with the model.
-
-        Parameters
-        ----------
         dt : sampling interval [s].
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
@@ -158,9 +145,6 @@ class InertialIdentifier(Method):
         cls, model: TireModel | None, vehicle: Vehicle, *, dt: float = 0.01
     ) -> "tuple[InertialIdentifier, TireModel | None]":
         """Return the design for a car with these tires, and what its run begins with.
-
-        Parameters
-        ----------
         model : a fit is held, what an axle identifier learnt is gone on from; others help nothing.
         dt : sampling interval [s].
         """
@@ -219,9 +203,6 @@ class InertialIdentifier(Method):
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
-
-        Parameters
-        ----------
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -243,27 +224,19 @@ class InertialIdentifier(Method):
         trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
         curves, compliance = self._directions(W), own[:, 0]
         known = self._known(vehicle, P, curves, compliance)
-        q = len(self._learnt.names)
-        rest = len(triangle(MOVING + q)) - len(triangle(q))
+        pressed = vehicle.has_downforce
+        scan = _scan(doublings(self.ladder), tires=not self.held, pressed=pressed)
         return Setup(
-            scan=_scan(
-                doublings(self.ladder),
-                tires=not self.held,
-                pressed=vehicle.has_downforce,
-            ),
+            scan=scan,
             carry={
-                "motion": np.zeros(MOVING),
+                **scan.zeros(),  # the covariance of what moves begins with the first sample
                 "W": W,
                 "own": own[:, 0],
                 "sensors": sensors,
                 "UD": packed(known[None]),
-                "motion_UD": np.zeros(rest),  # begins with the first sample
-                "gate": np.zeros(len(GateState._fields)),
-                "body": np.zeros(2),
                 "readings": np.concatenate(
                     [np.zeros(4), [trust.r_noise, trust.a_y_noise], np.zeros(4)]
                 ),
-                "running": np.zeros(3),
                 "excitation": excitation,
             },
             constants={
@@ -288,7 +261,7 @@ class InertialIdentifier(Method):
 
     def body_prior(self, vehicle: Vehicle) -> Body:
         """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
-        frequency = self.roll_frequency / vehicle.froude_time
+        frequency = self._sway(vehicle).frequency
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
 
@@ -339,19 +312,12 @@ class InertialIdentifier(Method):
 
     def _into(self, curves: Array, compliance: Array) -> Array:
         """Return what steps of what is learnt move of each axle's [W, own], (2, n + 3, k)."""
-        n, names = len(self.ladder), self._learnt.names
-        E = np.zeros((2, n + 3, len(names)))
-        for k, name in enumerate(names):
-            if name == "grip":
-                E[:, :n, k] = curves[:2]
-            elif name in CURVES:
-                i = CURVES.index(name)
-                E[i % 2, :n, k] = curves[i]
-            elif name == "compliance":
-                E[:, n, k] = compliance
-            elif name == "steering":
-                E[0, n + 2, k] = 1.0
-        return E
+        n = len(self.ladder)
+        moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[MOVING:, MOVING:]
+        *weights, own, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
+        steering, nothing = sensors[SENSORS.index("steering")], np.zeros(sensors.shape[1])
+        front = np.vstack([weights[0], own[0], nothing, steering])
+        return np.array([front, np.vstack([weights[1], own[1], nothing, nothing])])
 
     def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
         """Return the covariance of what is learnt of covariances of both axles' [W, own], (k, k).
@@ -384,25 +350,12 @@ class InertialIdentifier(Method):
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-
-        Parameters
-        ----------
         state : W (k, 2, n) and own (k, 2) at each of k instants.
         """
-        W, compliance = state["W"], state["own"].reshape(-1, 2)
-        slope = (W / np.array(self.ladder)).sum(axis=2)
-        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
-        return (
-            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
-            Track("relaxation length", "m", lag),
-            Track("force at saturation", "static load", W.sum(axis=2)),
-        )
+        return tracks(self.ladder, vehicle, state["W"], state["own"].reshape(-1, 2))
 
     def beside_force(self, state: Mapping[str, Array]) -> Array:
         """Return bias and roll in what the accelerometer showed, (n,) [weights].
-
-        Parameters
-        ----------
         state : sensors (n + 1, 4) and body (n + 1, 2).
         """
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
@@ -413,9 +366,6 @@ class InertialIdentifier(Method):
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights: where tires are held, as sure as typical ones.
-
-        Parameters
-        ----------
         state : W (2, n), own (2,), sensors (4,), UD of both and excitation (2, 9).
         """
         prior = self._prior_covariance(vehicle)

@@ -20,9 +20,6 @@ CONDITIONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP
 def as_factor(number: Any) -> Any:
     """Return a number as one that others are multiplied with: CasADi would turn each product with a
     choice into a choice.
-
-    Parameters
-    ----------
     number : scalar expression, finite where it is not chosen.
     """
     if number.is_leaf():
@@ -40,11 +37,7 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
 
     F is given by its way: rows for the a numbers on the way to m⁺, then for m⁺, each over z and
     the numbers on the way before it. So what many rows share is multiplied with U once.
-
-    Parameters
-    ----------
-    factors : of z, q entries.
-    F : Jacobian of what moves (a + m, q + a), sparse.
+    factors : of z, q entries.   F : Jacobian of what moves (a + m, q + a), sparse.
     Q : variances of w, m entries; None where there is none.
     """
     U, D = factors
@@ -91,11 +84,7 @@ def measured(
     counts: Any,
 ) -> tuple[list[Any], Factors]:
     """Return what one number that is measured corrects of z, and the factors after it.
-
-    Parameters
-    ----------
-    h : gradient of what is measured, (1, q), sparse.
-    innovation : ν, measured less expected.
+    h : gradient of what is measured, (1, q), sparse.   innovation : ν, measured less expected.
     R : variance of the measurement, positive.
     clip : standard deviations from which an innovation counts no more than at them.
     counts : 1 where there is a measurement, else 0.

@@ -34,7 +34,7 @@ SENSORS = ("bias", "roll", "steering", "gyro")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 
-class Unknowns(NamedTuple):
+class _Unknowns(NamedTuple):
     """z by name: symbols or expressions; slip, error and compliance (2,), W (2, n)."""
 
     v_y: Any
@@ -50,14 +50,13 @@ class Unknowns(NamedTuple):
     gyro: Any
 
 
-def size(n: int) -> int:
+def _size(n: int) -> int:
     """Return how many entries z has for n units."""
     return MOVING + 2 * n + 2 + len(SENSORS)
 
 
 class Learnt(NamedTuple):
     """What is learnt of z beside what moves, in this order: steps along directions.
-
     tires : along both directions of each curve, that of its stiffness and that of its grip, one
         factor of both compliances, and the zero of the steering; else along that of the grip alone.
     """
@@ -74,15 +73,12 @@ class Learnt(NamedTuple):
 
     def into(self, n: int, curves: Any, compliance: Any) -> Any:
         """Return what a step of what moves and of each of these moves of z, sparse.
-
-        Parameters
-        ----------
         n : number of units.
         curves : change of the weights by one of ln grip and of ln stiffness, (4, n): front and rear
             of the first, then of the second.
         compliance : of both axles that one of its factor adds, (2,).
         """
-        E = ca.SX(size(n), MOVING + len(self.names))
+        E = ca.SX(_size(n), MOVING + len(self.names))
         E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
         rest = MOVING + 2 * n
         for column, name in enumerate(self.names, start=MOVING):
@@ -104,16 +100,12 @@ class Learnt(NamedTuple):
 CURVES = ("grip_f", "grip_r", "stiffness_f", "stiffness_r")
 
 
-def unknowns(z: Any, n: int) -> Unknowns:
+def unknowns(z: Any, n: int) -> _Unknowns:
     """Return z by name.
-
-    Parameters
-    ----------
-    z : as above.
-    n : number of units.
+    z : as above.   n : number of units.
     """
     m, k = MOVING, MOVING + 2 * n
-    return Unknowns(
+    return _Unknowns(
         v_y=z[0],
         r=z[1],
         slip=z[2:4],
@@ -154,11 +146,7 @@ class Along(NamedTuple):
 
     def moved(self, load: Load, a_x: Any, v_x: Any) -> Any:
         """Return what forces are multiplied with (2,) [-].
-
-        Parameters
-        ----------
-        load : without a_x.
-        a_x : [m/s²].
+        load : without a_x.   a_x : [m/s²].
         """
         f = (a_x + self.drag * v_x**2) * (1 / GRAVITY)
         drives = f > 0
@@ -219,9 +207,6 @@ class Way:
 
     def linear(self, value: Any, slope: Any, x: Any) -> Any:
         """Return a number with a gradient that is known, and not that of how it is computed.
-
-        Parameters
-        ----------
         value, slope : f(x) and f'(x), of any shape.
         """
         return self.held(value) + self.held(slope) * (x - self.held(x))
@@ -234,11 +219,7 @@ class Way:
 
     def gradient(self, z: Any, moving: Any) -> Any:
         """Return F by its way, as `identifier.inertial.gaussian.propagated` takes it.
-
-        Parameters
-        ----------
-        z : symbols (q,).
-        moving : what moves (7,), an expression of z and of symbols on the way.
+        z : symbols (q,).   moving : what moves (7,), an expression of z and of symbols on the way.
         """
         symbols, values = zip(*self._on_the_way, strict=True)
         numbers = ca.vertcat(*values, moving)
@@ -247,7 +228,6 @@ class Way:
 
 class Predicted(NamedTuple):
     """After a step: what moves (7,) of z, the slip α (2,) [rad] and the rolling body.
-
     by_way : how the step leads to `moving`, and that as an expression of the numbers on the way.
     tilt, tilt_rate : ä [m/s²] and its rate [m/s³].   curve : at the slip before the step.
     force_rate : of the lagged slip times the slope of the curve [1/s], (2,).
@@ -270,9 +250,6 @@ def turning(car: Car) -> Any:
 
 def cosine(delta: Any) -> Any:
     """Return cos δ, without a call.
-
-    Parameters
-    ----------
     delta : steering [rad].
     """
     return 1 - delta**2 / 2 + delta**4 / FIRST_COS
@@ -280,11 +257,7 @@ def cosine(delta: Any) -> Any:
 
 def slip_angle(at: Sample, sideways: Any, steering: Any) -> Any:
     """Return α [rad], (2,).
-
-    Parameters
-    ----------
-    at : speed and steering.
-    sideways : v_y of the axles, v_y ± l r [m/s], (2,).
+    at : speed and steering.   sideways : v_y of the axles, v_y ± l r [m/s], (2,).
     steering : δ₀ [rad].
     """
     return at.delta + ca.vertcat(steering, 0) - ca.atan(sideways * (1 / at.v_x))
@@ -294,7 +267,7 @@ def predicted(
     car: Car,
     laws: Laws,
     dt: Any,
-    z: Unknowns,
+    z: _Unknowns,
     tilt: tuple[Any, Any],
     before: Sample,
     now: Sample,
@@ -306,13 +279,8 @@ def predicted(
 
     Slip is exact for α linear over the step (first-order hold), forces and motion meet in the
     middle of it.
-
-    Parameters
-    ----------
-    dt : sampling interval [s].
-    z : before the step.
-    scales : 1/α_j of the units [1/rad], (1, n).
-    steps : doublings between the units.
+    dt : sampling interval [s].   z : before the step.
+    scales : 1/α_j of the units [1/rad], (1, n).   steps : doublings between the units.
     """
     way = Way()
     v_x = (before.v_x + now.v_x) / 2
@@ -356,13 +324,9 @@ def predicted(
     return Predicted(moved, (way, moving), alpha, tilting, rate, before_it, force_rate)
 
 
-def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
+def curve_by(way: Way, z: _Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
     """Return the curves at the lagged slip under static loads, tanh with the gradient it tells.
-
-    Parameters
-    ----------
-    z : slip and weights.
-    scales : 1/α_j of the units [1/rad], (1, n).
+    z : slip and weights.   scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
     """
     T = hidden_units(z.slip, scales, steps)
@@ -371,7 +335,7 @@ def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curv
     return of_units(way.linear(T, (1 - T * T) * inverse, slip), z.W, scales)
 
 
-class Shown(NamedTuple):
+class _Shown(NamedTuple):
     """What gyro and accelerometer should show [rad/s], [m/s²]; forces (2,) [static axle loads]."""
 
     r: Any
@@ -379,15 +343,11 @@ class Shown(NamedTuple):
     force: Any
 
 
-def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) -> Shown:
+def shown(car: Car, laws: Laws, z: _Unknowns, tilt: Any, now: Sample, at: Curve) -> _Shown:
     """Return what the sensors should show of a state.
-
-    Parameters
-    ----------
-    tilt : ä of the rolling body [m/s²].
-    at : curves at the lagged slip.
+    tilt : ä of the rolling body [m/s²].   at : curves at the lagged slip.
     """
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
     a_y += laws.ahead * ca.dot(turning(car), force) - laws.aside * z.r**2
-    return Shown(z.r + z.gyro, a_y, force)
+    return _Shown(z.r + z.gyro, a_y, force)

@@ -10,14 +10,15 @@ Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is
 """
 
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
+from identifier.axle.car import Car, larger, smaller, step_function, symbols, within
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
-from identifier.axle.curve import EDGES, curve, excited
-from identifier.axle.gate import Gate, GateNumbers, GateState, gate
+from identifier.axle.curve import EDGES, EXCITATION, curve, excited
+from identifier.axle.gate import GATE_PORT, Gate, GateState, Plausibility, gate
 from identifier.axle.learning import BoundNumbers, towards_center
 from identifier.inertial.beliefs import TrustNumbers
 from identifier.inertial.gaussian import as_factor, measured, propagated
@@ -41,14 +42,10 @@ from identifier.inertial.motion import (
     turning,
     unknowns,
 )
-from identifier.setup import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
+from identifier.setup import AXLE_FORCE, FACTORS, Port
 from models.vehicle import GRAVITY, load_ratio
 
 OVER = ("x", "u", "v_x", "a_y")
-LEARNT = ("W", "own", "sensors")
-KEPT = ("UD", "motion_UD", "gate", "body", "readings", "running", "excitation")
-CARRY = ("motion", *LEARNT, *KEPT)
-OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
 SAME = 0.01  # of the square of a change, up to which the next one is none: a number that settles
 MOST_WAITING = 4  # numbers of a channel that wait for its turn
@@ -87,12 +84,7 @@ PORTS = (
         rule=FACTORS,
     ),
     Port("motion_UD", "of motion", "the rows of D and U that belong to motion, which stand first"),
-    Port(
-        "gate",
-        "SI",
-        "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "
-        "samples in a row",
-    ),
+    GATE_PORT,
     Port("body", "m/s^2; m/s^3", "motion of the rolling body and its rate"),
     Port(
         "readings",
@@ -106,14 +98,10 @@ PORTS = (
         "1 while the filter runs; mean square of the missed force over its deviation; slow mean "
         "of v_x, by which a_x is found",
     ),
-    Port(
-        "excitation",
-        "rad; s",
-        "largest slip, then time of learning above each edge, per axle",
-        learnt=True,
-        rule=NOT_NEGATIVE,
-    ),
+    EXCITATION,
 )
+OUTPUTS = tuple(port.name for port in PORTS[:4])
+CARRY = tuple(port.name for port in PORTS[4:])
 
 
 class LearntLimits(NamedTuple):
@@ -126,14 +114,42 @@ class LearntLimits(NamedTuple):
     gyro: Any
 
 
-class Noise(NamedTuple):
-    """What r and a_y tell of themselves, and which of them comes first.
+class _BodyState(NamedTuple):
+    """ä of the rolling body [m/s²] and its rate [m/s³]."""
 
+    tilt: Any
+    rate: Any
+
+
+class _Readings(NamedTuple):
+    """Of r and a_y, (2,) each: the newest number and the one before [rad/s], [m/s²]; variance of
+    the noise; how many numbers wait for their turn [-], and the innovation of these.
+    """
+
+    newest: Any
+    before: Any
+    variance: Any
+    waiting: Any
+    left: Any
+
+
+class _RunningState(NamedTuple):
+    """1 while the filter runs; mean square of the missed force over its deviation [-]; slow mean of
+    v_x [m/s].
+    """
+
+    on: Any
+    missed: Any
+    v_x: Any
+
+
+class _Noise(NamedTuple):
+    """What r and a_y tell of themselves, and which of them comes first.
     first : 1 where that is r, 0 where it is a_y.   counts : 1 where it has a number.
     turns : 1 where a channel has its turn (2,).   share : 1 over the numbers that waited for it,
     (2,) [-]: of errors that one in a row repeats of another, the sum counts.
-    fresh : 1 where a number is new, (2,).   left : innovations of those that wait (2,).
-    variance : of noise [rad²/s², m²/s⁴], (2,).   readings : next state (8,), without those.
+    fresh : 1 where a number is new, (2,).   variance : of its noise before [rad²/s², m²/s⁴], (2,).
+    readings : next state, but for the innovations.
     """
 
     first: Any
@@ -141,85 +157,70 @@ class Noise(NamedTuple):
     turns: list[Any]
     share: list[Any]
     fresh: list[Any]
-    left: list[Any]
-    variance: list[Any]
-    readings: Any
+    readings: _Readings
 
 
 def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = False) -> ca.Function:
     """Return the step; every number stays an input of it.
-
-    Parameters
-    ----------
     steps : doublings between the units.
     tires : whether it learns all of the tires, as of `motion.Learnt`.
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
     learnt = Learnt(tires)
-    q = MOVING + len(learnt.names)
-    ports: dict[str, Any] = {
-        "motion": ca.SX.sym("motion", MOVING),
-        "W": ca.SX.sym("W", 2, n),
-        "own": ca.SX.sym("own", 2),
-        "sensors": ca.SX.sym("sensors", len(SENSORS)),
-        "UD": ca.SX.sym("UD", 1, len(triangle(q - MOVING))),
-        "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
-    }
-    ports["gate"], last = named_port(GateState, "gate")
-    sizes = {"body": 2, "readings": 10, "running": 3}
-    ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
-    ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
-    ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
-    ports["dt"] = dt = ca.SX.sym("dt")
-    ports["car"], car = axle_port(Car, "car")
-    ports["scales"] = scales = ca.SX.sym("scales", 1, n)
-    ports["plausibility"], possible = named_port(GateNumbers, "plausibility")
-    ports["laws"], laws = named_port(Laws, "laws")
-    ports["trust"], trust = named_port(TrustNumbers, "trust")
-    ports["learning_speed"] = slowest = ca.SX.sym("learning_speed")
-    ports["limits"], limits = named_port(LearntLimits, "limits")
-    ports["bounds"], bounds = named_port(BoundNumbers, "bounds")
-    ports["rising"] = ca.SX.sym("rising", n)
-    ports["curves"] = ca.SX.sym("curves", len(CURVES), n)
-    ports["compliance"] = ca.SX.sym("compliance", 2)
-    ports["doubt"] = ca.SX.sym("doubt", 2)
-    into = learnt.into(n, ports["curves"], ports["compliance"])
-    load: Load = static_load
-    if pressed:
-        ports["downforce"] = ca.SX.sym("downforce", 2)
-        load = partial(load_ratio, ports["downforce"])
-    if not tires:
-        ports["along"], along = named_port(Along, "along")
-
-    seen = ca.vertcat(0, ports["x"][1])  # a missing v_y speaks against no sample
-    gated = gate(possible, dt, last, seen, ports["u"], ports["v_x"])
-    runs = ca.logic_and(gated.on, gated.v_x >= slowest)
-    goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
-    slow = ca.if_else(gated.first, gated.v_x, ports["running"][2])
-    a_x = (gated.v_x - slow) * (1 / LAG_OF_A_X) - ports["motion"][0] * gated.r
-    if not tires:
-        load = partial(along.moved, load, a_x)
-    z = ca.vertcat(
-        ports["motion"], ports["W"][0, :].T, ports["W"][1, :].T, ports["own"], ports["sensors"]
+    q, k = MOVING + len(learnt.names), len(learnt.names)
+    ports, s = symbols(
+        motion=MOVING,
+        W=(2, n),
+        own=2,
+        sensors=len(SENSORS),
+        UD=(1, len(triangle(k))),
+        motion_UD=(1, len(triangle(q)) - len(triangle(k))),
+        gate=GateState,
+        body=_BodyState,
+        readings=2 * len(_Readings._fields),
+        running=_RunningState,
+        excitation=(2, 1 + len(EDGES)),
+        x=2,
+        u=2,
+        v_x=1,
+        a_y=1,
+        dt=1,
+        car=(2, Car),
+        scales=(1, n),
+        plausibility=Plausibility,
+        laws=Laws,
+        trust=TrustNumbers,
+        learning_speed=1,
+        limits=LearntLimits,
+        bounds=BoundNumbers,
+        rising=n,
+        curves=(len(CURVES), n),
+        compliance=2,
+        doubt=2,
+        **({"downforce": 2} if pressed else {}),
+        **({} if tires else {"along": Along}),
     )
+    car, laws, trust, dt, slowest = s.car, s.laws, s.trust, s.dt, s.learning_speed
+    into = learnt.into(n, s.curves, s.compliance)
+    load: Load = partial(load_ratio, s.downforce) if pressed else static_load
+    seen = ca.vertcat(0, s.x[1])  # a missing v_y speaks against no sample
+    gated = gate(s.plausibility, dt, s.gate, seen, s.u, s.v_x)
+    runs = ca.logic_and(gated.on, gated.v_x >= slowest)
+    goes_on = ca.logic_and(runs, s.running.on > 0.5)
+    slow = ca.if_else(gated.first, gated.v_x, s.running.v_x)
+    a_x = (gated.v_x - slow) * (1 / LAG_OF_A_X) - s.motion[0] * gated.r
+    if not tires:
+        load = partial(s.along.moved, load, a_x)
+    z = ca.vertcat(s.motion, s.W[0, :].T, s.W[1, :].T, s.own, s.sensors)
     turned = ca.vertcat(1 + laws.steering_gain, 1)
     gated = gated._replace(delta=turned * gated.delta)
     now = Sample(larger(gated.v_x, slowest), gated.delta)
-    before = Sample(larger(last.v_x, slowest), turned * ca.vertcat(last.delta_f, last.delta_r))
-    ahead = predicted(
-        car,
-        laws,
-        dt,
-        unknowns(z, n),
-        (ports["body"][0], ports["body"][1]),
-        before,
-        now,
-        scales,
-        steps,
-        load,
-    )
-    factors = factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q)
+    last = ca.vertcat(s.gate.delta_f, s.gate.delta_r)
+    before = Sample(larger(s.gate.v_x, slowest), turned * last)
+    named = unknowns(z, n)
+    ahead = predicted(car, laws, dt, named, tuple(s.body), before, now, s.scales, steps, load)
+    factors = factors_of([*ca.horzsplit(s.motion_UD), *ca.horzsplit(s.UD)], q)
     way, moving = ahead.by_way
     by_z = way.gradient(z, moving)
     F = ca.horzcat(by_z[:, : z.numel()] @ into, by_z[:, z.numel() :])
@@ -227,29 +228,18 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(factors, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    noise = _noise(ports, trust, gated, goes_on)
-    step, factors, readings = _corrected(
-        (car, laws, trust),
-        ahead,
-        ahead_z,
-        into,
-        factors,
-        noise,
-        now,
-        scales,
-        steps,
-        load,
-    )
+    noise = _noise(s, gated, goes_on)
+    step, factors, left = _corrected(s, ahead, ahead_z, into, factors, noise, now, steps, load)
     corrected = ca.vertsplit(ahead_z + into @ step)
     missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
-    fast = ports["running"][1]
+    fast = s.running.missed
     fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
     factors = _loosened(factors, learnt, alarm * trust.inflation)
-    corrected = _bounded(ports, corrected, bounds, limits, learnt)
+    corrected = _bounded(s, corrected, learnt)
 
     sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
-    begun, unsure = _afresh(ports, trust, car, gated, now, load)
+    begun, unsure = _afresh(s, gated, now, load)
     a_kept = smaller(dt * (1 / LAG_OF_A_X), 1)
     kept = [
         *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
@@ -258,15 +248,15 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     variances = (ca.if_else(goes_on, a, b) for a, b in zip(factors.D, unsure, strict=False))
     factors = Factors(factors.U, [*variances, *factors.D[MOVING:]])
     after = row_of(factors)
-    moving = ports["motion_UD"].numel()
+    moving = s.motion_UD.numel()
     given = unknowns(ca.vertcat(*kept), n)
     tilt = ca.if_else(
         goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * given.r, 0)
     )
-    curves = curve(given.slip, given.W, scales, steps).under(load(now.v_x))
+    curves = curve(given.slip, given.W, s.scales, steps).under(load(now.v_x))
     force = curves.force * cosine(now.delta) + given.error
     variance = larger(entry(factors, 0, 0), 0)
-    doubt = ports["doubt"][0] + ports["doubt"][1] * ca.fabs(curves.force[1])
+    doubt = s.doubt[0] + s.doubt[1] * ca.fabs(curves.force[1])
     variance = variance + (now.v_x * doubt / curves.carcass_slope[1]) ** 2
     size_of_slip = larger(ca.fabs(given.slip), ca.fabs(ahead.alpha))
     next_state = {
@@ -278,38 +268,36 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
         "motion_UD": ca.horzcat(*after[:moving]),
         "gate": gated.state,
         "body": tilt,
-        "readings": readings,
+        "readings": ca.vertcat(*noise.readings[:-1], left),
         "running": ca.vertcat(
             ca.logic_and(runs, sane),
             ca.if_else(goes_on, fast, 0),
             slow + a_kept * (gated.v_x - slow),
         ),
         "excitation": excited(
-            ports["excitation"],
+            s.excitation,
             size_of_slip,
             dt=dt,
             samples=10,
             learns=ca.logic_and(goes_on, gated.learns) * ca.SX.ones(2),
         ),
     }
+    outputs = (
+        ca.if_else(gated.on, force * car.load, 0),
+        ca.if_else(gated.on, given.v_y, 0),
+        ca.sqrt(variance),
+        ca.logic_and(runs, variance < trust.observable * now.v_x**2),
+    )
     name = ["inertial_step", *map(str, steps), *["held"] * (not tires), *["pressed"] * pressed]
-    return ca.Function(
+    return step_function(
         "_".join(name),
-        list(ports.values()),
-        [
-            *(ca.densify(next_state[name]) for name in CARRY),
-            ca.if_else(gated.on, force * car.load, 0),
-            ca.if_else(gated.on, given.v_y, 0),
-            ca.sqrt(variance),
-            ca.logic_and(runs, variance < trust.observable * now.v_x**2),
-        ],
-        list(ports),
-        [*(f"{name}_next" for name in CARRY), *OUTPUTS],
-        {"cse": True},
+        ports,
+        {port: ca.densify(next_state[port]) for port in CARRY},
+        dict(zip(OUTPUTS, outputs, strict=True)),
     )
 
 
-def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any) -> Noise:
+def _noise(s: SimpleNamespace, gated: Gate, goes_on: Any) -> _Noise:
     """Return what is new of r and a_y, and how noisy they are.
 
     A sensor that is slower than the log repeats its number, or settles to it in two steps where a
@@ -318,31 +306,31 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
     One channel is taken at a sample, that of which more numbers wait: a second update would cost as
     much as the first and tell what the next sample does.
     """
-    readings, a_y = ports["readings"], ports["a_y"]
+    a_y, trust, last = s.a_y, s.trust, _Readings(*ca.vertsplit(s.readings, 2))
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
-    newest = [gated.r, ca.if_else(there, a_y, readings[1])]
+    readings = [gated.r, ca.if_else(there, a_y, last.newest[1])]
     fresh, waiting, variance, state = [], [], [], []
-    for i, y in enumerate(newest):
-        old = readings[4 + i]
-        differs = (y - readings[i]) ** 2 > SAME * (readings[i] - readings[2 + i]) ** 2
+    for y, newest, old, noise, waits, _ in zip(readings, *map(ca.vertsplit, last), strict=True):
+        differs = (y - newest) ** 2 > SAME * (newest - old) ** 2
         news = ca.logic_and(ca.logic_and(differs, goes_on), _is_good(gated))
-        second = y - 2 * readings[i] + readings[2 + i]
-        shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
-        variance.append(ca.if_else(news, old + trust.noise_gain * (shows - old), old))
+        second = y - 2 * newest + old
+        shows = smaller(second**2 / 6, MOST_NOISE * noise + LEAST)
+        variance.append(ca.if_else(news, noise + trust.noise_gain * (shows - noise), noise))
         fresh.append(news)
-        waiting.append(goes_on * smaller(readings[6 + i] + news, MOST_WAITING))
-        before = ca.if_else(news, readings[i], readings[2 + i])
+        waiting.append(goes_on * smaller(waits + news, MOST_WAITING))
+        before = ca.if_else(news, newest, old)
         holds = ca.logic_and(goes_on, ca.logic_not(news))
-        state.append((ca.if_else(holds, readings[i], y), ca.if_else(goes_on, before, y)))
-    now, before = zip(*state, strict=True)
+        state.append((ca.if_else(holds, newest, y), ca.if_else(goes_on, before, y)))
     of_r, of_a_y = waiting
     first = of_r >= of_a_y
     turns = [first, ca.logic_not(first)]
-    left = [ca.if_else(turn, 0, one) for turn, one in zip(turns, waiting, strict=True)]
+    rest = [ca.if_else(turn, 0, one) for turn, one in zip(turns, waiting, strict=True)]
     share = [1 / larger(one, 1) for one in waiting]
     counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
-    waits = ca.vertcat(*now, *before, *variance, *left)
-    return Noise(first, counts, turns, share, fresh, [readings[8], readings[9]], variance, waits)
+    newest, before = zip(*state, strict=True)
+    columns = [ca.vertcat(*one) for one in (newest, before, variance, rest)]
+    following = _Readings(*columns, *[last.left])
+    return _Noise(first, counts, turns, share, fresh, following)
 
 
 def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
@@ -357,28 +345,27 @@ def _process_noise(trust: TrustNumbers, ahead: Predicted) -> list[Any]:
 
 
 def _corrected(
-    given: tuple[Car, Laws, TrustNumbers],
+    s: SimpleNamespace,
     ahead: Predicted,
     z: Any,
     into: Any,
     factors: Factors,
-    noise: Noise,
+    noise: _Noise,
     now: Sample,
-    scales: Any,
     steps: tuple[int, ...],
     load: Load,
 ) -> tuple[Any, Factors, Any]:
-    """Return by how much r or a_y corrects, the factors, and what is carried of both.
+    """Return by how much r or a_y corrects, the factors, and innovations that wait.
 
     Innovations of what waits are kept: its turn comes at a next sample, where its number may be a
     new one, or none.
     """
-    car, laws, trust = given
-    n = len(steps) + 1
+    car, laws, trust = s.car, s.laws, s.trust
+    readings, n = noise.readings, len(steps) + 1
     symbol = ca.SX.sym("z", z.numel())
     tilt = ca.SX.sym("tilt")
     named, way = unknowns(symbol, n), Way()
-    at = curve_by(way, named, scales, steps).under(load(now.v_x))
+    at = curve_by(way, named, s.scales, steps).under(load(now.v_x))
     expected = shown(car, laws, named, tilt, now, at)
     y = ca.vertcat(expected.r, expected.a_y)
     numbers = way.valued([y, ca.jacobian(y, symbol), ca.dot(turning(car), at.force)])
@@ -389,10 +376,11 @@ def _corrected(
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
     nu = [
-        ca.if_else(fresh, noise.readings[i] - y[i], left)
-        for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
+        ca.if_else(fresh, readings.newest[i] - y[i], readings.left[i])
+        for i, fresh in enumerate(noise.fresh)
     ]
-    R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
+    variance = ca.vertsplit(readings.variance)
+    R = [e * share + R for e, share, R in zip(error, noise.share, variance, strict=True)]
     nu_now, R_now = (ca.if_else(noise.first, *pair) for pair in (nu, R))
     h = sum(as_factor(turn) * H[i, :] for i, turn in enumerate(noise.turns))
     step, factors = measured(
@@ -403,7 +391,7 @@ def _corrected(
         ca.if_else(turn, 0, one - ca.dot(H[i, :].T, moved))
         for i, (turn, one) in enumerate(zip(noise.turns, nu, strict=True))
     ]
-    return moved, factors, ca.vertcat(noise.readings, *left)
+    return moved, factors, ca.vertcat(*left)
 
 
 def _is_good(gated: Gate) -> Any:
@@ -418,18 +406,13 @@ def _loosened(factors: Factors, learnt: Learnt, amount: Any) -> Factors:
     return Factors(U, [d + amount if i in grip else d for i, d in enumerate(D)])
 
 
-def _bounded(
-    ports: dict[str, Any],
-    z: list[Any],
-    bounds: BoundNumbers,
-    limits: LearntLimits,
-    learnt: Learnt,
-) -> list[Any]:
+def _bounded(s: SimpleNamespace, z: list[Any], learnt: Learnt) -> list[Any]:
     """Return z with what is learnt within its bounds."""
-    kept, n = list(z), ports["W"].shape[1]
-    slope = ca.vertsplit(ports["rising"])
+    kept, n, limits = list(z), s.W.shape[1], s.limits
     for first in (MOVING, MOVING + n):
-        kept[first : first + n] = towards_center(bounds, z[first : first + n], slope)
+        kept[first : first + n] = towards_center(
+            s.bounds, z[first : first + n], ca.vertsplit(s.rising)
+        )
     at = MOVING + 2 * n
     if learnt.tires:
         for i in (at, at + 1):
@@ -441,18 +424,13 @@ def _bounded(
 
 
 def _afresh(
-    ports: dict[str, Any],
-    trust: TrustNumbers,
-    car: Car,
-    gated: Gate,
-    now: Sample,
-    load: Load,
+    s: SimpleNamespace, gated: Gate, now: Sample, load: Load
 ) -> tuple[list[Any], list[Any]]:
     """Return what moves, and its variances, of a filter that begins: in a steady corner."""
-    sensors = ports["sensors"]
-    zero, bias = (sensors[SENSORS.index(name)] for name in ("steering", "gyro"))
+    car, trust = s.car, s.trust
+    zero, bias = (s.sensors[SENSORS.index(name)] for name in ("steering", "gyro"))
     r = gated.r - bias
-    stiffness = ca.dot(ports["W"][1, :], ports["scales"]) * load(now.v_x)[1]
+    stiffness = ca.dot(s.W[1, :], s.scales) * load(now.v_x)[1]
     stiffness = larger(stiffness, STIFFNESS)
     lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
     v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r

@@ -20,7 +20,7 @@ Slopes run along by the chain rule from stage to stage (forward differentiation)
 few inputs, so that no stage but the last knows all parameters.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -28,8 +28,8 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
-from identifier.axle.car import named_port
-from identifier.axle.gate import GateNumbers, GateState, gate
+from identifier.axle.car import step_function, symbols
+from identifier.axle.gate import GateState, Plausibility, gate
 from identifier.axle.slip import SHORTEST
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
@@ -71,32 +71,25 @@ class CarNumbers(NamedTuple):
     drag: Any
 
 
-class Dual(NamedTuple):
+class _Dual(NamedTuple):
     """A value and its slopes over the parameters, (1, n)."""
 
     value: Any
     slopes: Any
 
 
-class Stage:
-    """Equations from a few inputs to a few outputs, differentiated once.
-
-    Parameters
-    ----------
-    outputs : expressions of them, and of symbols without slopes.
+def _staged(equations: Callable[..., Sequence[Any]], *inputs: _Dual) -> list[_Dual]:
+    """Return what equations make of a few inputs, differentiated once, and its slopes.
+    equations : of symbols in place of the inputs, and of others, which have no slopes.
     """
-
-    def __init__(self, inputs: list[Any], outputs: list[Any]) -> None:
-        x, y = ca.vertcat(*inputs), ca.vertcat(*outputs)
-        names = {one.name() for one in inputs}
-        self._free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
-        self._function = ca.Function("stage", [x, self._free], [y, ca.jacobian(y, x)])
-
-    def __call__(self, inputs: list[Dual]) -> list[Dual]:
-        """Return the outputs and their slopes."""
-        value, J = self._function(ca.vertcat(*(one.value for one in inputs)), self._free)
-        slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
-        return [Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
+    symbols = [ca.SX.sym(f"stage_{i}") for i in range(len(inputs))]
+    x, y = ca.vertcat(*symbols), ca.vertcat(*equations(*symbols))
+    names = {one.name() for one in symbols}
+    free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
+    stage = ca.Function("stage", [x, free], [y, ca.jacobian(y, x)])
+    value, J = stage(ca.vertcat(*(one.value for one in inputs)), free)
+    slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
+    return [_Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
 
 
 @cache
@@ -107,69 +100,68 @@ def motion_scan(columns: Columns = ()) -> Scan:
     a sample, `parameters` (p,), `car` (7,) and `dt` are constant; `force` (2,) [static loads],
     `missed` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
     `missed_slopes` (2, n) come out.
-
-    Parameters
-    ----------
     columns : names of the parameters over which slopes are asked for, (n,).
     """
     n = len(columns)
-    state, old = _symbols(CARRIED)
-    signal_port, signals = _symbols(SIGNALS)
-    rate_port, rates = _symbols(RATES)
-    parameter_port, parameters = _symbols(NAMES)
-    car_port, car = named_port(CarNumbers, "car")
-    dt = ca.SX.sym("dt")
-    was_on = ca.SX.sym("was_on")
-    duals = {name: Dual(parameters[name], _unit(name, columns)) for name in NAMES}
-    nothing = ca.SX(1, n)
-    fixed = {name: Dual(value, nothing) for name, value in (signals | rates).items()}
-    first = 1 - was_on * signals["on"]
+    ports, s = symbols(
+        state=len(CARRIED),
+        was_on=1,
+        signals=len(SIGNALS),
+        rates=len(RATES),
+        parameters=len(NAMES),
+        car=CarNumbers,
+        dt=1,
+    )
+    old = _by_name(CARRIED, s.state)
+    duals = {
+        name: _Dual(value, _unit(name, columns))
+        for name, value in _by_name(NAMES, s.parameters).items()
+    }
+    fixed = _constant((*SIGNALS, *RATES), ca.vertsplit(ca.vertcat(s.signals, s.rates)), n)
+    on = fixed["on"].value
+    first = 1 - s.was_on * on
     pattern = {name: ca.Sparsity(1, n) for name in CARRIED}
     while True:  # which parameters each state can depend on
         tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
-        before = {name: Dual(old[name], tangents[name]) for name in CARRIED}
-        after, out = _step(before, fixed, duals, car, dt, first)
+        before = {name: _Dual(old[name], tangents[name]) for name in CARRIED}
+        after, out = _step(_At(before, fixed, duals, s.car, s.dt, first))
         grown = {
             name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
         }
         if all(grown[name].nnz() == pattern[name].nnz() for name in CARRIED):
             break
         pattern = grown
-    on = signals["on"]
-    following = ca.vertcat(*(ca.if_else(on > 0, after[name].value, 0) for name in CARRIED))
-    ports_in = [state, was_on, signal_port, rate_port, parameter_port, car_port, dt]
-    names_in = ["state", "was_on", "signals", "rates", "parameters", "car", "dt"]
-    names_out = ["state_next", "was_on_next", "force", "missed", "slip"]
-    ports_out = [
-        following,
-        on,
-        *(on * ca.vertcat(*(axis.value for axis in out[name])) for name in ("F", "e", "x")),
-    ]
+    outputs = {
+        "state_next": ca.vertcat(*(ca.if_else(on > 0, after[name].value, 0) for name in CARRIED)),
+        "was_on_next": on,
+        **{
+            port: on * ca.vertcat(*(axis.value for axis in out[name]))
+            for port, name in (("force", "F"), ("missed", "e"), ("slip", "x"))
+        },
+    }
     carry: tuple[str, ...] = ("state", "was_on")
     if n:
-        kept = [ca.vec(tangents[name].nz[:]) for name in CARRIED]
-        flat = ca.SX.sym("tangent", sum(one.numel() for one in kept))
-        moved = [
-            on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED
-        ]
-        slopes = on * ca.vertcat(*(ca.densify(axis.slopes) for axis in out["e"]))
-        exchanged = ca.substitute(
-            [*ports_out, ca.vertcat(*moved), ca.densify(slopes)], [ca.vertcat(*kept)], [flat]
+        kept = ca.vertcat(*(ca.vec(tangents[name].nz[:]) for name in CARRIED))
+        ports["tangent"] = ca.SX.sym("tangent", kept.numel())
+        outputs["tangent_next"] = ca.vertcat(
+            *(on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED)
         )
-        ports_in.append(flat)
-        names_in.append("tangent")
-        ports_out = exchanged
-        names_out += ["tangent_next", "missed_slopes"]
-        carry = ("state", "was_on", "tangent")
-    step = ca.Function(
-        f"motion_{n}", ports_in, [ca.densify(one) for one in ports_out], names_in, names_out
-    )
+        outputs["missed_slopes"] = on * ca.vertcat(*(ca.densify(one.slopes) for one in out["e"]))
+        exchanged = ca.substitute(list(outputs.values()), [kept], [ports["tangent"]])
+        outputs = dict(zip(outputs, exchanged, strict=True))
+        carry = (*carry, "tangent")
+    dense = [ca.densify(one) for one in outputs.values()]
+    step = ca.Function(f"motion_{n}", list(ports.values()), dense, list(ports), list(outputs))
     return Scan(step, carry=carry, over=("signals", "rates"), flags=QUICK)
 
 
-def _symbols(names: tuple[str, ...]) -> tuple[Any, dict[str, Any]]:
-    port = ca.SX.sym(names[0], len(names))
-    return port, dict(zip(names, ca.vertsplit(port), strict=True))
+def _by_name(names: tuple[str, ...], vector: Any) -> dict[str, Any]:
+    return dict(zip(names, ca.vertsplit(vector), strict=True))
+
+
+def _constant(names: tuple[str, ...], values: Sequence[Any], n: int) -> dict[str, _Dual]:
+    """Return values that depend on none of n parameters, by name."""
+    return {name: _Dual(value, ca.SX(1, n)) for name, value in zip(names, values, strict=True)}
 
 
 def _unit(name: str, columns: Columns) -> Any:
@@ -180,49 +172,38 @@ def _unit(name: str, columns: Columns) -> Any:
     return slopes
 
 
-def _step(
-    before: dict[str, Dual],
-    signals: dict[str, Dual],
-    p: dict[str, Dual],
-    car: CarNumbers,
-    dt: Any,
-    first: Any,
-) -> tuple[dict[str, Dual], dict[str, tuple[Dual, Dual]]]:
+class _At(NamedTuple):
+    """A sample: states before it, signals and parameters by name, numbers of the car, dt [s], and
+    whether nothing is known of the sample before.
+    """
+
+    before: dict[str, _Dual]
+    signals: dict[str, _Dual]
+    p: dict[str, _Dual]
+    car: CarNumbers
+    dt: Any
+    first: Any
+
+
+def _step(at: _At) -> tuple[dict[str, _Dual], dict[str, tuple[_Dual, _Dual]]]:
     """Return the state after a sample, and F, e, x of both axles."""
-    after: dict[str, Dual] = {}
-    L = car.l_f + car.l_r
-    v_x, v_y, r, delta = _sensors(signals, p)
-    after["rate"], after["rho"], sway = _sway(before, p, car, dt, first, v_x, r)
-    out: dict[str, tuple[Dual, Dual]] = {}
-    found = [
-        _axle(
-            axle,
-            before,
-            signals,
-            p,
-            car,
-            dt,
-            first,
-            v_x=v_x,
-            v_y=v_y,
-            r=r,
-            delta=delta if axle == "f" else signals["delta_r"],
-            sway=sway,
-            after=after,
-            L=L,
-        )
-        for axle in "fr"
-    ]
-    for k, name in enumerate(("F", "e", "x")):
-        out[name] = (found[0][k], found[1][k])
-    return after, out
+    v_x, v_y, r, delta = _sensors(at)
+    after, sway = _sway(at, v_x, r)
+    found: dict[str, list[_Dual]] = {"F": [], "e": [], "x": []}
+    for axle, angle in (("f", delta), ("r", at.signals["delta_r"])):
+        slips, x = _slip(axle, at, v_x, v_y, r, angle, sway)
+        after |= slips
+        forces, force = _force(axle, at, v_x, x)
+        after |= forces
+        balance, across, e = _missed(axle, at, v_x, v_y, r, angle, force)
+        after |= balance
+        for name, one in zip(found, (across, e, x), strict=True):
+            found[name].append(one)
+    return after, {name: (front, rear) for name, (front, rear) in found.items()}
 
 
 def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
     """Return v_x, v_y, r and δ_f without the sensors' errors, as numbers or as symbols.
-
-    Parameters
-    ----------
     p : parameters, those of `SENSORS`.
     """
     v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate = signals
@@ -235,44 +216,39 @@ def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, An
     return true_v_x, true_v_y, true_r, true_delta
 
 
-def _sensors(signals: dict[str, Dual], p: dict[str, Dual]) -> tuple[Dual, Dual, Dual, Dual]:
+def _sensors(at: _At) -> list[_Dual]:
     """Return v_x, v_y, r and δ_f without the sensors' errors."""
-    logged, errors = ([ca.SX.sym(name) for name in names] for names in (SENSED, SENSORS))
-    stage = Stage([*logged, *errors], list(true_signals(logged, errors)))
-    found = stage([signals[name] for name in SENSED] + [p[name] for name in SENSORS])
-    return found[0], found[1], found[2], found[3]
+
+    def true(*given: Any) -> tuple[Any, ...]:
+        return true_signals(given[: len(SENSED)], given[len(SENSED) :])
+
+    logged, errors = (at.signals[name] for name in SENSED), (at.p[name] for name in SENSORS)
+    return _staged(true, *logged, *errors)
 
 
-def _sway(
-    before: dict[str, Dual],
-    p: dict[str, Dual],
-    car: CarNumbers,
-    dt: Any,
-    first: Any,
-    v_x: Dual,
-    r: Dual,
-) -> tuple[Dual, Dual, Dual]:
-    """Return ρ', ρ and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
+def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
+    """Return ρ' and ρ, and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
+    car, dt, first = at.car, at.dt, at.first
+
+    def equations(
+        rho: Any, rate: Any, f_f: Any, f_r: Any, C_f: Any, C_r: Any, k_f: Any, k_r: Any,
+        ln_sway: Any, shift: Any, speed: Any, yaw: Any,
+    ) -> list[Any]:  # fmt: skip
+        L = car.l_f + car.l_r
+        front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
+        omega = car.omega * ca.exp(ln_sway)
+        a = GRAVITY * (front * f_f + rear * f_r)
+        eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
+        moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
+        moved = ca.if_else(first > 0, 0, moved)
+        place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
+        return [moved, place, -moved / (omega**2 * speed)]
+
     names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
-    rho, rate, f_f, f_r, C_f, C_r = (ca.SX.sym(name) for name in names)
-    k_f, k_r, ln_sway, shift, speed, yaw = (
-        ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw")
-    )
-    L = car.l_f + car.l_r
-    front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
-    omega = car.omega * ca.exp(ln_sway)
-    a = GRAVITY * (front * f_f + rear * f_r)
-    eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
-    moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
-    moved = ca.if_else(first > 0, 0, moved)
-    place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
-    inputs = [rho, rate, f_f, f_r, C_f, C_r, k_f, k_r, ln_sway, shift, speed, yaw]
-    outputs = [moved, place, -moved / (omega**2 * speed)]
     of = ("sway_share_f", "sway_share_r", "ln_sway", "cg_shift")
-    found = Stage(inputs, outputs)(
-        [before[name] for name in names] + [p[name] for name in of] + [v_x, r]
-    )
-    return found[0], found[1], found[2]
+    inputs = [*(at.before[name] for name in names), *(at.p[name] for name in of), v_x, r]
+    rate, rho, slip = _staged(equations, *inputs)
+    return {"rate": rate, "rho": rho}, slip
 
 
 def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
@@ -280,9 +256,14 @@ def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
 
     The numbers are ln C, ln μ, c, E, q (4) and ln m, (9,); forces in static axle loads.
     """
-    numbers = [ca.SX.sym(n) for n in ("lnC", "lnmu", "c", "E", "q0", "q1", "q2", "q3", "lnm")]
-    ln_C, ln_mu, c, E, *q, ln_m = numbers
-    x = ca.SX.sym("x")
+    names = ("lnC", "lnmu", "c", "E", *(f"q{j}" for j in range(len(SLIPS))), "lnm")
+    numbers, x = [ca.SX.sym(name) for name in names], ca.SX.sym("x")
+    return numbers, x, *_curve(*numbers, x)
+
+
+def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, Any]:
+    """Return φ and dφ/dx.   others : q (4), ln m, and the slip x."""
+    *q, ln_m, x = others
     m = ca.exp(ln_m)
     y = x / m
     mu = ca.exp(ln_mu)
@@ -295,15 +276,48 @@ def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
     slope = mu * c * ca.cos(at) / (1 + u * u) * du + sum(
         weight * (1 - t * t) / slip for weight, t, slip in zip(q, T, SLIPS, strict=True)
     )
-    return numbers, x, m * phi, slope
+    return m * phi, slope
+
+
+def carcass_curve(*numbers: Any) -> tuple[Any, Any]:
+    """Return φ and its slope as far as the carcass stretches.   numbers : as of `_curve`."""
+    phi, slope = _curve(*numbers)
+    return phi, ca.fmax(slope, LEAST_SLOPE * ca.exp(numbers[0]))
+
+
+def pushed_names(axle: str) -> list[str]:
+    """Return the parameters of `load_and_ellipse` of an axle."""
+    of_axle = f"braking_{axle}", f"driving_{axle}"
+    return ["load_transfer", *of_axle, "cg_shift", f"downforce_{axle}"]
+
+
+def load_and_ellipse(
+    axle: str, car: CarNumbers, numbers: Sequence[Any], a_x: Any, v_x: Any
+) -> tuple[Any, Any]:
+    """Return λ, the load of an axle over the static one, and G, what the ellipse leaves [-].
+    numbers : of `pushed_names`.   a_x : [m/s²].   v_x : [m/s].
+    """
+    height, brake, drive, cg, down = numbers
+    f = (a_x + car.drag * v_x**2) / GRAVITY
+    front = axle == "f"
+    other, press = (car.l_r + cg, car.press_f) if front else (car.l_f - cg, car.press_r)
+    shifted = (-height if front else height) * (car.l_f + car.l_r) / other * f
+    load = 1 + shifted + (press + down) * v_x**2
+    use = ca.if_else(f > 0, drive, brake) * f
+    least = ca.if_else(load > LIGHTEST, load, LIGHTEST)
+    return least, ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
+
+
+def curve_names(axle: str) -> list[str]:
+    """Return the numbers of `curve_symbols` of an axle but for the road, (8,)."""
+    names = ["ln_stiffness", "ln_grip", "shape", "curvature"]
+    return [f"{name}_{axle}" for name in (*names, *(f"residual{j}" for j in range(len(SLIPS))))]
 
 
 @cache
 def curve_index(axle: str) -> list[int]:
     """Return where the numbers of `curve_symbols` of an axle stand among the parameters, (9,)."""
-    names = [f"{name}_{axle}" for name in ("ln_stiffness", "ln_grip", "shape", "curvature")]
-    names += [f"residual{j}_{axle}" for j in range(len(SLIPS))]
-    return [INDEX[name] for name in (*names, "ln_road")]
+    return [INDEX[name] for name in (*curve_names(axle), "ln_road")]
 
 
 @cache
@@ -315,116 +329,73 @@ def curve_function() -> ca.Function:
     return ca.Function("curve", [vector, x], [phi, slope, gradient])
 
 
-def _axle(
-    axle: str,
-    before: dict[str, Dual],
-    signals: dict[str, Dual],
-    p: dict[str, Dual],
-    car: CarNumbers,
-    dt: Any,
-    first: Any,
-    *,
-    v_x: Dual,
-    v_y: Dual,
-    r: Dual,
-    delta: Dual,
-    sway: Dual,
-    after: dict[str, Dual],
-    L: Any,
-) -> tuple[Dual, Dual, Dual]:
-    """Return F, e and x of an axle; its states after the sample go into `after`."""
-    front = axle == "f"
-    # Slip.
-    d, vy, vx, yaw, k, s, shift = (ca.SX.sym(n) for n in ("d", "vy", "vx", "r", "k", "s", "cg"))
-    arm = (car.l_f - shift) if front else -(car.l_r + shift)
-    (alpha,) = Stage([d, vy, vx, yaw, k, s, shift], [d - ca.atan((vy + arm * yaw) / vx) + k * s])(
-        [delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"]]
-    )
-    # Relaxation: the exact step of a first-order lag for α linear over it.
-    x0, a0, a1, C, give = (ca.SX.sym(n) for n in ("x", "a0", "a1", "C", "s"))
-    sigma = give * C + SHORTEST * L
-    h = vx * dt / sigma
-    e = ca.exp(-h)
-    x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
-    (x,) = Stage([x0, a0, a1, C, give, vx], [ca.if_else(first > 0, a1, x1)])(
-        [
-            before[f"x_{axle}"],
-            before[f"alpha_{axle}"],
-            alpha,
-            before[f"slope_{axle}"],
-            p[f"compliance_{axle}"],
-            v_x,
-        ]
-    )
-    after[f"x_{axle}"], after[f"alpha_{axle}"] = x, alpha
-    # Curve.
-    numbers, at, phi, slope = curve_symbols()
-    road = p["ln_road"]
-    ln_m = Dual(road.value + signals["road"].value, road.slopes)
-    floor = LEAST_SLOPE * ca.exp(numbers[0])
-    names = ("ln_stiffness", "ln_grip", "shape", "curvature")
-    given = [p[f"{name}_{axle}"] for name in names]
-    given += [p[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
-    curve = Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
-    value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
-    # Load and ellipse.
-    phi0, height, brake, drive, cg, down, felt, speed = (
-        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "down", "a_x", "v")
-    )
-    f = (felt + car.drag * speed**2) / GRAVITY
-    other = (car.l_r + cg) if front else (car.l_f - cg)
-    shifted = (-height if front else height) * L / other * f
-    press = car.press_f if front else car.press_r
-    load = 1 + shifted + (press + down) * speed**2
-    load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
-    use = ca.if_else(f > 0, drive, brake) * f
-    left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
-    (force,) = Stage([phi0, height, brake, drive, cg, down, felt, speed], [phi0 * load * left])(
-        [
-            value,
-            p["load_transfer"],
-            p[f"braking_{axle}"],
-            p[f"driving_{axle}"],
-            p["cg_shift"],
-            p[f"downforce_{axle}"],
-            signals["a_x"],
-            v_x,
-        ]
-    )
-    after[f"force_{axle}"] = force
-    # What the balance misses.
-    z0, xi0, u0, F0, angle, ln_I, push = (
-        ca.SX.sym(n) for n in ("z", "xi", "u", "F", "d", "I", "bank")
-    )
-    J = car.inertia * ca.exp(ln_I) / (other if front else -other)
-    across = F0 * ca.cos(angle)
-    xi = vy / GRAVITY + J * yaw
-    u = across - vx * yaw / GRAVITY + push
-    fall = ca.exp(-RATE * dt)
-    mean = (1 - fall) / (RATE * dt)
-    z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
-    z = ca.if_else(first > 0, 0, z)
-    bank = Dual(signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
-    balance = Stage(
-        [z0, xi0, u0, F0, angle, ln_I, push, vx, vy, yaw, cg], [z, xi, u, across, RATE * z]
-    )
-    found = balance(
-        [
-            before[f"z_{axle}"],
-            before[f"xi_{axle}"],
-            before[f"u_{axle}"],
-            force,
-            delta,
-            p["ln_inertia"],
-            bank,
-            v_x,
-            v_y,
-            r,
-            p["cg_shift"],
-        ]
-    )
-    after[f"z_{axle}"], after[f"xi_{axle}"], after[f"u_{axle}"] = found[0], found[1], found[2]
-    return found[3], found[4], x
+def _slip(
+    axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, sway: _Dual
+) -> tuple[dict[str, _Dual], _Dual]:
+    """Return slip and lagged slip of an axle after the sample, and the latter by itself."""
+    car, p = at.car, at.p
+
+    def slip(d: Any, vy: Any, vx: Any, yaw: Any, k: Any, s: Any, shift: Any) -> list[Any]:
+        arm = (car.l_f - shift) if axle == "f" else -(car.l_r + shift)
+        return [d - ca.atan((vy + arm * yaw) / vx) + k * s]
+
+    def lagged(x0: Any, a0: Any, a1: Any, C: Any, give: Any, vx: Any) -> list[Any]:
+        """Exact for α linear over the step."""
+        h = vx * at.dt / (give * C + SHORTEST * (car.l_f + car.l_r))
+        e = ca.exp(-h)
+        x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
+        return [ca.if_else(at.first > 0, a1, x1)]
+
+    (alpha,) = _staged(slip, delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"])
+    last, was, slope = (at.before[f"{name}_{axle}"] for name in ("x", "alpha", "slope"))
+    (x,) = _staged(lagged, last, was, alpha, slope, p[f"compliance_{axle}"], v_x)
+    return {f"x_{axle}": x, f"alpha_{axle}": alpha}, x
+
+
+def _force(axle: str, at: _At, v_x: _Dual, x: _Dual) -> tuple[dict[str, _Dual], _Dual]:
+    """Return slope and force at a lagged slip, of curve, load and ellipse; the latter by itself."""
+    car, p, road = at.car, at.p, at.p["ln_road"]
+
+    def pushes(phi: Any, *of: Any) -> list[Any]:
+        *numbers, a_x, speed = of
+        load, left = load_and_ellipse(axle, car, numbers, a_x, speed)
+        return [phi * load * left]
+
+    ln_m = _Dual(road.value + at.signals["road"].value, road.slopes)
+    numbers = [p[name] for name in curve_names(axle)]
+    value, slope = _staged(carcass_curve, *numbers, ln_m, x)
+    given = (p[name] for name in pushed_names(axle))
+    (force,) = _staged(pushes, value, *given, at.signals["a_x"], v_x)
+    return {f"slope_{axle}": slope, f"force_{axle}": force}, force
+
+
+def _missed(
+    axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, force: _Dual
+) -> tuple[dict[str, _Dual], _Dual, _Dual]:
+    """Return the states of the balance of an axle after the sample, F, and e."""
+    car, dt, p = at.car, at.dt, at.p
+
+    def balance(
+        z0: Any, xi0: Any, u0: Any, F0: Any, angle: Any, ln_I: Any, push: Any,
+        vx: Any, vy: Any, yaw: Any, cg: Any,
+    ) -> list[Any]:  # fmt: skip
+        other = (car.l_r + cg) if axle == "f" else -(car.l_f - cg)
+        J = car.inertia * ca.exp(ln_I) / other
+        across = F0 * ca.cos(angle)
+        xi = vy / GRAVITY + J * yaw
+        u = across - vx * yaw / GRAVITY + push
+        fall = ca.exp(-RATE * dt)
+        mean = (1 - fall) / (RATE * dt)
+        z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
+        z = ca.if_else(at.first > 0, 0, z)
+        return [z, xi, u, across, RATE * z]
+
+    bank = _Dual(at.signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
+    names = [f"{name}_{axle}" for name in ("z", "xi", "u")]
+    last = (at.before[name] for name in names)
+    inputs = (force, delta, p["ln_inertia"], bank, v_x, v_y, r, p["cg_shift"])
+    *kept, across, e = _staged(balance, *last, *inputs)
+    return dict(zip(names, kept, strict=True)), across, e
 
 
 # The same, sample by sample in a car: no smoothing, a gate before it, a_x from v_x alone.
@@ -435,49 +406,47 @@ REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
 
 
 @cache
-def replay_step() -> ca.Function:
+def _replay_step() -> ca.Function:
     """Return the model as a step: axle_force [N], lagged slip and the larger slip [rad], (2,)."""
-    state_port, old = _symbols(REPLAYED)
-    gate_port, last = named_port(GateState, "gate")
-    x, u, v_x, dt = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x"), ca.SX.sym("dt")
-    parameter_port, parameters = _symbols(NAMES)
-    car_port, car = named_port(CarNumbers, "car")
-    limit_port, limits = named_port(GateNumbers, "plausibility")
-    loads = ca.SX.sym("loads", 2)
-    g = gate(limits, dt, last, x, u, v_x)
+    ports, s = symbols(
+        gate=GateState,
+        motion=len(REPLAYED),
+        x=2,
+        u=2,
+        v_x=1,
+        parameters=len(NAMES),
+        dt=1,
+        car=CarNumbers,
+        plausibility=Plausibility,
+        loads=2,
+    )
+    old = _by_name(REPLAYED, s.motion)
+    g = gate(s.plausibility, s.dt, s.gate, s.x, s.u, s.v_x)
     slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
     a_x = (g.v_x - slow) / LAG_OF_A_X - g.v_y * g.r
-    following = g.v_x + (slow - g.v_x) * ca.exp(-dt / LAG_OF_A_X)
+    following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / LAG_OF_A_X)
     values = [g.v_x, g.v_y, g.r, g.delta[0], g.delta[1], a_x, 0, 0, g.on]
-    nothing = ca.SX(1, 0)
-    fixed = {
-        name: Dual(value, nothing)
-        for name, value in zip((*SIGNALS, *RATES), (*values, 0, 0, 0), strict=True)
-    }
-    duals = {name: Dual(parameters[name], nothing) for name in NAMES}
-    before = {name: Dual(old.get(name, 0), nothing) for name in CARRIED}
-    after, out = _step(before, fixed, duals, car, dt, g.first)
+    fixed = _constant((*SIGNALS, *RATES), [*values, 0, 0, 0], 0)
+    duals = _constant(NAMES, ca.vertsplit(s.parameters), 0)
+    before = _constant(CARRIED, [old.get(name, 0) for name in CARRIED], 0)
+    after, out = _step(_At(before, fixed, duals, s.car, s.dt, g.first))
     slip = ca.vertcat(*(axis.value for axis in out["x"]))
     alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
     motion = [ca.if_else(g.on, after[name].value, 0) for name in CARRIED[:10]]
-    force = ca.if_else(g.on, loads * ca.vertcat(*(axis.value for axis in out["F"])), 0)
-    return ca.Function(
+    force = s.loads * ca.vertcat(*(axis.value for axis in out["F"]))
+    return step_function(
         "motion_replay",
-        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limit_port, loads],
-        [
-            g.state,
-            ca.vertcat(*motion, following),
-            force,
-            ca.if_else(g.on, slip, 0),
-            ca.if_else(g.on, ca.fmax(ca.fabs(slip), ca.fabs(alpha)), 0),
-        ],
-        ["gate", "motion", "x", "u", "v_x", "parameters", "dt", "car", "plausibility", "loads"],
-        ["gate_next", "motion_next", "axle_force", "lagged_slip", "slip_size"],
-        {"cse": True},
+        ports,
+        {"gate": g.state, "motion": ca.vertcat(*motion, following)},
+        {
+            "axle_force": ca.if_else(g.on, force, 0),
+            "lagged_slip": ca.if_else(g.on, slip, 0),
+            "slip_size": ca.if_else(g.on, ca.fmax(ca.fabs(slip), ca.fabs(alpha)), 0),
+        },
     )
 
 
 @cache
 def replay_scan() -> Scan:
-    """Return `replay_step` as a compiled loop."""
-    return Scan(replay_step(), carry=REPLAY_CARRY, over=REPLAY_OVER)
+    """Return `_replay_step` as a compiled loop."""
+    return Scan(_replay_step(), carry=REPLAY_CARRY, over=REPLAY_OVER)

@@ -16,18 +16,19 @@ from typing import Any
 import casadi as ca
 
 from codegen import Scan
-from identifier.axle.car import named_port
+from identifier.axle.car import step_function, symbols
 from identifier.axle.slip import SHORTEST
 from identifier.motion.model import (
-    LEAST_GRIP,
-    LEAST_SLOPE,
     QUICK,
     CarNumbers,
     Columns,
-    curve_symbols,
+    carcass_curve,
+    curve_names,
+    load_and_ellipse,
+    pushed_names,
 )
-from identifier.motion.parameters import NAMES, SLIPS
-from models.vehicle import GRAVITY, LIGHTEST
+from identifier.motion.parameters import NAMES
+from models.vehicle import GRAVITY
 
 STATES = ("v_y", "r", "x_f", "x_r", "e_f", "e_r", "bank", "bank_rate")
 GIVEN = ("v_x", "delta_f", "delta_r", "a_x", "turning", "rho", "rho_rate", "jerk")
@@ -48,27 +49,30 @@ def node_scan(columns: Columns = ()) -> Scan:
     for, `measured` (2,) and the weights `of_moves` (8,), `of_shows` (2,) and `of_begins` (8,) have
     a row a node, too, and parts of Gauss-Newton's matrix come out: of the node, of the next, of
     both, with the parameters, the gradient, and of the parameters alone as sums that are carried.
-
-    Parameters
-    ----------
     columns : names of the parameters over which slopes are asked for, (n,), those of the
         accelerometer among them.
     """
-    z, z_next = ca.SX.sym("z", len(STATES)), ca.SX.sym("z_next", len(STATES))
-    given, given_next = ca.SX.sym("given", len(GIVEN)), ca.SX.sym("given_next", len(GIVEN))
-    p, felt = ca.SX.sym("parameters", len(NAMES)), ca.SX.sym("accelerometer", len(ACCELEROMETER))
-    car_port, car = named_port(CarNumbers, "car")
-    times, dt = ca.SX.sym("times", len(TIMES)), ca.SX.sym("dt")
-    by_name = dict(zip(LATENT_NAMES, ca.vertsplit(ca.vertcat(p, felt)), strict=True))
-    now, then = (_Instant(one, u, by_name, car) for one, u in ((z, given), (z_next, given_next)))
-    moves = ca.vertcat(*_moves(now, then, by_name, times, dt))
+    over: tuple[str, ...] = ("z", "z_next", "given", "given_next")
+    ports, s = symbols(
+        z=len(STATES),
+        z_next=len(STATES),
+        given=len(GIVEN),
+        given_next=len(GIVEN),
+        parameters=len(NAMES),
+        accelerometer=len(ACCELEROMETER),
+        car=CarNumbers,
+        times=len(TIMES),
+        dt=1,
+    )
+    z, p = s.z, ca.vertcat(s.parameters, s.accelerometer)
+    by_name = dict(zip(LATENT_NAMES, ca.vertsplit(p), strict=True))
+    now, then = (
+        _Instant(z, s.given, by_name, s.car),
+        _Instant(s.z_next, s.given_next, by_name, s.car),
+    )
+    moves = ca.vertcat(*_moves(now, then, by_name, s.times, s.dt))
     shows = ca.vertcat(*_shows(now, by_name))
     begins = ca.vertcat(z[0], 0, z[2:4] - ca.vertcat(*now.alpha), z[4:])
-    ports = {
-        **{"z": z, "z_next": z_next, "given": given, "given_next": given_next, "parameters": p},
-        **{"accelerometer": felt, "car": car_port, "times": times, "dt": dt},
-    }
-    over: tuple[str, ...] = ("z", "z_next", "given", "given_next")
     carry: tuple[str, ...] = ()
     force = ca.vertcat(*now.force) - z[4:6]
     out = {"moves": moves, "shows": shows, "begins": begins, "force": force}
@@ -84,7 +88,7 @@ def node_scan(columns: Columns = ()) -> Scan:
         carry = ("sums", "slopes")
         ports |= {"measured": measured, **weights, "sums": sums, "slopes": slopes}
         of = ca.vertcat(*(by_name[name] for name in columns))
-        J, K, P = (ca.jacobian(missed, one) for one in (z, z_next, of))
+        J, K, P = (ca.jacobian(missed, one) for one in (z, s.z_next, of))
         wJ, wK, wP = (ca.diag(w) @ one for one in (J, K, P))
         out = {
             **{"now": J.T @ wJ, "next": K.T @ wK, "both": K.T @ wJ},
@@ -93,14 +97,8 @@ def node_scan(columns: Columns = ()) -> Scan:
             "shows_z": ca.jacobian(shows, z),
             **{"sums_next": sums + P.T @ wP, "slopes_next": slopes + wP.T @ missed},
         }  # fmt: skip
-    step = ca.Function(
-        f"nodes_{len(columns)}",
-        list(ports.values()),
-        [ca.densify(one) for one in out.values()],
-        list(ports),
-        list(out),
-        {"cse": True},
-    )
+    dense = {name: ca.densify(one) for name, one in out.items()}
+    step = step_function(f"nodes_{len(columns)}", ports, {}, dense)
     return Scan(step, carry=carry, over=over, flags=QUICK)
 
 
@@ -132,29 +130,18 @@ class _Instant:
 
     def curve(self, axle: str, x: Any) -> tuple[Any, Any]:
         """Return φ and the slope of the curve at a slip, at least what the carcass keeps."""
-        numbers, at, phi, slope = curve_symbols()
-        one = ca.Function("curve", [ca.vertcat(*numbers), at], [phi, slope])
-        names = ("ln_stiffness", "ln_grip", "shape", "curvature")
-        own = [self.p[f"{name}_{axle}"] for name in names]
-        own += [self.p[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
-        value, tangent = one(ca.vertcat(*own, self.p["ln_road"]), x)
-        return value, ca.fmax(tangent, LEAST_SLOPE * ca.exp(own[0]))
+        numbers = [self.p[name] for name in curve_names(axle)]
+        return carcass_curve(*numbers, self.p["ln_road"], x)
 
     @property
     def force(self) -> list[Any]:
         """Lateral forces of both axles over their static loads, across the body."""
         p, v_x = self.p, self.given["v_x"]
         a_x = self.given["a_x"] - self.given["turning"] * self.v_y * self.r
-        f = (a_x + self.car.drag * v_x**2) / GRAVITY
-        use_of = ca.if_else(f > 0, 1, 0)
         found = []
         for i, axle in enumerate("fr"):
-            other = -self.arms[1] if i == 0 else self.arms[0]
-            shifted = (-1 if i == 0 else 1) * p["load_transfer"] * self.L / other * f
-            press = (self.car.press_f, self.car.press_r)[i] + p[f"downforce_{axle}"]
-            load = ca.fmax(1 + shifted + press * v_x**2, LIGHTEST)
-            use = (use_of * p[f"driving_{axle}"] + (1 - use_of) * p[f"braking_{axle}"]) * f
-            left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
+            numbers = [p[name] for name in pushed_names(axle)]
+            load, left = load_and_ellipse(axle, self.car, numbers, a_x, v_x)
             phi, _ = self.curve(axle, self.z[2 + i])
             found.append(phi * load * left * ca.cos(self.delta[i]) + self.z[4 + i])
         return found

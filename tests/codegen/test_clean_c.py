@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from codegen import clean_c, find_compiler, load_library
-from codegen.clean_c import Statements, in_order, literal, recognized
+from codegen.clean_c import Statements, _in_order, literal, recognized
 from codegen.graph import UnknownOperationError, graph_of
 
 PREAMBLE = """#include <math.h>
@@ -166,7 +166,7 @@ def test_each_unit_is_written_once_and_after_what_it_needs(rng):
     for _ in range(50):
         needs = {k: [int(i) for i in np.flatnonzero(rng.random(k) < 0.1)] for k in range(60)}
         read = {one for needed in needs.values() for one in needed}
-        order = in_order(needs, [k for k in needs if k not in read])
+        order = _in_order(needs, [k for k in needs if k not in read])
         assert sorted(order) == list(needs)
         at = {unit: place for place, unit in enumerate(order)}
         assert all(at[one] < at[unit] for unit, needed in needs.items() for one in needed)
@@ -178,4 +178,4 @@ def test_partial_sums_are_read_as_they_come_and_do_not_wait():
         needs |= {f"s{k}": [f"s{k - 1}"], f"r{k}": [f"s{k - 1}"]}
     results = [f"r{k}" for k in reversed(range(1, n))] + [f"e{n}"]
     needs[f"e{n}"] = [f"s{n - 1}"]
-    assert waiting(needs, in_order(needs, results)) < 4
+    assert waiting(needs, _in_order(needs, results)) < 4

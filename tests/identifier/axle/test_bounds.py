@@ -93,7 +93,7 @@ def kept(theta, P, **limits):
     """[w, s, k, offset] within bounds, in double."""
     n = len(theta) - 3
     declared = bounds.Bounds(compliance=0.3, v_y=0.2, **limits)
-    numbers = declared.at(n, SLOPES, 0.0)
+    numbers = declared.of_ladder(LADDER, 0.0)
     upper = {(i, j): P[i, j] for i in range(n) for j in range(i, n)}
     found = bounds.bounded(
         numbers, [ca.SX(float(t)) for t in theta], upper, offset=0.01, slope=list(ROW)
@@ -150,14 +150,14 @@ def test_bounds_that_no_weights_can_keep_are_refused():
     with pytest.raises(ValueError, match="least_stiffness must be below most_stiffness"):
         bounds.Bounds(compliance=0.1, v_y=0.1, least_stiffness=90.0)
     with pytest.raises(ValueError, match=r"4 weights up to 0\.1 cannot carry"):
-        bounds.Bounds(compliance=0.1, v_y=0.1, weight=0.1).at(4, SLOPES, 0.0)
+        bounds.Bounds(compliance=0.1, v_y=0.1, weight=0.1).of_ladder(LADDER, 0.0)
     with pytest.raises(ValueError, match=r"stiffness of .* loads/rad, outside of 2 to 80"):
-        bounds.Bounds(compliance=0.1, v_y=0.1).at(4, 1000.0, 0.0)
+        bounds.Bounds(compliance=0.1, v_y=0.1).of_ladder((0.001, 0.002, 0.004, 0.008), 0.0)
 
 
 def test_limits_are_floats_that_are_not_above_the_declared():
     for limit in (0.1, 0.3, 0.324, 1 / 3, 0.01):
-        numbers = bounds.Bounds(compliance=limit, v_y=limit).at(4, SLOPES, 0.0)
+        numbers = bounds.Bounds(compliance=limit, v_y=limit).of_ladder(LADDER, 0.0)
         for number in (numbers.compliance, numbers.v_y):
             assert float(np.float32(number)) == number
             assert limit * (1 - 2e-7) < number <= limit

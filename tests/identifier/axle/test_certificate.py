@@ -12,10 +12,10 @@ from identifier.axle import learning as steps
 from identifier.axle.along import BEGIN, adjoint, begin_error, certified_along, lessons
 from identifier.axle.certificate import (
     FrictionDrop,
+    _widest_range,
     corners,
     curve_facts,
     jump_by_learning,
-    widest_range,
 )
 from identifier.axle.covariance import LEAST_VARIANCE, unpacked
 from identifier.axle.curve import LADDER
@@ -48,7 +48,7 @@ def test_forces_of_the_corners_are_those_of_linear_programs(design):
         assert (W @ T).min() == pytest.approx(least, abs=1e-7)
         assert (W @ T).max() == pytest.approx(most, abs=1e-7)
         widest = max(widest, most - least)
-    assert widest <= widest_range(W, LADDER, 1.5) < 1.2 * widest
+    assert widest <= _widest_range(W, LADDER, 1.5) < 1.2 * widest
 
 
 def test_a_ladder_of_three_and_a_free_slope_have_their_corners_too(design):

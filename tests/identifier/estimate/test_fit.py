@@ -8,7 +8,7 @@ import pytest
 import identifier.estimate.fit as fitting
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
-from identifier.estimate.roads import cheapest
+from identifier.estimate.roads import _cheapest
 from identifier.motion.parameters import INDEX, NAMES
 from models.vehicle import sedan
 from tests.identifier.estimate.conftest import DROP, driven
@@ -104,8 +104,8 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
 def test_the_cheapest_path_changes_where_it_gains_more_than_the_price():
     loss = np.zeros((2, 30))
     loss[0, 10:20], loss[1, :10], loss[1, 20:] = 1.0, 1.0, 1.0
-    assert cheapest(loss, 4.0).tolist() == [0] * 10 + [1] * 10 + [0] * 10
-    assert not cheapest(loss, 6.0).any()
+    assert _cheapest(loss, 4.0).tolist() == [0] * 10 + [1] * 10 + [0] * 10
+    assert not _cheapest(loss, 6.0).any()
 
 
 def test_a_log_without_a_sample_that_counts_is_refused_by_its_name():

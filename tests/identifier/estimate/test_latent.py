@@ -11,7 +11,7 @@ from identifier.estimate.drive import hardest
 from identifier.estimate.fit import fit
 from identifier.estimate.latent import (
     TRUST,
-    Latent,
+    _Latent,
     lateness,
     latent_priors,
     learn_latent,
@@ -52,7 +52,7 @@ def exact():
 @pytest.fixture(scope="module")
 def problem(exact):
     nodes = Nodes.of(blind(exact).between(0.0, 3.0), CAR)
-    return Latent(nodes, CAR, latent_priors(CAR, Priors.of(CAR)))
+    return _Latent(nodes, CAR, latent_priors(CAR, Priors.of(CAR)))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_the_step_is_that_of_the_dense_matrix(problem, place):
     if not bounded:
         np.testing.assert_allclose(dp, step[n:], rtol=1e-4, atol=1e-6)
         np.testing.assert_allclose(dz.ravel(), step[:n], rtol=1e-3, atol=1e-6)
-    exactly = Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=1.0))
+    exactly = _Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=1.0))
     own, P, slopes, _ = exactly.spread(z, p, problem.R)
     inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
     whole = own[:, 0, 0] + np.einsum("ni,ij,nj->n", slopes, P, slopes)
@@ -111,7 +111,7 @@ def test_what_a_drive_tells_counts_less_and_what_is_believed_does_not(problem, p
     z, p, _ = place
     told = []
     for lasting in (1.0, 2.0, 4.0):
-        one = Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=lasting))
+        one = _Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=lasting))
         told.append(np.linalg.inv(one.spread(z, p, problem.R)[1]))
     believed = around_beliefs(problem.priors, p)[1][np.ix_(problem.index, problem.index)]
     shares = [(one - believed) / np.abs(np.diag(told[0])).max() for one in told]
@@ -136,7 +136,7 @@ def test_parameters_that_are_held_leave_their_doubt(problem, place):
     moves = np.zeros_like(problem.priors.moves)
     again = [LATENT_NAMES.index(name) for name in ("r_bias", "a_y_bias")]
     moves[again] = True
-    held = Latent(problem.nodes, CAR, replace(problem.priors, moves=moves), columns=problem.index)
+    held = _Latent(problem.nodes, CAR, replace(problem.priors, moves=moves), columns=problem.index)
     own_held, P_held, slopes_held, _ = held.spread(z, p, problem.R)
     np.testing.assert_allclose(own_held, own, rtol=1e-6)
     known = np.flatnonzero(~moves[problem.index])
@@ -224,9 +224,9 @@ def test_starts_part_only_where_both_explain_the_drive(problem, monkeypatch, wor
     best = problem.smoothed(z, p, rounds=0)
     moved = z.copy()
     moved[:, 0] += 0.5
-    monkeypatch.setattr(Latent, "settled", lambda self, stiffer=0.0: (z, p))
-    monkeypatch.setattr(Latent, "smoothed", lambda self, *given: best)
-    monkeypatch.setattr(Latent, "descend", lambda *given: (moved, p, best.cost + worse))
+    monkeypatch.setattr(_Latent, "settled", lambda self, stiffer=0.0: (z, p))
+    monkeypatch.setattr(_Latent, "smoothed", lambda self, *given: best)
+    monkeypatch.setattr(_Latent, "descend", lambda *given: (moved, p, best.cost + worse))
     found = learn_latent(problem.nodes, CAR, Priors.of(CAR))
     assert (found.parted > TRUST.parted) == parted
 

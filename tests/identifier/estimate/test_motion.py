@@ -5,7 +5,7 @@ import pytest
 
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
-from identifier.estimate.solve import DELAYS, Problem, arguments, car_numbers, simulate
+from identifier.estimate.solve import DELAYS, Problem, _arguments, car_numbers, simulate
 from identifier.motion.model import RATE, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, sedan
@@ -135,7 +135,7 @@ def test_slopes_over_faults_and_the_road_are_finite_differences(drive):
     moves = Priors.of(sedan()).moves
     names = tuple(name for name, moving in zip(NAMES, moves, strict=True) if not moving)
     scan, p, car = motion_scan(names), parameters(), car_numbers(sedan())
-    inputs = arguments(drive, np.zeros(len(p)), car, scan)  # delays as the model reads them
+    inputs = _arguments(drive, np.zeros(len(p)), car, scan)  # delays as the model reads them
 
     def run(p, port):
         return scan(len(drive.signals), {**inputs, "parameters": p}, ports=(port,))[port]

@@ -7,7 +7,7 @@ import pytest
 
 import tireid as ti
 from identifier.estimate.fit import fit
-from identifier.estimate.poor import Kinematics, Shown, new_values, on_time
+from identifier.estimate.poor import _Kinematics, _new_values, _Shown, on_time
 from models.recordings.record import joined
 
 from .conftest import driven
@@ -46,9 +46,9 @@ def share_missed(learnt, log):
 
 
 def test_of_a_good_signal_all_are_new(log):
-    assert len(new_values(log.v_y)) == len(log)
-    assert len(new_values(np.where(log.t < 2.0, 0.0, log.v_y))) == len(log)
-    assert len(new_values(np.zeros(100))) == 100
+    assert len(_new_values(log.v_y)) == len(log)
+    assert len(_new_values(np.where(log.t < 2.0, 0.0, log.v_y))) == len(log)
+    assert len(_new_values(np.zeros(100))) == 100
 
 
 @pytest.mark.parametrize("how", ["held", "ahead", "lines"])
@@ -56,7 +56,7 @@ def test_rare_and_late_values_are_found_and_brought_on_time(log, how):
     shown = received(log, how=how)
     at = np.arange(0, len(log), 10)
     at = at[(at < 300) | (at >= 420)]
-    new = new_values(shown.v_y)
+    new = _new_values(shown.v_y)
     assert np.isin(new, at if how != "ahead" else np.append(at, 300)).all()
     assert len(new) > 0.9 * len(at)
     found = on_time(shown, CAR)
@@ -112,8 +112,8 @@ def test_banded_algebra_gives_the_least_squares(log):
     """By a dense matrix of the same equations."""
     some = log.between(2.0, 2.6)
     new = np.arange(3, len(some), 7)
-    s = Shown(interval=0.07, late=0.013, noise=0.02, push=0.01, wanders=0.1)
-    v_y, missed = Kinematics(some, new).carried(s, np.ones(len(new)))
+    s = _Shown(interval=0.07, late=0.013, noise=0.02, push=0.01, wanders=0.1)
+    v_y, missed = _Kinematics(some, new).carried(s, np.ones(len(new)))
     n, dt = len(some), some.dt
     rows, right = [], []
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from identifier.axle.band import BandCalibration
-from identifier.axle.band_step import hinged, hinges
+from identifier.axle.band_step import _hinged, hinges
 from identifier.export import fmu as binaries
 from identifier.export.compiled import CompiledPackage, samples_of
 from identifier.export.fmu import export_fmu, fmu_text
@@ -110,7 +110,7 @@ def test_hinges_are_the_straight_lines_between_centers():
     values, at = np.array([[1.0, 3.0, 2.0, 2.5], [0.5, 0.4, 0.9, 4.0]]), (0.1, 0.2, 0.5, 0.6)
     for x in (0.0, 0.1, 0.15, 0.2, 0.44, 0.55, 0.6, 9.0):
         for numbers, row in zip(hinges(values, at), values, strict=True):
-            found = float(hinged(list(map(float, numbers)), at, x))
+            found = float(_hinged(list(map(float, numbers)), at, x))
             assert found == pytest.approx(np.interp(x, at, row))
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from codegen import processor
-from codegen.processor import PROCESSORS, ReplayError, missing_tools, replay, size_on, with_figures
+from codegen.processor import PROCESSORS, ReplayError, _size_on, missing_tools, replay, with_figures
 from identifier.export.processor import figures_text, measure, recording_program
 
 pytestmark = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
@@ -17,7 +17,7 @@ def test_the_paper_s_network_keeps_the_targets(packages, samples):
     assert 1000 < found.instructions <= 2000
     assert found.most_instructions <= 2600  # the first sample counts twice
     assert 256 < found.stack <= 800
-    size = size_on(PROCESSORS[0], "tireid", package.files, single=True)
+    size = _size_on(PROCESSORS[0], "tireid", package.files, single=True)
     assert size.static_ram == 0
     assert found.state + found.params <= 400
     assert 4000 < size.flash <= 7000
@@ -42,7 +42,7 @@ def test_the_counter_counts(packages, samples):
 def test_data_that_may_change_would_be_counted(packages):
     files = dict(packages["integral"].files)
     files["src/tireid.c"] += "int tireid_calls;\nint tireid_most = 7;\n"
-    assert size_on(PROCESSORS[0], "tireid", files, single=True).static_ram == 8
+    assert _size_on(PROCESSORS[0], "tireid", files, single=True).static_ram == 8
 
 
 def test_the_table_has_a_row_for_each_processor_and_precision(packages):

@@ -14,7 +14,7 @@ from identifier.run import OnlineIdentifier, identify, learn
 from models.friction import Friction, FrictionChange
 from models.recordings import RecordingError
 from models.sensors import Sensor, Sensors
-from models.vehicle import GRAVITY, sedan
+from models.vehicle import GRAVITY, Vehicle, sedan
 from tests.identifier.conftest import missed, steered
 
 CAR = sedan()
@@ -293,3 +293,19 @@ def test_bounds_hold_whatever_is_measured(banked):
         *((held[name], sensors[k]) for k, name in enumerate(names)),
     ):
         assert least <= values.min() and values.max() <= most
+
+
+def test_a_tiny_body_rolls_no_faster_than_the_filter_can_follow():
+    tiny = Vehicle(
+        mass=0.05,
+        yaw_inertia=1e-5,
+        l_f=0.03,
+        l_r=0.03,
+        cornering_stiffness_front=3.0,
+        cornering_stiffness_rear=3.0,
+    )
+    method = InertialIdentifier.for_vehicle(tiny)
+    assert method.roll_frequency / tiny.froude_time > 60.0
+    assert method.body_prior(tiny).frequency == 60.0
+    roll_stiffness = method.setup(tiny).constants["laws"][2]
+    assert roll_stiffness == 60.0**2

@@ -13,9 +13,9 @@ from identifier.inertial.motion import (
     Along,
     Laws,
     Sample,
+    _size,
     predicted,
     shown,
-    size,
     static_load,
     unknowns,
 )
@@ -38,7 +38,7 @@ def places():
 
 
 def state():
-    z = np.zeros(size(N))
+    z = np.zeros(_size(N))
     z[:MOVING] = [-0.4, 0.25, 0.03, 0.025, 0.02, -0.01, 0.03]
     at = places()
     z[at["W"] : at["W"] + N] = [0.1, 0.5, 0.2, 0.1]

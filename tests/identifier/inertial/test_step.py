@@ -15,9 +15,9 @@ from identifier.inertial.motion import (
     SENSORS,
     Laws,
     Sample,
+    _size,
     predicted,
     shown,
-    size,
     unknowns,
 )
 from identifier.run import identify
@@ -28,7 +28,7 @@ from models.vehicle import sedan
 G, CAR, DT = 9.81, sedan(), 0.01
 METHOD = replace(InertialIdentifier.for_vehicle(CAR), sensor_position=(0.3, -0.1))
 N = len(METHOD.ladder)
-Q = size(N)
+Q = _size(N)
 LOAD = CAR.weight * np.array([CAR.l_r, CAR.l_f]) / CAR.wheelbase
 
 
