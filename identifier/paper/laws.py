@@ -36,7 +36,7 @@ def _static_direction(A_d: Any, drive: Any) -> Any:
     return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
 
 
-def lyapunov_direction(A_d: Any, drive: Any) -> Any:
+def _lyapunov_direction(A_d: Any, drive: Any) -> Any:
     """Return -P drive with A_dᵀ P + P A_d = -2 I, (2,): -A_d⁻¹ where A_d is symmetric.
 
     P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
@@ -84,15 +84,14 @@ class Law:
 
 
 # The integral law is that of (11)-(12); the instantaneous one the conventional scheme. z + τ ξ̃:
-# with τ long enough the loop is positive real, and along `lyapunov_direction` no gain is then too
-# high, whatever the Hurwitz A_d; for A_d = -a I long enough is 1/a, else `lead_time` of
-# `identifier.stability.pi_lead`.
+# with τ long enough the loop is positive real, and along `_lyapunov_direction` no gain is then too
+# high, whatever the Hurwitz A_d; for A_d = -a I long enough is 1/a.
 LAWS: Mapping[str, Law] = {
     law.name: law
     for law in (
         Law(name="integral", z=1.0),
         Law(name="instantaneous", xi=1.0),
-        Law(name="pi_lead", z=1.0, lead=1.0, direction=lyapunov_direction),
+        Law(name="pi_lead", z=1.0, lead=1.0, direction=_lyapunov_direction),
     )
 }
 

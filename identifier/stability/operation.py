@@ -67,8 +67,6 @@ class Operation:
     needed_force : that the network should be able to hold against its leakage [U].
     x_bar_max : bound on |x_bar| [-], without what the error adds where the network reads x_hat.
     input_feedback : (2, 2) J_f K [1/s] where the network reads x_hat; None where it reads x.
-    W_M : bound on the ideal weights (Frobenius) [U], for (14).
-    w_bar : bound on the approximation error [U], for (14).
     V_start : largest |V_hat| to begin with (Frobenius) [-].
     W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this one
         (Frobenius) [U]; the V layer's share of the loop gain grows with it.
@@ -83,8 +81,6 @@ class Operation:
     needed_force: float
     x_bar_max: float
     input_feedback: Array | None
-    W_M: float
-    w_bar: float
     V_start: float = 0.0
     W_large: float = math.inf
     input_per_error: float = 0.0
@@ -100,7 +96,7 @@ class Operation:
             )
         if not self.W_large > 0.0:
             raise ValueError(f"W_large must be positive, it is {self.W_large}")
-        for name in ("W_M", "w_bar", "V_start", "input_per_error"):
+        for name in ("V_start", "input_per_error"):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
 
@@ -236,26 +232,19 @@ def worst_loop(
 # F' = 0. (8)c prints x_hat; x is measured, so that reading x costs nothing and has no such limit.
 
 
-def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
-    """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6)."""
-    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
-    K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
-    slip = np.array([[1.0, l_f], [1.0, -l_r]])
-    coupling: Array = slip @ K
-    return coupling
-
-
 def estimated_input_feedback(
     *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
     """
-    require_positive(ValueError, v_x=v_x)
+    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
     if lost.shape != (2,) or not np.all(np.isfinite(lost)):
         raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
-    return np.diag(lost) @ axle_coupling(m=m, I_z=I_z, l_f=l_f, l_r=l_r) / v_x
+    K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
+    coupling = np.array([[1.0, l_f], [1.0, -l_r]]) @ K
+    return np.diag(lost) @ coupling / v_x
 
 
 def minimal_decay(feedback: ArrayLike) -> float:
@@ -390,9 +379,8 @@ def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> floa
 def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
     """Return what the certificate of a design needs.
 
-    (14) is given what holds for sure: the ideal weights W = 0, that leave all of f as w_bar. The V
-    layer is judged up to twice the smallest weights that hold the expected residual with every
-    unit saturated: units half open.
+    The V layer is judged up to twice the smallest weights that hold the expected residual with
+    every unit saturated: units half open.
     """
     found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
     expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
@@ -413,8 +401,6 @@ def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
         V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
         input_feedback=feedback if estimated else None,
         input_per_error=input_per_error(design, vehicle, driving) if estimated else 0.0,
-        W_M=0.0,
-        w_bar=found.residual,
         W_large=2.0 * expected / design.force_unit / math.sqrt(design.network.hidden),
     )
 

@@ -3,7 +3,7 @@ import pytest
 
 from benchmarks.limits import integral_euler_limit
 from identifier.paper.design import PaperIdentifier
-from identifier.paper.laws import Gains, diagonal
+from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.paper.network import Network
 from identifier.run import identify
 from identifier.stability.bounds import small_gain, steady_capacity, transient_peak
@@ -24,10 +24,9 @@ from identifier.stability.sampled_bound import (
     error_gains,
     output_layer,
 )
-from tests.identifier.stability.storage import pi_lead
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
-LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead(0.3)}
+LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": DrivingError(1.0, 0.3)}
 
 
 def learning_of(A_d, law, *, lam, eta_W, rho_W, n_h, integrator="euler", dt=2e-3):
@@ -249,8 +248,6 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
         needed_force=f_max,
         x_bar_max=x_bar_max,
         input_feedback=None,
-        W_M=0.0,
-        w_bar=f_max,
         V_start=V_start,
     )
     inverse = np.eye(2) / 6.0
