@@ -1,6 +1,7 @@
 """What the doctor found: one fault, its size and what is known of it, and what takes it out."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,6 +67,11 @@ class Finding:
         """The confidence as text; 99 % at most, as a log alone proves nothing."""
         return f"{100.0 * min(self.confidence, MOST):.0f} %"
 
+    @property
+    def subject(self) -> tuple[str, str]:
+        """Code and channel: a log has one finding of each."""
+        return self.code, self.channel
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and words, ready for JSON; None is what is not known."""
 
@@ -85,3 +91,11 @@ class Finding:
             "note": self.note,
             "repair": None if self.repair is None else self.repair.tables(),
         }
+
+
+def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
+    """Return findings without the second of one subject."""
+    kept: dict[tuple[str, str], Finding] = {}
+    for one in findings:
+        kept.setdefault(one.subject, one)
+    return list(kept.values())

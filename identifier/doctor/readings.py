@@ -75,6 +75,20 @@ class Change:
         kind = {"sign": "sign", "steering": "ratio"}.get(self.code, "size")
         return frozenset(f"{name} {kind}" for name, _ in self.factors)
 
+    @property
+    def by_channel(self) -> dict[str, float]:
+        """What each channel is multiplied by."""
+        pairs = zip(self.channels, self.factors, strict=True)
+        return {name: factor for name, (_, factor) in pairs}
+
+    @property
+    def parts(self) -> "tuple[Change, ...]":
+        """The same, channel by channel."""
+        return tuple(
+            replace(self, channels=(name,), factors=(factor,))
+            for name, factor in zip(self.channels, self.factors, strict=True)
+        )
+
     def shows_in(self, motion: Motion) -> bool:
         """Return whether a log can tell it: what is hidden in noise has no unit of its own."""
         return self.code not in ("unit", "sideslip") or not motion.hidden >= {*self.channels}
