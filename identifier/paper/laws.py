@@ -96,12 +96,6 @@ LAWS: Mapping[str, Law] = {
 }
 
 
-def unbounded(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: the leakage alone bounds them."""
-    del radius
-    return weights
-
-
 def ball(weights: Any, radius: Any) -> Any:
     """Return the weights, projected on the ball |weights|_F <= radius.
     radius : Frobenius norm that is kept, positive.
@@ -110,7 +104,7 @@ def ball(weights: Any, radius: Any) -> Any:
 
 
 def whole(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: all of them leak, as in (11)-(12)."""
+    """Return the weights as they are: all of them leak, as in (11)-(12), and none is projected."""
     del radius
     return weights
 
@@ -170,8 +164,6 @@ def weight_rates(
 # ξ, ξ̂ [U s]: axle impulse, measured and estimated.   u = [δ_f, δ_r] [rad].   f̂ [U]: network
 # output.
 
-_InputSource = Callable[[Any, Any], Any]
-
 
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
@@ -188,22 +180,12 @@ def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
     return -forgetting * z + xi_tilde  # (10)
 
 
-def measured(xi: Any, xi_hat: Any) -> Any:
-    """Read the network's input from the measured state, which opens the loop through x̂."""
-    del xi_hat
-    return xi
-
-
-def estimated(xi: Any, xi_hat: Any) -> Any:
-    """Read the network's input from the estimated state, as (8) prints it.
-
-    It closes a loop: A_d must then be fast against the slope of the tire.
-    """
-    del xi
-    return xi_hat
-
-
-INPUT_SOURCES: Mapping[str, _InputSource] = {"measured": measured, "estimated": estimated}
+# Reading the estimate, as (8) prints it, closes a loop: A_d must then be fast against the slope of
+# the tire.
+INPUT_SOURCES: Mapping[str, Callable[[Any, Any], Any]] = {  # of ξ and ξ̂
+    "measured": lambda xi, _: xi,
+    "estimated": lambda _, xi_hat: xi_hat,
+}
 
 # One step of an ordinary differential equation, with its inputs held over the step.
 
@@ -216,12 +198,8 @@ def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
     return [s + h * r for s, r in zip(state, rate, strict=True)]
 
 
-def free(state: list[Any]) -> list[Any]:
-    return state
-
-
 def euler(
-    derivative: Derivative, state: list[Any], dt: Any, project: Projection = free
+    derivative: Derivative, state: list[Any], dt: Any, project: Projection = list
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
@@ -230,7 +208,7 @@ def euler(
     return _ahead(state, derivative(state), dt)
 
 
-def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection = free) -> list[Any]:
+def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection = list) -> list[Any]:
     """Return the state one classical fourth-order Runge-Kutta step later.
 
     The inner stages are projected: else a high gain leaves the bounds within the step, and the

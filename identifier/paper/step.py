@@ -21,7 +21,6 @@ from identifier.paper.laws import (
     beyond_ball,
     filter_rate,
     observer_rate,
-    unbounded,
     weight_rates,
     whole,
 )
@@ -96,7 +95,7 @@ def build_step(structure: Structure) -> ca.Function:
     xi = model.K_inv @ x / unit
     law, source = LAWS[structure.law], INPUT_SOURCES[structure.input_source]
     error = law.error(lead)
-    bounded = ball if structure.projects else unbounded
+    bounded = ball if structure.projects else whole
 
     def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
         x_read = unit * model.K @ source(xi, xi_hat)

@@ -200,27 +200,11 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
 # that random first weights are expected to have. Neither reads anything but the car and its
 # driving.
 
-
-def leakage(gains: Gains, known: Operation) -> Gains:
-    """Return the gains as they are: the paper's leakage alone.   gains : of `design_gains`."""
-    del known
-    return gains
-
-
-def dead_zone(gains: Gains, known: Operation) -> Gains:
-    """Return the gains with a leakage of what lies beyond the balls.
-    gains : of `design_gains`.
-    """
-    return replace(gains, W_free=known.W_large, V_free=known.V_start)
-
-
-def projection(gains: Gains, known: Operation) -> Gains:
-    return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)
-
-
 KEEPINGS: Mapping[str, Callable[[Gains, Operation], Gains]] = {
-    "leakage": leakage,
-    "dead_zone": dead_zone,
-    "projection": projection,
+    "leakage": lambda gains, _: gains,
+    "dead_zone": lambda gains, known: replace(gains, W_free=known.W_large, V_free=known.V_start),
+    "projection": lambda gains, known: replace(
+        gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start
+    ),
 }
 DEFAULT_KEEPING = "projection"  # of designs that are found; measured by benchmarks/forgetting.py

@@ -9,7 +9,6 @@ friction : μ [-].
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -18,7 +17,6 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
 from identifier.paper.laws import DrivingError, Gains
-from identifier.paper.network import Network, network_signals
 from identifier.stability.loop import INTEGRATORS, Integrator, Loop, spectral_radius, worst_gain
 from identifier.stability.sampled_bound import (
     Disturbance,
@@ -33,30 +31,6 @@ from identifier.stability.sampled_bound import (
 from models.bicycle import bicycle
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
-
-
-class Sampled(Protocol):
-    """What of a design its operation follows from: the network that it samples, and how."""
-
-    @property
-    def network(self) -> Network:
-        """Structure and scales of the network."""
-
-    @property
-    def input_source(self) -> str:
-        """Where the network reads the state: "measured" or "estimated"."""
-
-    @property
-    def integrator(self) -> str:
-        """Of the step: "euler", "rk4" or "exact"."""
-
-    @property
-    def dt(self) -> float:
-        """Sampling interval [s]."""
-
-    @property
-    def force_unit(self) -> float:
-        """Unit of the weights of the output [N]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -345,63 +319,6 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
         noise=float(np.linalg.norm(K_inv @ n_x)) / unit,
         rate=float(np.linalg.norm(push + turning)) / unit,
         known=(float(np.linalg.norm(C * driving.slip + turning)) + misread) / unit,
-    )
-
-
-def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
-    """Bound on |x_bar| [-], noise of the sensors in it."""
-    signals, slow = declared_signals(vehicle, driving), (1.0 - SPEED_SPREAD) * driving.v_x
-    sideways = driving.noise_v_y + vehicle.wheelbase * driving.noise_r
-    speed = driving.noise_v_x * (signals["v_y"] + vehicle.wheelbase * signals["r"]) / slow
-    slip = driving.noise_delta + (sideways + speed) / (slow - driving.noise_v_x)
-    noise = {
-        "v_y": driving.noise_v_y, "r": driving.noise_r, "delta_f": driving.noise_delta,
-        "delta_r": driving.noise_delta, "v_x": driving.noise_v_x, "alpha_f": slip, "alpha_r": slip,
-    }  # fmt: skip
-    assert design.network.scale is not None
-    named = zip(design.network.inputs, design.network.scale, strict=True)
-    return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
-
-
-def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
-    """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
-    driving : how hard it is driven; the slowest speed counts.
-    """
-    slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x
-    x = ca.SX.sym("x", 2)
-    signals = network_signals(vehicle.bicycle, slowest, x, ca.SX.zeros(2))
-    x_bar = design.network.normalized_input(signals)
-    K = bicycle(vehicle.bicycle, slowest).K
-    per_error = ca.jacobian(x_bar, x) @ ca.DM(K) * design.force_unit
-    return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
-
-
-def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
-    """Return what the certificate of a design needs.
-
-    The V layer is judged up to twice the smallest weights that hold the expected residual with
-    every unit saturated: units half open.
-    """
-    found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
-    expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
-    feedback = estimated_input_feedback(
-        m=vehicle.mass, I_z=vehicle.yaw_inertia, l_f=vehicle.l_f, l_r=vehicle.l_r,
-        stiffness_lost=(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear),
-        v_x=(1.0 - SPEED_SPREAD) * driving.v_x,
-    )  # fmt: skip
-    estimated = design.input_source == "estimated"
-    return Operation(
-        n_h=design.network.hidden,
-        dt=design.dt,
-        integrator=design.integrator,
-        bandwidth=driving.bandwidth,
-        disturbance=found,
-        needed_force=expected / design.force_unit,
-        x_bar_max=_largest_input(design, vehicle, driving),
-        V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
-        input_feedback=feedback if estimated else None,
-        input_per_error=input_per_error(design, vehicle, driving) if estimated else 0.0,
-        W_large=2.0 * expected / design.force_unit / math.sqrt(design.network.hidden),
     )
 
 

@@ -185,37 +185,30 @@ def _v_y_stuck(asked: Asked) -> Iterator[Objection]:
 
 
 def _no_force(asked: Asked) -> Iterator[Objection]:
-    forceless = asked.forceless
-    hidden = np.sqrt(asked.found.noise) > RULES.force
-    for axle, peak, none, noisy in zip(AXLES, asked.found.peak, forceless, hidden, strict=True):
+    forceless, noise = asked.forceless, np.sqrt(asked.found.noise)
+    for axle, peak, none, sd in zip(AXLES, asked.found.peak, forceless, noise, strict=True):
         if not none:
             continue
-        if noisy:
+        if sd > RULES.force:
             advice = "noise of v_y and yaw rate hides it: repair the sensors"
         elif asked.own:
             advice = "its numbers are default values; drive a slalom"
         else:
             advice = "this drive cannot judge the model"
-        yield Objection(
-            "no_force",
-            axle,
-            f"lateral force reaches {peak:.2g} of the static load, {RULES.force:g} are needed: "
-            f"{advice}",
-            asked.own or all(forceless),
-        )
+        need = f"{RULES.force:g} are needed"
+        text = f"lateral force reaches {peak:.2g} of the static load, {need}: {advice}"
+        yield Objection("no_force", axle, text, asked.own or all(forceless))
 
 
 def _missed(asked: Asked) -> Iterator[Objection]:
     limit = RULES.missed
     for axle, missed, none in zip(AXLES, asked.found.missed, asked.forceless, strict=True):
         if not (missed <= limit or none):
-            yield Objection(
-                "force_missed",
-                axle,
+            text = (
                 f"model error {PERCENT * missed:.0f} % of the force in the motion (limit "
-                f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause",
-                True,
+                f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause"
             )
+            yield Objection("force_missed", axle, text, True)
 
 
 def _left_out(asked: Asked) -> Iterator[Objection]:
@@ -241,13 +234,11 @@ def _unsure(asked: Asked) -> Iterator[Objection]:
         power = asked.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
         if not (mean <= RULES.doubt or asked.forceless[i]):
-            yield Objection(
-                "prior",
-                axle,
+            text = (
                 f"the drive reduced the uncertainty of the curve to {PERCENT * mean:.0f} % of the "
-                f"prior's (limit {PERCENT * RULES.doubt:.0f} %): drive longer",
-                True,
+                f"prior's (limit {PERCENT * RULES.doubt:.0f} %): drive longer"
             )
+            yield Objection("prior", axle, text, True)
 
 
 def _no_tire(asked: Asked) -> Iterator[Objection]:
@@ -256,13 +247,11 @@ def _no_tire(asked: Asked) -> Iterator[Objection]:
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
-            yield Objection(
-                "no_tire",
-                axle,
+            text = (
                 f"cornering stiffness {C / 1e3:.3g} kN/rad is {each:.2g} static loads per rad, "
-                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file",
-                True,
+                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file"
             )
+            yield Objection("no_tire", axle, text, True)
 
 
 def _beyond(asked: Asked) -> Iterator[Objection]:
@@ -271,13 +260,11 @@ def _beyond(asked: Asked) -> Iterator[Objection]:
         return
     for axle, share, slip in zip(AXLES, beyond, known, strict=True):
         if share > RULES.beyond:
-            yield Objection(
-                "beyond_known",
-                axle,
+            text = (
                 f"{PERCENT * share:.0f} % of the samples exceed the identified slip range "
-                f"({np.degrees(slip):.1f} deg); there the curve is extrapolated",
-                False,
+                f"({np.degrees(slip):.1f} deg); there the curve is extrapolated"
             )
+            yield Objection("beyond_known", axle, text, False)
 
 
 def _turning(asked: Asked) -> Iterator[Objection]:
@@ -288,18 +275,16 @@ def _turning(asked: Asked) -> Iterator[Objection]:
     felt = windows.mean(recording.a_y)
     motion = windows.rate(recording.v_y) + windows.mean(recording.v_x * recording.r)
     felt, motion = felt - felt.mean(), motion - motion.mean()
-    power = float(np.mean(motion**2)) - lateral_noise(recording, windows)[0]
+    power = float(np.mean(motion**2)) - lateral_noise(recording, windows)
     if not power > (RULES.force * GRAVITY) ** 2:
         return
     slope, (least, most) = float(np.mean(felt * motion)) / power, RULES.rolling
     if not least <= slope <= most:
-        yield Objection(
-            "a_y_disagrees",
-            None,
+        text = (
             f"the recorded a_y is {slope:.2g} times what v_x, r and the estimated v_y give "
-            f"({least:g} to {most:g} are usual): check the scales of v_x, r and a_y, and delays",
-            True,
+            f"({least:g} to {most:g} are usual): check the scales of v_x, r and a_y, and delays"
         )
+        yield Objection("a_y_disagrees", None, text, True)
 
 
 def _unobserved(asked: Asked) -> Iterator[Objection]:
@@ -313,13 +298,11 @@ def _unobserved(asked: Asked) -> Iterator[Objection]:
     at = asked.found.windows.starts
     sd = float(np.median(found.sd[at] / recording.v_x[at]))
     if not sd <= RULES.side_slip:
-        yield Objection(
-            "side_slip_unknown",
-            None,
+        text = (
             f"side slip is estimated to ± {np.degrees(sd):.2g} deg (limit "
-            f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom",
-            True,
+            f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom"
         )
+        yield Objection("side_slip_unknown", None, text, True)
 
 
 def _at_bound(one: Reached) -> Objection:
@@ -349,9 +332,9 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
     )
     lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
-        "force_missed": _pair(found.missed),
-        "rms_force_static_loads": _pair(found.force),
-        "peak_force_static_loads": _pair(found.peak),
+        "force_missed": tuple(map(float, found.missed)),
+        "rms_force_static_loads": tuple(map(float, found.force)),
+        "peak_force_static_loads": tuple(map(float, found.peak)),
         "explained_lateral": lateral,
         "explained_yaw": yaw,
     }
@@ -364,7 +347,6 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
         )
         for one in model.estimates()
     )
-    blind = WITHOUT_V_Y if recording.logged_v_y is None else ()
     clock, starts, n = whole.t[asked.portion.samples], found.windows.starts, found.windows.n
     middle = 0.5 * (clock[starts] + clock[starts + n])
     return Verdict(
@@ -372,7 +354,7 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
         numbers=numbers,
         measures=measures,
         reach=_reach(model, recording),
-        blind=blind,
+        blind=WITHOUT_V_Y if recording.logged_v_y is None else (),
         shown=WindowForces(middle, found.measured, found.modelled),
     )
 
@@ -390,17 +372,8 @@ def _reach(model: TireModel, recording: Recording) -> str:
     return f"{speeds[0]:.3g} to {speeds[1]:.3g} m/s, {slip}"
 
 
-def _pair(values: Array | None) -> tuple[float, ...] | None:
-    return None if values is None else tuple(float(value) for value in values)
-
-
 def _too_short(model: TireModel) -> Verdict:
-    finding = Objection(
-        "too_short",
-        None,
-        f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly: there is nothing to "
-        "judge by",
-        True,
-    )
+    few = f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly"
+    finding = Objection("too_short", None, f"{few}: there is nothing to judge by", True)
     numbers = tuple(Number(*one, valid=False) for one in model.estimates())
     return Verdict(findings=(finding,), numbers=numbers, measures={})

@@ -14,10 +14,8 @@ from identifier.stability.operation import (
     declared_signals,
     disturbance,
     expected_residual,
-    input_per_error,
     largest_signals,
     minimal_decay,
-    operation,
     residual_bound,
 )
 
@@ -116,7 +114,7 @@ def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_
 def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
     for law in ("integral", "instantaneous_scaled"):
         design = PaperIdentifier.for_vehicle(car, law=law)
-        task = operation(design, car, DRIVING)
+        task = design.operation(car, DRIVING)
         certificate = certify(design.gains, LAWS[design.law], task)
         assert certificate["gain_sampled"].margin > 1.0
         a = -design.gains.A_d[0][0]
@@ -126,7 +124,7 @@ def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
 
 def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):
     design = replace(PaperIdentifier.for_vehicle(car), input_source="estimated")
-    task = operation(design, car, DRIVING)
+    task = design.operation(car, DRIVING)
     assert task.input_feedback is not None
     assert 5.0 < minimal_decay(task.input_feedback) < 12.0
 
@@ -153,4 +151,4 @@ def test_an_error_of_the_estimate_adds_most_to_the_input_at_the_slowest_speed_th
     shown = 0.95 * 20.0 - 4.0
     angles = np.array([[1.0, car.l_f], [1.0, -car.l_r]]) / shown
     expected = np.linalg.norm(angles / [[0.1], [0.2]] @ K * design.force_unit, 2)
-    assert input_per_error(design, car, noisy) == pytest.approx(expected, rel=1e-9)
+    assert design.operation(car, noisy).input_per_error == pytest.approx(expected, rel=1e-9)

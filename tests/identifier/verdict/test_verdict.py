@@ -16,7 +16,7 @@ from identifier.motion.parameters import INDEX
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge, judge_prediction
-from identifier.verdict.motion import Windows, clean_share, measured_force, noise_variance
+from identifier.verdict.motion import Windows, clean_rms, measured_force, noise_variance
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors, white_noise
@@ -87,7 +87,8 @@ def test_what_is_measured_is_the_true_force(whole):
     windows = Windows.of(whole, 3.0)
     measured = measured_force(whole, car, windows)
     true = windows.mean(whole.axle_force / np.array(car.axle_loads))
-    assert clean_share(measured - true, true, np.zeros(2)).max() < 0.03
+    share = clean_rms(measured - true, np.zeros(2)) / clean_rms(true, np.zeros(2))
+    assert share.max() < 0.03
 
 
 def test_noise_is_told_from_motion(whole, drive):
