@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
@@ -186,24 +185,16 @@ def run_in_virtual_machine(
     samples : (n, k) in the order of the inputs.
     """
     limits, method = specialized.limits, specialized.method
-    function, n = specialized.function, len(specialized.carry)
-    in_place = _InPlace(function)
-    arguments, results = in_place.arguments, in_place.results
-    for array, value in zip(arguments, specialized.carry.values(), strict=False):
-        array[:] = np.ravel(value, order="F")
-    x, delta, *scalars = arguments[n:]
+    state = [np.asarray(value) for value in specialized.carry.values()]
     now, missed, started = np.zeros(sum(port.size for port in specialized.outputs)), 0, False
     table = []
 
     def step(sample: Array) -> Array:
         v_x, v_y, r, delta_f, delta_r, *a_y = sample
-        x[:], delta[:] = (limits.possible(v_y), r), (delta_f, delta_r)
-        for array, value in zip(scalars, (v_x, *a_y), strict=True):
-            array[:] = value
-        in_place.compute()
-        for carried, following in zip(arguments, results[:n], strict=False):
-            carried[:] = following
-        return np.concatenate(results[n:])
+        x, delta = (limits.possible(v_y), r), (delta_f, delta_r)
+        results = [np.array(one) for one in specialized.function(*state, x, delta, v_x, *a_y)]
+        state[:], outputs = results[: len(state)], results[len(state) :]
+        return np.concatenate([one.ravel(order="F") for one in outputs])
 
     absent = np.array([port == ACCELERATION for port in specialized.inputs])
     nowhere = np.where(absent, np.nan, 0.0)
@@ -223,23 +214,7 @@ def run_in_virtual_machine(
             if missed >= stale_samples(STALE_TIME, specialized.dt):
                 now = np.zeros_like(now)
         table.append(now)
-    last = [array.reshape(function.size_in(i), order="F") for i, array in enumerate(arguments[:n])]
-    return np.array(table), dict(zip(specialized.carry, last, strict=True))
-
-
-class _InPlace:
-    """A dense function whose `results` are computed of its `arguments`, flat arrays by columns."""
-
-    def __init__(self, function: ca.Function) -> None:
-        buffers: Any  # typed as in C, where memory does not know its size
-        buffers, self.compute = function.buffer()
-        self.arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
-        self.results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        for i, array in enumerate(self.arguments):
-            buffers.set_arg(i, array.data)
-        for i, array in enumerate(self.results):
-            buffers.set_res(i, array.data)
-        self._buffers = buffers  # which nothing else keeps
+    return np.array(table), dict(zip(specialized.carry, state, strict=True))
 
 
 def vectors(specialized: SpecializedStep) -> Vectors:

@@ -22,7 +22,6 @@ from identifier.plan.search import (
     PlanError,
     Search,
     Space,
-    after_pass,
     body_of,
     edge_distance,
     swing_time,
@@ -195,7 +194,7 @@ def make_plan(
                 progress((before + done) / count)
 
         passes.append(search.best(rng, share))
-        known = after_pass(known, passes[-1])
+        known = known.after(passes[-1].covariance)
     rivals = _rivals(tires, space, time, passes[-1].error)
     return Plan(tires=tires, space=space, passes=tuple(passes), rivals=rivals)
 

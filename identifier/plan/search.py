@@ -13,7 +13,7 @@ axles.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +31,7 @@ from models.vehicle import GRAVITY
 _POPULATION, GENERATIONS = 32, 100
 _STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
 SWING = 0.75  # sqrt(L/g): least mean duration of a change from angle to angle, 0.4 s in a sedan
-_CHIRP = math.log(
-    3.0
-)  # largest ratio of the last to the mean duration, and of the mean to the first
+_CHIRP = math.log(3.0)  # largest, of the last to the mean duration, and of the mean to the first
 CALM = 0.5  # share of the grip that the rear axle may still need at the end of a pass
 REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
 OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
@@ -201,14 +199,11 @@ class Search:
         angles = np.zeros((len(numbers), N + 1))
         angles[:, 1:N] = u * self.largest_angle
         reach = 2.0 / math.pi * space.rate_limit * spans * (1.0 - 1e-9)
-        for k in range(1, N):
-            angles[:, k] = np.clip(
-                angles[:, k], angles[:, k - 1] - reach[:, k - 1], angles[:, k - 1] + reach[:, k - 1]
-            )
-        for k in range(N - 1, 0, -1):
-            angles[:, k] = np.clip(
-                angles[:, k], angles[:, k + 1] - reach[:, k], angles[:, k + 1] + reach[:, k]
-            )
+        forward = ((k, k - 1, k - 1) for k in range(1, N))
+        back = ((k, k + 1, k) for k in range(N - 1, 0, -1))
+        for k, beside, span in (*forward, *back):
+            low, high = angles[:, beside] - reach[:, span], angles[:, beside] + reach[:, span]
+            angles[:, k] = np.clip(angles[:, k], low, high)
         again = [(-1.0) ** k * angles[:, 1:] for k in range(self.repeats)]
         angles = np.column_stack([angles[:, :1], *again])
         spans = np.tile(spans, self.repeats)
@@ -325,7 +320,3 @@ class Search:
             duration=self.duration,
         )
         return Pass(steering, steerings.entry, motion, P[0, 0], float(error.mean()), t)
-
-
-def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:
-    return replace(tires, covariance=one.covariance)
