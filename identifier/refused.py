@@ -86,7 +86,7 @@ def stale_samples(stale_time: float, dt: float) -> int:
     return max(1, int(stale_time / dt + 0.5))
 
 
-class Rests(NamedTuple):
+class _Rests(NamedTuple):
     """Samples with rests between segments, N of them.
     rows : of the recording that each is, at rests the one that follows, (N,).
     resting : whether it is a rest (N,).   at : which of them each sample is (n,).
@@ -97,7 +97,7 @@ class Rests(NamedTuple):
     at: NDArray[np.intp]
 
 
-def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
+def with_rests(n: int, breaks: Sequence[int], rest: int) -> _Rests:
     """Return n samples with rests before each segment but the first.
     breaks : samples with which segments begin, rising.
     """
@@ -105,4 +105,4 @@ def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
     samples = np.arange(n)
     resting = np.insert(np.zeros(n, dtype=np.bool_), begins, np.ones(begins.size, dtype=np.bool_))
     at = np.flatnonzero(~resting)
-    return Rests(np.insert(samples, begins, begins), resting, at)
+    return _Rests(np.insert(samples, begins, begins), resting, at)

@@ -225,10 +225,10 @@ def shares(trial: Trial, course: Course) -> Shares:
     online = float(np.mean([course.share(name, trial.online[name]) for name in names]))
     if trial.frozen is None:
         return Shares(online, None, None)
-    return Shares(online, *frozen_shares(trial.frozen, course))
+    return Shares(online, *_frozen_shares(trial.frozen, course))
 
 
-def frozen_shares(
+def _frozen_shares(
     frozen: Mapping[str, Mapping[str, AxleRmse]], course: Course
 ) -> tuple[float | None, float | None]:
     """Return the mean errors of frozen models where they learnt and elsewhere [%].

@@ -35,7 +35,7 @@ BESIDE = {"ln_inertia": 0.1}  # believed of any car: a declared one is an estima
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
+class _Rules:
     """Limits of the search, chosen on random cars of the plant."""
 
     interval: float = 0.02  # [s] between samples, of a sedan
@@ -64,7 +64,7 @@ class Rules:
     untold: float = 0.6  # of `wide`, what is left by a drive that does not tell a size
 
 
-RULES = Rules()
+RULES = _Rules()
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
 _SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (

@@ -36,7 +36,7 @@ COARSE = 0.05  # quantum over the rms of a channel
 CERTAIN = 0.99
 
 
-class Runs(NamedTuple):
+class _Runs(NamedTuple):
     """Segments of equal neighbors of a channel: index of the first sample, and length, (k,)."""
 
     first: NDArray[np.intp]
@@ -197,7 +197,7 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
         yield replace(_found("jitter", name, size, "s", 0.9, text), deviation=size / z)
 
 
-def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
+def _repeats(name: str, runs: _Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
     """A channel that holds one number: for long, or again and again, as noise never does."""
     signal, dt = getattr(recording, name), recording.dt
     zero = _zero(name, runs, recording) if name in _ESTIMATED else None
@@ -229,7 +229,7 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
         yield _found("frozen", name, length * dt, "s", 0.95, _stopped(name, first, length * dt))
 
 
-def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
+def _zero(name: str, runs: _Runs, recording: Recording) -> Finding | None:
     """A channel that is exactly 0 for long, again and again, while the car turns.
 
     No sensor does that: an estimate does, which is switched off there.
@@ -258,7 +258,7 @@ def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
     return _found("zero", name, size, "s", 0.95, text)
 
 
-def _grain(signal: Array, runs: Runs) -> float | None:
+def _grain(signal: Array, runs: _Runs) -> float | None:
     """Return the step of which all values are multiples that a channel keeps for a while.
 
     None where there is none. Between them a channel that was brought to another clock has any
@@ -274,7 +274,7 @@ def _grain(signal: Array, runs: Runs) -> float | None:
     return step if float(np.mean(np.abs(count - np.round(count)) < 0.05)) > ON_GRID else None
 
 
-def _lost_on_the_way(signal: Array, runs: Runs, grain: float | None) -> NDArray[np.bool_]:
+def _lost_on_the_way(signal: Array, runs: _Runs, grain: float | None) -> NDArray[np.bool_]:
     """Return which runs of equal values may be lost samples: a rest of a rounded channel is none.
 
     A rest ends by one step of the rounding, or as the channel begins to move: by a step that others
@@ -352,9 +352,9 @@ def _noise(signal: Array) -> float:
     return float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0)) if together < _ALTERNATE else 0.0
 
 
-def _runs(signal: Array) -> Runs:
+def _runs(signal: Array) -> _Runs:
     starts = np.flatnonzero(np.concatenate([[True], np.diff(signal) != 0.0]))
-    return Runs(starts, np.diff(np.append(starts, signal.size)))
+    return _Runs(starts, np.diff(np.append(starts, signal.size)))
 
 
 def _quantum(signal: Array) -> float | None:
@@ -375,7 +375,7 @@ def _quantum(signal: Array) -> float | None:
     return step if few and bool(np.mean(on_grid) > 0.99) else None
 
 
-def _stairs(runs: Runs, n: int, quantum: float | None) -> int | None:
+def _stairs(runs: _Runs, n: int, quantum: float | None) -> int | None:
     """Return how many samples each value of a slow channel lasts, None where it is not slow."""
     inner = runs.length[1:-1]
     if inner.size < 10:

@@ -55,7 +55,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     clock = clock_findings(recording)
     if clock:
         return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
-    samples, given = sample_findings(recording), unlike(vehicle)
+    samples, given = sample_findings(recording), _unlike(vehicle)
     driven = sum(one.duration for one in driven_pieces(recording))
     lasts = {"copied": -math.inf, "frozen": _PERFECT * driven, "zero": _OFTEN * driven}
     missing = [one.channel for one in samples if one.size >= lasts.get(one.code, math.inf)]
@@ -177,7 +177,7 @@ def clock_findings(recording: Recording) -> tuple[Finding, ...]:
     )
 
 
-def unlike(vehicle: Vehicle) -> list[Finding]:
+def _unlike(vehicle: Vehicle) -> list[Finding]:
     """Return a yaw inertia that no car of that mass and those lengths has."""
     similar, (least, most) = similar_inertia(vehicle), usual_inertia(vehicle)
     ratio, origin = vehicle.yaw_inertia / similar, vehicle.origin("yaw_inertia")

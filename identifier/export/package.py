@@ -145,7 +145,7 @@ SAMPLES = 240
 REST = 10  # samples at rest, and some as long in between
 
 
-class Vectors(NamedTuple):
+class _Vectors(NamedTuple):
     """Samples (n, k) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
 
     samples: Array
@@ -217,14 +217,14 @@ def run_in_virtual_machine(
     return np.array(table), dict(zip(specialized.carry, state, strict=True))
 
 
-def vectors(specialized: SpecializedStep) -> Vectors:
+def vectors(specialized: SpecializedStep) -> _Vectors:
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
-    return Vectors(samples, outputs[:, :2])
+    return _Vectors(samples, outputs[:, :2])
 
 
-def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
-    double, single = tolerances(specialized)
+def vectors_header(specialized: SpecializedStep, found: _Vectors) -> str:
+    double, single = _tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     names = ", ".join(port.name for port in specialized.inputs)
     size = len(specialized.inputs)
@@ -287,7 +287,7 @@ def _programs(specialized: SpecializedStep) -> dict[str, str]:
     }
 
 
-def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
+def _tolerances(specialized: SpecializedStep) -> tuple[str, str]:
     """Return the largest difference of a force that the self-test allows [N], double and float."""
     force = specialized.limits.force
     return f"{TOLERANCE_DOUBLE * force:.2g}", f"{TOLERANCE_SINGLE * force:.2g}"
@@ -300,7 +300,7 @@ def readme(package: Package, about_figures: str) -> str:
         f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n" for m in state
     )
     modes = _modes(specialized)
-    double, single = tolerances(specialized)
+    double, single = _tolerances(specialized)
     equations = package.files[f"src/{specialized.name}_equations.c"]
     called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(

@@ -75,7 +75,7 @@ class Space:
         require_within(PlanError, math.radians(1.0), math.radians(60.0), max_angle=self.max_angle)
 
 
-class Body(NamedTuple):
+class _Body(NamedTuple):
     """How far a car reaches from its center of gravity [m]: ahead, behind, to each side."""
 
     ahead: float
@@ -83,17 +83,17 @@ class Body(NamedTuple):
     side: float
 
 
-def body_of(tires: PlausibleTires) -> Body:
+def body_of(tires: PlausibleTires) -> _Body:
     car = tires.vehicle
     over = OVERHANG * car.wheelbase
     side = _HALF_WIDTH * car.wheelbase
     if car.chassis is not None:
         track = max(car.chassis.track_front, car.chassis.track_rear)
         side = 0.5 * _WIDER * track
-    return Body(car.l_f + over, car.l_r + over, side)
+    return _Body(car.l_f + over, car.l_r + over, side)
 
 
-def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> Array:
+def edge_distance(space: Space, body: _Body, X: Array, Y: Array, psi: Array) -> Array:
     """Return the least distance of a body on its way to the edge of the area [m], (...).
     X, Y, psi : center of gravity [m] and heading [rad] over time, (n, ...).
     """
@@ -117,7 +117,7 @@ def swing_time(tires: PlausibleTires, space: Space) -> float:
     return max(SWING * tires.vehicle.froude_time, across)
 
 
-class Steerings(NamedTuple):
+class _Steerings(NamedTuple):
     """m steerings: times (m, N + 1) [s], angles (m, N + 1) [rad], and entries."""
 
     times: Array
@@ -188,7 +188,7 @@ class Search:
         bend = car.wheelbase * grip * GRAVITY / self.space.speed**2
         return min(self.space.max_angle, bend + 1.5 * float(self.tires.slip_at(REAR)[0, 0]))
 
-    def steerings(self, numbers: Array) -> Steerings:
+    def steerings(self, numbers: Array) -> _Steerings:
         """Return the steerings that numbers between -1 and 1 stand for; rates are kept.
         numbers : N - 1 angles, ratio of durations, place and heading of the entry, (m, N + 2).
         """
@@ -212,7 +212,7 @@ class Search:
         psi = _LARGEST_HEADING * heading
         free = 0.5 * space.width - space.margin - body.side
         X = space.margin + body.behind * np.cos(psi) + body.side * np.abs(np.sin(psi))
-        return Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
+        return _Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
 
     def costs(self, numbers: Array) -> Array:
         """Return the expected error of steerings, more than 1 where they are not possible, (m,)."""
@@ -227,7 +227,7 @@ class Search:
             cost[possible] = expected_error(self.tires, doubt, P).mean(axis=1)
         return cost
 
-    def motion(self, steerings: Steerings) -> Motion:
+    def motion(self, steerings: _Steerings) -> Motion:
         """Return what all tires do under steerings."""
         t = steps_of(self.tires, self.duration)
         space, hold = self.space, hold_of(self.tires, self.space.speed)

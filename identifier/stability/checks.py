@@ -83,7 +83,7 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
         Property.judged(
             "damping",
             "damping ratio of the learning loop",
-            worst_damping(loop),
+            _worst_damping(loop),
             "-",
             limit=_ENOUGH_DAMPING,
             bad=1e-9,
@@ -146,7 +146,7 @@ def drift_check(
     return Property.judged("drift", title, operation.bandwidth, "Hz", limit=limit, advice=advice)
 
 
-def worst_damping(loop: Loop) -> float:
+def _worst_damping(loop: Loop) -> float:
     """Smallest -Re/|.| of the oscillating eigenvalues of the loop, 1 if none oscillates.
 
     sqrt(a³/g)/2 for the instantaneous law with A_d = -a I; negative where the loop is unstable.

@@ -52,7 +52,7 @@ class GainDesign:
     V_max: float
 
 
-def gain_for_phase_margin(
+def _gain_for_phase_margin(
     *, a: float, lam: float, law: DrivingError, phase_margin: float, dt: float | None = None
 ) -> float:
     """Loop gain g that gives the scalar loop (A_d = -a I, no leakage) its phase margin, exactly.
@@ -131,7 +131,7 @@ def design_gains(
             f"{FASTEST / (_LAG_RULE * 2.0 * math.pi * dt):.3g} Hz"
         )
     lam, A_d = a, diagonal(a)
-    g = gain_for_phase_margin(
+    g = _gain_for_phase_margin(
         a=a, lam=lam, law=law, phase_margin=phase_margin, dt=dt if integrator == "euler" else None
     )
     eta_W = g / n_h

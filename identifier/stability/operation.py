@@ -239,7 +239,7 @@ def minimal_decay(feedback: ArrayLike) -> float:
 # rate times T_s/2 from that.
 
 
-def largest_signals(
+def _largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI."""
@@ -257,7 +257,7 @@ def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
     """Bound of every signal over the whole range of speeds, SI."""
     at = {"slip": driving.slip, "friction": driving.friction}
     speeds = [(1.0 + share) * driving.v_x for share in (-SPEED_SPREAD, SPEED_SPREAD)]
-    slow, fast = (largest_signals(vehicle, v_x=v_x, **at) for v_x in speeds)
+    slow, fast = (_largest_signals(vehicle, v_x=v_x, **at) for v_x in speeds)
     return {name: max(slow[name], fast[name]) for name in slow}
 
 
@@ -267,7 +267,7 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
     return omega * signals["delta_f"], omega * signals["delta_r"]
 
 
-def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
+def _residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
     vehicle : the car; its stiffness is at least half that of the tires.
     """
@@ -315,7 +315,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
 
     turning = K_inv[:, 0] * fast * r
     return Disturbance(
-        residual=(residual_bound(vehicle, slip=driving.slip) + held + misread) / unit,
+        residual=(_residual_bound(vehicle, slip=driving.slip) + held + misread) / unit,
         noise=float(np.linalg.norm(K_inv @ n_x)) / unit,
         rate=float(np.linalg.norm(push + turning)) / unit,
         known=(float(np.linalg.norm(C * driving.slip + turning)) + misread) / unit,

@@ -27,7 +27,7 @@ from identifier.stability.operation import Operation
 from models.rules import require_positive
 
 
-def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
+def _printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h (|P| + (η/ρ) |A_d⁻¹|)]/2, the one that gives (14) as printed [U].
     W_M : bound on the ideal weights (Frobenius) [U].   n_h : hidden units; |s| <= √n_h.
     eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
@@ -38,18 +38,18 @@ def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
 
-def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
+def _tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h |P + (η/ρ) A_d⁻¹|]/2: the two couplings cancel before the norm is taken.
 
-    W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `canceling_pair`. Arguments are
-    those of `printed_k_b`.
+    W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `_canceling_pair`. Arguments are
+    those of `_printed_k_b`.
     """
     require_positive(ValueError, rho_W=rho_W)
     coupling = float(np.linalg.norm(pair.P + eta_W / rho_W * np.linalg.inv(pair.A_d), 2))
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
 
-def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
+def _canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
     A_d : (2, 2) Hurwitz error dynamics [1/s].   eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
@@ -64,10 +64,10 @@ def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPai
     return LyapunovPair(A_d=matrix, P=P, Q=Q, residual=lyapunov_residual(matrix, P, Q))
 
 
-def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
+def _bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     """B = 2 (|P| w_bar + k_b²)/λ_min(Q) of (14) [U s]: where L' < 0, not yet an ultimate bound.
     w_bar : bound on the approximation error [U].
-    k_b : of `printed_k_b` or `tight_k_b` [U].
+    k_b : of `_printed_k_b` or `_tight_k_b` [U].
     """
     return float(2.0 * (np.linalg.norm(pair.P, 2) * w_bar + k_b**2) / np.linalg.eigvalsh(pair.Q)[0])
 
@@ -87,12 +87,12 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     b_UUB² = max over 0 <= y <= w_b of [λ_max(P) x(y)² + y²/ρ_W]/λ_min(P), with
     x(y) = max(0, b - (2/λ_min(Q)) (y - k_b)²) and w_b = k_b + sqrt(k_b² + |P| w_bar). The objective
     is a quartic where x > 0: its stationary points are roots of a cubic, none is missed.
-    w_bar : bound on the approximation error [U].   k_b : of `printed_k_b` or `tight_k_b` [U].
+    w_bar : bound on the approximation error [U].   k_b : of `_printed_k_b` or `_tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, rho_W=rho_W)
     p = np.linalg.eigvalsh(pair.P)
-    b, curve = bound_14(pair, w_bar=w_bar, k_b=k_b), 2.0 / np.linalg.eigvalsh(pair.Q)[0]
+    b, curve = _bound_14(pair, w_bar=w_bar, k_b=k_b), 2.0 / np.linalg.eigvalsh(pair.Q)[0]
     w_b = k_b + math.sqrt(k_b**2 + p[1] * w_bar)
     x = np.polynomial.Polynomial([b - curve * k_b**2, 2.0 * curve * k_b, -curve])
     level = p[1] * x * x + np.polynomial.Polynomial([0.0, 0.0, 1.0 / rho_W])
@@ -122,10 +122,10 @@ def printed_bounds(
     pair, tight_pair = _best_pair(gains), _tight_pair(gains)
     w_bar, rho_W = operation.disturbance.residual, gains.rho_W
     ideal = {"W_M": 0.0, "n_h": operation.n_h, "eta_W": gains.eta_W, "rho_W": rho_W}
-    k_b, tight = printed_k_b(pair, **ideal), tight_k_b(tight_pair, **ideal)
+    k_b, tight = _printed_k_b(pair, **ideal), _tight_k_b(tight_pair, **ideal)
     entries = {
-        "printed_bound": ("bound (14), printed route", bound_14(pair, w_bar=w_bar, k_b=k_b)),
-        "tight_bound": ("bound (14), tight route", bound_14(tight_pair, w_bar=w_bar, k_b=tight)),
+        "printed_bound": ("bound (14), printed route", _bound_14(pair, w_bar=w_bar, k_b=k_b)),
+        "tight_bound": ("bound (14), tight route", _bound_14(tight_pair, w_bar=w_bar, k_b=tight)),
         "ultimate_bound": (
             "true ultimate bound behind (14)",
             ultimate_bound(pair, w_bar=w_bar, k_b=k_b, rho_W=rho_W),
@@ -149,7 +149,7 @@ def _best_pair(gains: Gains) -> LyapunovPair:
 
 def _tight_pair(gains: Gains) -> LyapunovPair:
     try:
-        return canceling_pair(gains.matrix, eta_W=gains.eta_W, rho_W=gains.rho_W)
+        return _canceling_pair(gains.matrix, eta_W=gains.eta_W, rho_W=gains.rho_W)
     except LyapunovError:
         return _best_pair(gains)
 

@@ -42,7 +42,7 @@ ROADS = 3  # segments of another friction that are listed one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
+class _Rules:
     """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
     missed : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
@@ -62,10 +62,10 @@ class Rules:
     rolling: tuple[float, float] = (0.85, 1.25)
 
 
-RULES = Rules()
+RULES = _Rules()
 
 
-class Asked(NamedTuple):
+class _Asked(NamedTuple):
     """A model and a drive.
 
     portion : what of the drive is asked.   found : what the model explains of it.   own : whether
@@ -134,7 +134,7 @@ def judge_prediction(
 
 def _asked(
     model: TireModel, recording: Recording, *, own: bool, frozen: int | None = None
-) -> Asked | None:
+) -> _Asked | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model))
@@ -148,7 +148,7 @@ def _asked(
     if some is not None:
         t, starts = recording.t[part.samples], found.windows.starts
         left_out = float(t[starts[some[0]]]), float(t[starts[some[1] - 1] + found.windows.n])
-    return Asked(model, part, judged, own, left_out)
+    return _Asked(model, part, judged, own, left_out)
 
 
 def _road(recording: Recording, model: TireModel) -> Array | None:
@@ -165,7 +165,7 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
     return bank
 
 
-def _findings(asked: Asked) -> list[Objection]:
+def _findings(asked: _Asked) -> list[Objection]:
     rules = (
         _v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning,
         _unobserved,
@@ -173,7 +173,7 @@ def _findings(asked: Asked) -> list[Objection]:
     return [finding for rule in rules for finding in rule(asked)]
 
 
-def _v_y_stuck(asked: Asked) -> Iterator[Objection]:
+def _v_y_stuck(asked: _Asked) -> Iterator[Objection]:
     recording, brisk = asked.recording, asked.found.windows.starts
     v_y = recording.logged_v_y
     if v_y is None:
@@ -184,7 +184,7 @@ def _v_y_stuck(asked: Asked) -> Iterator[Objection]:
         yield Objection("v_y_stuck", None, text, True)
 
 
-def _no_force(asked: Asked) -> Iterator[Objection]:
+def _no_force(asked: _Asked) -> Iterator[Objection]:
     forceless, noise = asked.forceless, np.sqrt(asked.found.noise)
     for axle, peak, none, sd in zip(AXLES, asked.found.peak, forceless, noise, strict=True):
         if not none:
@@ -200,7 +200,7 @@ def _no_force(asked: Asked) -> Iterator[Objection]:
         yield Objection("no_force", axle, text, asked.own or all(forceless))
 
 
-def _missed(asked: Asked) -> Iterator[Objection]:
+def _missed(asked: _Asked) -> Iterator[Objection]:
     limit = RULES.missed
     for axle, missed, none in zip(AXLES, asked.found.missed, asked.forceless, strict=True):
         if not (missed <= limit or none):
@@ -211,7 +211,7 @@ def _missed(asked: Asked) -> Iterator[Objection]:
             yield Objection("force_missed", axle, text, True)
 
 
-def _left_out(asked: Asked) -> Iterator[Objection]:
+def _left_out(asked: _Asked) -> Iterator[Objection]:
     if asked.left_out is not None:
         begin, end = asked.left_out
         text = (
@@ -222,7 +222,7 @@ def _left_out(asked: Asked) -> Iterator[Objection]:
         yield Objection("segment", None, text, False)
 
 
-def _unsure(asked: Asked) -> Iterator[Objection]:
+def _unsure(asked: _Asked) -> Iterator[Objection]:
     if not asked.own:
         return
     car, windows = asked.model.vehicle, asked.found.windows
@@ -241,7 +241,7 @@ def _unsure(asked: Asked) -> Iterator[Objection]:
             yield Objection("prior", axle, text, True)
 
 
-def _no_tire(asked: Asked) -> Iterator[Objection]:
+def _no_tire(asked: _Asked) -> Iterator[Objection]:
     loads = np.array(asked.model.vehicle.axle_loads)
     stiffness = asked.model.force_at(np.array([_SECANT]))[0] / _SECANT
     least, most = RULES.stiffness
@@ -254,7 +254,7 @@ def _no_tire(asked: Asked) -> Iterator[Objection]:
             yield Objection("no_tire", axle, text, True)
 
 
-def _beyond(asked: Asked) -> Iterator[Objection]:
+def _beyond(asked: _Asked) -> Iterator[Objection]:
     beyond, known = beyond_known(asked.model, asked.recording), asked.model.known_slip
     if beyond is None or known is None or asked.own:
         return
@@ -267,7 +267,7 @@ def _beyond(asked: Asked) -> Iterator[Objection]:
             yield Objection("beyond_known", axle, text, False)
 
 
-def _turning(asked: Asked) -> Iterator[Objection]:
+def _turning(asked: _Asked) -> Iterator[Objection]:
     """Judge an estimated v_y by the accelerometer; means tell of bank and offset, and are left."""
     recording, windows = asked.recording, asked.found.windows
     if recording.logged_v_y is not None or recording.v_y is None or recording.a_y is None:
@@ -287,7 +287,7 @@ def _turning(asked: Asked) -> Iterator[Objection]:
         yield Objection("a_y_disagrees", None, text, True)
 
 
-def _unobserved(asked: Asked) -> Iterator[Objection]:
+def _unobserved(asked: _Asked) -> Iterator[Objection]:
     """Refuse where the side slip that the model is judged at is hardly known."""
     recording = asked.recording
     if recording.logged_v_y is not None or recording.a_y is None:
@@ -320,7 +320,7 @@ def _roads(found: RoadFriction | None) -> list[Objection]:
     return listed
 
 
-def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict:
+def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdict:
     model, recording, found = asked.model, asked.recording, asked.found
     if len(recording) < len(whole):
         minutes = len(recording) * whole.dt / 60.0, whole.duration / 60.0

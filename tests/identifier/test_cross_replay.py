@@ -9,8 +9,8 @@ from identifier.baselines import LinearBaseline
 from identifier.compare.course import (
     INFINITE,
     Course,
+    _frozen_shares,
     cross_replay,
-    frozen_shares,
     same_and_other,
 )
 from identifier.reproducibility import AxleRmse
@@ -38,7 +38,7 @@ def test_shares_are_means_over_the_right_drives(course):
     sizes = {recording.name: course.size(recording) for recording in course.recordings}
     none = AxleRmse(front=0.0, rear=0.0)
     frozen = {"a": {"a": none, "b": sizes["b"]}, "b": {"a": sizes["a"], "b": none}}
-    own, other = frozen_shares(frozen, course)
+    own, other = _frozen_shares(frozen, course)
     assert own == pytest.approx(0.0)
     assert other == pytest.approx(100.0)
 

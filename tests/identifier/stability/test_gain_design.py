@@ -3,7 +3,7 @@ import pytest
 
 from identifier.paper.laws import DrivingError
 from identifier.stability.bounds import steady_capacity
-from identifier.stability.gain_design import DesignError, design_gains, gain_for_phase_margin
+from identifier.stability.gain_design import DesignError, _gain_for_phase_margin, design_gains
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact
 from identifier.stability.margins import phase_margin
 from identifier.stability.operation import Operation, worst_loop
@@ -27,14 +27,14 @@ def operation(**changes):
 @pytest.mark.parametrize("margin", [30.0, 45.0, 60.0, 75.0])
 def test_equal_poles_give_the_closed_form_of_the_gain(margin):
     x = np.tan(np.radians(90.0 - margin) / 2.0)
-    g = gain_for_phase_margin(a=7.0, lam=7.0, law=INTEGRAL, phase_margin=margin)
+    g = _gain_for_phase_margin(a=7.0, lam=7.0, law=INTEGRAL, phase_margin=margin)
     assert g == pytest.approx(7.0**4 * x * (1 + x**2), rel=1e-9)
 
 
 @pytest.mark.parametrize("law", [INTEGRAL, INSTANTANEOUS, DrivingError(1.0, 0.05)])
 @pytest.mark.parametrize("dt", [None, 0.01])
 def test_the_gain_has_the_phase_margin_that_was_asked_for(law, dt):
-    g = gain_for_phase_margin(a=6.0, lam=9.0, law=law, phase_margin=50.0, dt=dt)
+    g = _gain_for_phase_margin(a=6.0, lam=9.0, law=law, phase_margin=50.0, dt=dt)
     loop = Loop(A_d=-6.0 * np.eye(2), forgetting=9.0, law=law, G=g * np.eye(2))
     found = phase_margin(loop, exact if dt is None else euler, 0.01)
     assert found == pytest.approx(50.0, abs=1e-6)
@@ -42,7 +42,7 @@ def test_the_gain_has_the_phase_margin_that_was_asked_for(law, dt):
 
 def test_a_phase_margin_below_that_of_every_gain_is_refused():
     with pytest.raises(DesignError, match="every gain"):
-        gain_for_phase_margin(a=6.0, lam=9.0, law=INSTANTANEOUS, phase_margin=1e-6)
+        _gain_for_phase_margin(a=6.0, lam=9.0, law=INSTANTANEOUS, phase_margin=1e-6)
 
 
 @pytest.mark.parametrize("law", [INTEGRAL, INSTANTANEOUS])

@@ -8,7 +8,7 @@ from benchmarks.limits import (
     integral_euler_limit,
     integral_limit,
 )
-from identifier.stability.checks import worst_damping
+from identifier.stability.checks import _worst_damping
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
 from identifier.stability.margins import gain_margin
 
@@ -67,7 +67,7 @@ def test_the_instantaneous_law_is_damped_as_the_formula_says_and_has_no_limit():
     for a, _, leakage in random_cases(20, 3):
         g = 7.0 * a**3
         loop = scalar(a, 4.0, g, leakage, INSTANTANEOUS)
-        assert worst_damping(loop) == pytest.approx(instantaneous_damping(a, g, leakage), rel=1e-9)
+        assert _worst_damping(loop) == pytest.approx(instantaneous_damping(a, g, leakage), rel=1e-9)
         assert gain_margin(loop, exact).factor == np.inf
 
 

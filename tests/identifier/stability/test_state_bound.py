@@ -11,10 +11,10 @@ from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.operation import Operation, proven_bounds
 from identifier.stability.printed import (
-    bound_14,
-    canceling_pair,
-    printed_k_b,
-    tight_k_b,
+    _bound_14,
+    _canceling_pair,
+    _printed_k_b,
+    _tight_k_b,
     trivial_bound,
 )
 from identifier.stability.sampled_bound import (
@@ -269,9 +269,9 @@ def test_the_integral_law_passes_bound_14_many_times_over():
     f, s = np.zeros((40000, 2)), np.ones((40000, n_h))
     f[:50] = 1e-2  # a nudge
     error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
-    pair = canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
+    pair = _canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
     ideal = {"W_M": 1.0, "n_h": n_h, "eta_W": eta, "rho_W": rho}  # generous: W_M is 0
-    tight = bound_14(pair, w_bar=0.0, k_b=tight_k_b(pair, **ideal))
+    tight = _bound_14(pair, w_bar=0.0, k_b=_tight_k_b(pair, **ideal))
     assert error > 100.0 * tight
 
 
@@ -282,7 +282,7 @@ def test_the_integral_law_passes_even_the_printed_route_where_a_is_slow():
     f[:50] = 1e-3
     error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
     pair = lyapunov(-a * np.eye(2), 2.0 * eta / rho * np.eye(2))  # |P| = (η/ρ)/a: b is smallest
-    k_b = printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
-    printed = bound_14(pair, w_bar=0.0, k_b=k_b)
+    k_b = _printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
+    printed = _bound_14(pair, w_bar=0.0, k_b=k_b)
     assert error > 1.2 * printed
     assert trivial_bound(-a * np.eye(2), 1e-3) < printed

@@ -6,11 +6,11 @@ from identifier.stability.loop import INSTANTANEOUS
 from identifier.stability.lyapunov import LyapunovError, lyapunov
 from identifier.stability.operation import Operation
 from identifier.stability.printed import (
-    bound_14,
-    canceling_pair,
+    _bound_14,
+    _canceling_pair,
+    _printed_k_b,
+    _tight_k_b,
     printed_bounds,
-    printed_k_b,
-    tight_k_b,
     trivial_bound,
     ultimate_bound,
 )
@@ -41,11 +41,11 @@ def random_states(pair, n, seed, w_bar=0.4):
         yield rng.standard_normal(2), W_t, W, s, w
 
 
-@pytest.mark.parametrize("k_b_of", [printed_k_b, tight_k_b])
+@pytest.mark.parametrize("k_b_of", [_printed_k_b, _tight_k_b])
 def test_the_lyapunov_function_falls_wherever_the_error_is_beyond_the_bound(k_b_of):
     pair = lyapunov(SKEWED, np.eye(2))
     k_b = k_b_of(pair, **NUMBERS)
-    b = bound_14(pair, w_bar=0.4, k_b=k_b)
+    b = _bound_14(pair, w_bar=0.4, k_b=k_b)
     for xi_tilde, W_t, W, s, w in random_states(pair, 400, 1):
         beyond = 1.0001 * b * xi_tilde / np.linalg.norm(xi_tilde)
         assert lyapunov_rate(pair, beyond, W_t, W, s, w, 3.0, 0.8) < 0.0
@@ -64,7 +64,7 @@ def test_the_quadratic_in_the_weight_error_bounds_the_rate_and_a_wrong_sign_does
     for xi_tilde, W_t, W, s, w in random_states(pair, 200, 2):
         size, y = np.linalg.norm(xi_tilde), np.linalg.norm(W_t)
         rate = lyapunov_rate(pair, xi_tilde, W_t, W, s, w, 3.0, 0.8)
-        k_b = tight_k_b(pair, **NUMBERS)
+        k_b = _tight_k_b(pair, **NUMBERS)
         assert rate <= size * (-q * size / 2 + P * 0.4 + 2 * k_b * y - y**2) + 1e-9
         rest = -xi_tilde @ pair.Q @ xi_tilde / 2 + xi_tilde @ pair.P @ w
         rest += size * np.sum(W_t * (W - W_t))
@@ -75,14 +75,14 @@ def test_the_quadratic_in_the_weight_error_bounds_the_rate_and_a_wrong_sign_does
 
 def test_the_canceling_pair_gives_the_closed_form_of_the_tight_bound():
     A_d = np.array([[-4.0, 1.0], [1.0, -6.0]])
-    pair = canceling_pair(A_d, eta_W=3.0, rho_W=0.8)
-    k_b = tight_k_b(pair, **NUMBERS)
+    pair = _canceling_pair(A_d, eta_W=3.0, rho_W=0.8)
+    k_b = _tight_k_b(pair, **NUMBERS)
     assert k_b == pytest.approx(NUMBERS["W_M"] / 2)
     inverse = np.linalg.norm(np.linalg.inv(A_d), 2)
     expected = inverse * 0.4 + 0.8 * 1.5**2 / (4 * 3.0)
-    assert bound_14(pair, w_bar=0.4, k_b=k_b) == pytest.approx(expected)
+    assert _bound_14(pair, w_bar=0.4, k_b=k_b) == pytest.approx(expected)
     with pytest.raises(LyapunovError, match="too far from symmetric"):
-        canceling_pair(np.array([[-1.0, 9.0], [0.0, -1.0]]), eta_W=1.0, rho_W=1.0)
+        _canceling_pair(np.array([[-1.0, 9.0], [0.0, -1.0]]), eta_W=1.0, rho_W=1.0)
 
 
 def best_printed(*, w_bar, n_h, eta_W, rho_W):
@@ -106,7 +106,7 @@ def best_printed(*, w_bar, n_h, eta_W, rho_W):
 def test_the_best_scale_of_the_printed_bound_is_found_by_a_search_too():
     numbers = {"n_h": 6, "eta_W": 3.0, "rho_W": 0.8}
     found = min(
-        bound_14(pair, w_bar=0.4, k_b=printed_k_b(pair, W_M=0.0, **numbers))
+        _bound_14(pair, w_bar=0.4, k_b=_printed_k_b(pair, W_M=0.0, **numbers))
         for scale in np.geomspace(0.1, 1e3, 2000)
         for pair in [lyapunov(SKEWED, scale * np.eye(2))]
     )
@@ -127,7 +127,7 @@ def test_the_ultimate_bound_is_the_maximum_of_the_level_over_a_fine_grid():
         w_bar, k_b, rho = np.exp(rng.uniform(-2, 2, 3))
         pair = lyapunov(SKEWED, np.diag(rng.uniform(0.2, 3.0, 2)))
         p, q = np.linalg.eigvalsh(pair.P), np.linalg.eigvalsh(pair.Q)[0]
-        b = bound_14(pair, w_bar=w_bar, k_b=k_b)
+        b = _bound_14(pair, w_bar=w_bar, k_b=k_b)
         y = np.linspace(0.0, k_b + np.sqrt(k_b**2 + p[1] * w_bar), 400_001)
         x = np.maximum(0.0, b - 2 / q * (y - k_b) ** 2)
         expected = np.sqrt((p[1] * x**2 + y**2 / rho).max() / p[0])
@@ -139,6 +139,6 @@ def test_the_ultimate_bound_is_the_maximum_of_the_level_over_a_fine_grid():
 def test_without_ideal_weights_the_ultimate_bound_has_a_closed_form():
     a, eta, f_bar = 3.0, 5.0, 2.0
     for rho in (0.1, 20.0):
-        pair = canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
+        pair = _canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
         found = ultimate_bound(pair, w_bar=f_bar, k_b=0.0, rho_W=rho)
         assert found == pytest.approx(max(f_bar / a, np.sqrt(f_bar / rho)), rel=1e-9)
