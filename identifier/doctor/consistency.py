@@ -32,7 +32,7 @@ _RATIO_OF = np.arange(_STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS 
 _DISBELIEF = 0.3  # per square of the logarithm of c over the declared one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
 EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
-CLEAR = 2.5  # times its noise that a channel must swing for its unit to be told
+CLEAR = 2.5  # times its noise that a channel must swing for its unit to be identified
 _ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
 
 
@@ -182,7 +182,7 @@ def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
 
 def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
     """Return the logarithm of the share of a_y that the motion does not explain."""
-    shown, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
-    slope = float(np.clip(shown @ moved / (moved @ moved + 1e-12), *_ROLLING))
-    left = float(np.sum((shown - slope * moved) ** 2)) / (float(shown @ shown) + 1e-12)
+    measured, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
+    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *_ROLLING))
+    left = float(np.sum((measured - slope * moved) ** 2)) / (float(measured @ measured) + 1e-12)
     return math.log(min(left, 1.0) + EXACT)

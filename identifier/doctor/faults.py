@@ -53,7 +53,7 @@ class _Rules:
     enough: float = 0.3  # [nats] that a step must gain
     telling: float = 2.5  # deviations, with the least size in them, that a size must have
     against: float = 4.0  # [nats] by which the accelerometer may speak against a fault
-    alike: float = 4.0  # [nats] within which two cannot be told apart
+    alike: float = 4.0  # [nats] within which two are alike
     kept: float = 1.0  # deviations by which what was taken in may still move
     temper: float = 2.0  # [nats] for odds of e
     sure: float = 20.0  # [nats] of a sure fault,

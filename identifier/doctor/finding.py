@@ -21,7 +21,7 @@ class Finding:
         right value [-].
     deviation : standard deviation of the size, NaN where nobody knows it.
     unit : of both, "" for a pure number.   confidence : that it is this, from 0 to 1.
-    group : confidence that it is this or one of those that cannot be told from it; 0 where there
+    group : confidence that it is this or one of those that are alike on this drive; 0 where there
         are none.
     text : one line for people: what, how much, and what else it may be.
     repair : what takes it out, None where nothing can.
@@ -54,7 +54,7 @@ class Finding:
 
     @property
     def alarm(self) -> float:
-        """Confidence that something is wrong, be it this or what cannot be told from it."""
+        """Confidence that something is wrong, be it this or what is alike."""
         return max(self.confidence, self.group)
 
     @property

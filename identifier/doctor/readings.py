@@ -2,7 +2,7 @@
 
 What may be wrong grossly is a short list of changes; each is tried, alone and then together, and
 that reading is taken which leaves least unexplained, where every change must earn its place. Two
-readings that leave the same cannot be told apart, and the confidence says so.
+readings that leave the same are alike, and the confidence says so.
 """
 
 import math

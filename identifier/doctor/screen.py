@@ -1,4 +1,4 @@
-"""What is grossly wrong with a log or with its car, to be seen before anything is estimated.
+"""What is grossly wrong with a log or with its car, found before anything is estimated.
 
 First the samples themselves, then whether there is anything to learn from, then units, signs and
 the car: by that reading of the log which leaves least unexplained.
