@@ -89,7 +89,7 @@ class Motion(NamedTuple):
             return None
         *means, a_y = rows if m <= MOST else rows[:, np.linspace(0, m - 1, MOST).astype(int)]
         felt = None if recording.a_y is None else a_y
-        return cls(*means, felt, speed, _hidden(pieces, SLOWEST * speed))
+        return cls._make((*means, felt, speed, _hidden(pieces, SLOWEST * speed)))
 
 
 def _rows(recording: Recording, fast: float) -> Array:

@@ -394,7 +394,7 @@ def design_for(
     feedback = known.input_feedback
     slowest = 0.0 if feedback is None else minimal_decay(feedback)
     lead = LAWS[law].lead / decay_rate(driving.bandwidth, slowest)
-    designed = design_gains(
+    gains = design_gains(
         law=LAWS[law].error(lead),
         bandwidth=driving.bandwidth,
         dt=dt,
@@ -407,7 +407,7 @@ def design_for(
         integrator=integrator,
         minimal_decay=slowest,
     )
-    return replace(frame, gains=replace(designed.gains, lead=lead))
+    return replace(frame, gains=replace(gains, lead=lead))
 
 
 def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:

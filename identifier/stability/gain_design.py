@@ -13,7 +13,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from identifier.stability.operation import Operation
 from identifier.stability.sampled_bound import (
     Disturbance,
     Learning,
-    SampledBounds,
     by_leakage,
     error_gains,
     output_layer,
@@ -38,18 +37,6 @@ FASTEST = 0.2  # largest a dt
 
 class DesignError(TireidError, ValueError):
     """What is asked of the gains cannot be had at this sampling interval."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GainDesign:
-    """Gains and what is proved of them.
-    gains : of (8) to (12).   bounds : proven bounds of |ξ̃| and |W_hat|.
-    """
-
-    gains: Gains
-    loop_gain: float
-    bounds: SampledBounds
-    V_max: float
 
 
 def _gain_for_phase_margin(
@@ -110,7 +97,7 @@ def design_gains(
     capacity: float = 4.0,
     integrator: str = "euler",
     minimal_decay: float = 0.0,
-) -> GainDesign:
+) -> Gains:
     """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
     bandwidth : highest frequency of steering that matters [Hz].   dt : sampling interval T_s [s].
     needed_force : that the network is expected to hold [U].
@@ -158,7 +145,7 @@ def design_gains(
     if memory > 0.0:
         eta_V = min(eta_V, 0.5 * V_max / memory)
     rho_V = _leakage_of_V(replace(layer, drive=eta_V * layer.drive), V_max, bounds.stage)
-    gains = Gains(
+    return Gains(
         A_d=A_d,
         forgetting=lam,
         eta_W=eta_W,
@@ -167,7 +154,6 @@ def design_gains(
         rho_V=rho_V,
         lead=c_xi if c_z > 0.0 else 0.0,
     )
-    return GainDesign(gains=gains, loop_gain=g, bounds=bounds, V_max=V_max)
 
 
 def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:

@@ -217,8 +217,9 @@ def estimated_input_feedback(
     if lost.shape != (2,) or not np.all(np.isfinite(lost)):
         raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
-    coupling = np.array([[1.0, l_f], [1.0, -l_r]]) @ K
-    return np.diag(lost) @ coupling / v_x
+    slip = np.array([[1.0, l_f], [1.0, -l_r]])
+    feedback: Array = np.diag(lost) @ (slip @ K) / v_x
+    return feedback
 
 
 def minimal_decay(feedback: ArrayLike) -> float:

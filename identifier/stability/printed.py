@@ -120,9 +120,10 @@ def printed_bounds(
     trivial : bound of an identifier without a network [U s].
     """
     pair, tight_pair = _best_pair(gains), _tight_pair(gains)
-    w_bar, rho_W = operation.disturbance.residual, gains.rho_W
-    ideal = {"W_M": 0.0, "n_h": operation.n_h, "eta_W": gains.eta_W, "rho_W": rho_W}
-    k_b, tight = _printed_k_b(pair, **ideal), _tight_k_b(tight_pair, **ideal)
+    w_bar, n_h = operation.disturbance.residual, operation.n_h
+    eta_W, rho_W = gains.eta_W, gains.rho_W
+    k_b = _printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
+    tight = _tight_k_b(tight_pair, W_M=0.0, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
     entries = {
         "printed_bound": ("bound (14), printed route", _bound_14(pair, w_bar=w_bar, k_b=k_b)),
         "tight_bound": ("bound (14), tight route", _bound_14(tight_pair, w_bar=w_bar, k_b=tight)),

@@ -37,7 +37,7 @@ def designed(law):
         disturbance=Disturbance(residual=4.0),
         needed_force=4.0,
         V_max=12.0,
-    ).gains
+    )
 
 
 def gains(a=8.0, lam=8.0, **changes):
