@@ -186,11 +186,11 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
 
 def _unobservable(recording: Recording, gross: Screened) -> tuple[str, ...]:
     """Return what this log cannot tell, a line each."""
-    more = ()
+    lines = [*NEVER, *gross.unobservable]
     if gross.blind:
-        more = (f"offsets, delays, lever arms, scales, center of gravity, inertia: {gross.blind}",)
+        sizes = "offsets, delays, lever arms, scales, center of gravity, inertia"
+        lines.append(f"{sizes}: {gross.blind}")
     elif recording.a_y is None:
-        more = (
-            "bank of the road, and units of speed against one another: there is no a_y in the log",
-        )
-    return (*NEVER, *gross.unobservable, *more)
+        speeds = "units of speed against one another"
+        lines.append(f"bank of the road, and {speeds}: there is no a_y in the log")
+    return tuple(lines)

@@ -292,13 +292,13 @@ def _description(
     return _document(model)
 
 
-_CAN_2 = (
+_CAN_2: tuple[str, ...] = (
     "canHandleVariableCommunicationStepSize",
     "canNotUseMemoryManagementFunctions",
     "canGetAndSetFMUstate",
     "canSerializeFMUstate",
 )
-_CAN_3 = (
+_CAN_3: tuple[str, ...] = (
     "canGetAndSetFMUState",
     "canSerializeFMUState",
     "canHandleVariableCommunicationStepSize",
