@@ -50,7 +50,6 @@ from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import (
     declared_signals,
     largest_steering_rate,
-    operation,
     proven_bounds,
 )
 from models.vehicle import Vehicle
@@ -108,7 +107,7 @@ def certificate_of(design: PaperIdentifier, vehicle: Vehicle) -> Certificate:
     """
     assert design.driving is not None
     chosen = KNOWN[design.law]
-    return certify(design.gains, chosen, operation(design, vehicle, design.driving))
+    return certify(design.gains, chosen, design.operation(vehicle, design.driving))
 
 
 def may_pass(design: PaperIdentifier, vehicle: Vehicle) -> bool:
@@ -122,7 +121,7 @@ def may_pass(design: PaperIdentifier, vehicle: Vehicle) -> bool:
     assert design.driving is not None
     chosen, gains = KNOWN[design.law], design.gains
     law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
-    task = operation(design, vehicle, design.driving)
+    task = design.operation(vehicle, design.driving)
     found = proven_bounds(gains, law, task, D)
     entries = [
         *dynamics_checks(gains, task),

@@ -28,6 +28,30 @@ class Property:
     unit: str
     advice: str = ""
 
+    @classmethod
+    def judged(
+        cls,
+        name: str,
+        title: str,
+        value: float,
+        unit: str,
+        *,
+        limit: float,
+        bad: float | None = None,
+        least: bool = False,
+        advice: str = "",
+    ) -> "Property":
+        """Return what passes up to its limit, or down to it, and has advice where it does not.
+        bad : beyond which it fails, None for never.   least : whether the limit is the least value.
+        """
+        status = (at_least if least else at_most)(value, good=limit, bad=bad)
+        margin = value / limit if least else limit / value if value else math.inf
+        advice = "" if status == "pass" else advice
+        return cls(
+            name=name, title=title, value=value, limit=limit, margin=margin, status=status,
+            unit=unit, advice=advice,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate:

@@ -89,7 +89,7 @@ def columns(maneuver: str) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class _Trial:
     """One law with one seed on one maneuver.
     replays : freeze time [s] to replay of the same recording; errors count from the onset on.
     errors : by column as `columns` names them: RMSE of both axles from the onset on [kN]; empty
@@ -110,17 +110,17 @@ def drive_maneuvers() -> dict[str, Recording]:
     }
 
 
-def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> Trial:
+def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> _Trial:
     history = identify(recording, sedan(), design)
     if history.diverged_at is not None:
-        return Trial(history=history, replays={}, errors={})
+        return _Trial(history=history, replays={}, errors={})
     since = ONSETS[maneuver]
     replays = {t: reproduce(history, t, since=since) for t in FREEZES[maneuver]}
     missed = {ONLINE: online_error(history, since=since)}
     for t, result in replays.items():
         missed |= {frozen_column(m, t): error for m, error in _measures(result).items()}
     errors = {name: error.both / 1000.0 for name, error in missed.items() if error is not None}
-    return Trial(history=history, replays=replays, errors=errors)
+    return _Trial(history=history, replays=replays, errors=errors)
 
 
 def _measures(result: Replay) -> dict[str, AxleRmse | None]:
@@ -157,7 +157,7 @@ class Study:
             for maneuver, by_law in self.errors.items()
         }
 
-    def typical(self, maneuver: str, law: str) -> Trial | None:
+    def typical(self, maneuver: str, law: str) -> _Trial | None:
         """Return the trial of median error over all of the drive at the first freeze, if any.
         maneuver : "step_steer" or "slalom".   law : one of `LAWS`.
         """

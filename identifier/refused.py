@@ -3,7 +3,7 @@
 A sample is refused where a number is not finite or beyond what any car reaches (`SampleLimits`). It
 counts as time. No sample is refused for a_y, nor for v_y where the method tells it itself: a v_y
 that no car reaches is taken for NaN there, as without a sensor. A method that judges samples
-itself, whose step carries a gate, is shown a sample at `NOWHERE` in place of one that is refused,
+itself, whose step carries a gate, is given a sample at `NOWHERE` in place of one that is refused,
 which no gate believes: it holds its last one for a moment, then rests. The others rest at the first
 sample after the gap, once, before they take it: observers take the measurement and filters begin
 anew, as at a start, and what was learnt stays. So no difference over the gap is ever taken for one
@@ -24,7 +24,7 @@ TURN = 4.0  # largest yaw rate, in sqrt(g/wheelbase): 8 rad/s for a sedan
 STEERING = 1.5  # rad
 WEIGHTS = 5.0  # largest force of an axle, in weights of the car
 STALE_TIME = 0.5  # s: a driver's reaction; forces follow steering and yaw within less
-NOWHERE = 1e6  # m/s, of a car that nobody has seen; its square is a number in float too
+NOWHERE = 1e6  # m/s, of no car; its square is a number in float too
 GATE = "gate"  # the carried port of a step that judges samples itself
 
 
@@ -86,7 +86,7 @@ def stale_samples(stale_time: float, dt: float) -> int:
     return max(1, int(stale_time / dt + 0.5))
 
 
-class Rests(NamedTuple):
+class _Rests(NamedTuple):
     """Samples with rests between segments, N of them.
     rows : of the recording that each is, at rests the one that follows, (N,).
     resting : whether it is a rest (N,).   at : which of them each sample is (n,).
@@ -97,7 +97,7 @@ class Rests(NamedTuple):
     at: NDArray[np.intp]
 
 
-def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
+def with_rests(n: int, breaks: Sequence[int], rest: int) -> _Rests:
     """Return n samples with rests before each segment but the first.
     breaks : samples with which segments begin, rising.
     """
@@ -105,4 +105,4 @@ def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
     samples = np.arange(n)
     resting = np.insert(np.zeros(n, dtype=np.bool_), begins, np.ones(begins.size, dtype=np.bool_))
     at = np.flatnonzero(~resting)
-    return Rests(np.insert(samples, begins, begins), resting, at)
+    return _Rests(np.insert(samples, begins, begins), resting, at)

@@ -19,7 +19,7 @@ from models.recordings import Recording
 Kind = Literal["state", "outputs"]
 
 
-class Found(NamedTuple):
+class _Found(NamedTuple):
     """What has been computed of a block, by port, and how much of it comes before its part."""
 
     cut: int
@@ -40,7 +40,7 @@ class Rerun:
     first: int
     end: int
     _wanted: set[str] = field(default_factory=set, init=False)
-    _found: dict[int, Found] = field(default_factory=dict, init=False)
+    _found: dict[int, _Found] = field(default_factory=dict, init=False)
 
     def __len__(self) -> int:
         return self.end - self.first
@@ -63,7 +63,7 @@ class Rerun:
             part = slice(begins - self.first, ends - self.first)
             if begins >= ends or not holds(part, samples):
                 continue
-            found = self._found.get(k) or Found(begins - whole.start, {"state": {}, "outputs": {}})
+            found = self._found.get(k) or _Found(begins - whole.start, {"state": {}, "outputs": {}})
             if len(self.begins) == 1:
                 self._found[k] = found
             of = partial(self._of_block, k, found)
@@ -72,7 +72,7 @@ class Rerun:
             after = _OnDemand(self.ports("state"), partial(_last_row, state))
             yield Block(part, state, outputs, after)
 
-    def _of_block(self, k: int, found: Found, kind: Kind, port: str) -> Array:
+    def _of_block(self, k: int, found: _Found, kind: Kind, port: str) -> Array:
         if port not in found.values[kind]:
             self._wanted.add(port)
             missing = self._wanted.difference(*found.values.values())

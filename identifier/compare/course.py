@@ -225,20 +225,11 @@ def shares(trial: Trial, course: Course) -> Shares:
     online = float(np.mean([course.share(name, trial.online[name]) for name in names]))
     if trial.frozen is None:
         return Shares(online, None, None)
-    return Shares(online, *frozen_shares(trial.frozen, course))
-
-
-def frozen_shares(
-    frozen: Mapping[str, Mapping[str, AxleRmse]], course: Course
-) -> tuple[float | None, float | None]:
-    """Return the mean errors of frozen models where they learnt and elsewhere [%].
-    frozen : by recording learnt on and recording replayed [N].
-    """
-    learnt_on, other = same_and_other(frozen)
-    return (
-        _mean([course.share(name, error) for name, error in learnt_on]),
-        _mean([course.share(name, error) for name, error in other]),
+    same, other = (
+        [course.share(name, error) for name, error in listed]
+        for listed in same_and_other(trial.frozen)
     )
+    return Shares(online, _mean(same), _mean(other))
 
 
 def same_and_other(

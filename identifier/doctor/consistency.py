@@ -32,7 +32,7 @@ _RATIO_OF = np.arange(_STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS 
 _DISBELIEF = 0.3  # per square of the logarithm of c over the declared one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
 EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
-CLEAR = 2.5  # times its noise that a channel must swing for its unit to be told
+CLEAR = 2.5  # times its noise that a channel must swing for its unit to be identified
 _ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
 
 
@@ -58,9 +58,9 @@ class Reading(NamedTuple):
 class Motion(NamedTuple):
     """Means of a log as it is written over the windows in which the car drives, each (m,).
 
-    v_y, delta_f, delta_r, v_x_r = v_x r, turn = r/v_x, sideslip = v_y/v_x, a_y or None; rates of
-    change v_y_dot, r_dot, and that of v_x v_y; speed: 95th percentile of |v_x|, one number;
-    hidden: channels whose swings do not stand out of their noise.
+    v_y, delta_f, delta_r, v_x_r = v_x r, turn = r/v_x, sideslip = v_y/v_x; rates of change v_y_dot,
+    r_dot, and that of v_x v_y; a_y or None; speed: 95th percentile of |v_x|, one number; hidden:
+    channels whose swings do not stand out of their noise.
     """
 
     v_y: Array
@@ -69,10 +69,10 @@ class Motion(NamedTuple):
     v_x_r: Array
     turn: Array
     sideslip: Array
-    a_y: Array | None
     v_y_dot: Array
     r_dot: Array
     v_x_v_y_dot: Array
+    a_y: Array | None
     speed: float
     hidden: frozenset[str] = frozenset()
 
@@ -83,42 +83,24 @@ class Motion(NamedTuple):
         speed = usual_speed(pieces)
         if speed == 0.0:
             return None
-        parts = [cls._of_piece(one, SLOWEST * speed) for one in pieces]
-        means, rates, shown = (
-            np.concatenate([part[k] for part in parts], axis=1) for k in range(3)
-        )
-        m = means.shape[1]
-        some = np.arange(m) if m <= MOST else np.linspace(0, m - 1, MOST).astype(int)
+        rows = np.concatenate([_rows(one, SLOWEST * speed) for one in pieces], axis=1)
+        m = rows.shape[1]
         if m < FEWEST:
             return None
-        a_y = None if recording.a_y is None else shown[0, some]
-        v_y, delta_f, delta_r, v_x_r, turn, sideslip = means[:, some]
-        v_y_dot, r_dot, v_x_v_y_dot = rates[:, some]
-        return cls(
-            v_y=v_y,
-            delta_f=delta_f,
-            delta_r=delta_r,
-            v_x_r=v_x_r,
-            turn=turn,
-            sideslip=sideslip,
-            a_y=a_y,
-            v_y_dot=v_y_dot,
-            r_dot=r_dot,
-            v_x_v_y_dot=v_x_v_y_dot,
-            speed=speed,
-            hidden=_hidden(pieces, SLOWEST * speed),
-        )
+        *means, a_y = rows if m <= MOST else rows[:, np.linspace(0, m - 1, MOST).astype(int)]
+        felt = None if recording.a_y is None else a_y
+        return cls._make((*means, felt, speed, _hidden(pieces, SLOWEST * speed)))
 
-    @staticmethod
-    def _of_piece(recording: Recording, fast: float) -> tuple[Array, Array, Array]:
-        """Return means, rates and what an accelerometer shows, a column each window."""
-        v_x, v_y, r, a_y = recording.v_x, recording.needed("v_y"), recording.r, recording.a_y
-        windows = driven_windows(recording, fast)
-        over = np.where(np.abs(v_x) < fast, fast, v_x)
-        signals = np.column_stack([v_y, recording.u, v_x * r, r / over, v_y / over])
-        rates = windows.rate(np.column_stack([v_y, r, v_x * v_y])).T
-        shown = windows.mean(np.zeros_like(r) if a_y is None else a_y)[None]
-        return windows.mean(signals).T, rates, shown
+
+def _rows(recording: Recording, fast: float) -> Array:
+    """Return means and rates in the order of `Motion`, and means of a_y, a column each window."""
+    v_x, v_y, r, a_y = recording.v_x, recording.needed("v_y"), recording.r, recording.a_y
+    windows = driven_windows(recording, fast)
+    over = np.where(np.abs(v_x) < fast, fast, v_x)
+    signals = np.column_stack([v_y, recording.u, v_x * r, r / over, v_y / over])
+    rates = windows.rate(np.column_stack([v_y, r, v_x * v_y]))
+    felt = windows.mean(np.zeros_like(r) if a_y is None else a_y)
+    return np.vstack([windows.mean(signals).T, rates.T, felt])
 
 
 def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
@@ -134,6 +116,14 @@ def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
     return frozenset(found)
 
 
+class _AxleMotion(NamedTuple):
+    """φ and α, rows front and rear (2, m); dv_y/dt + v_x r [m/s^2] (m,)."""
+
+    force: Array
+    slip: Array
+    acceleration: Array
+
+
 def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:
     """Return what a reading leaves unexplained: the sum of the logarithms of each equation's
     share.
@@ -142,15 +132,13 @@ def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:
     return front_leaves(one, vehicle) + but_front_leaves(one, motion, vehicle, reading)
 
 
-def front_leaves(one: "AxleMotion", vehicle: Vehicle) -> float:
+def front_leaves(one: _AxleMotion, vehicle: Vehicle) -> float:
     """Return what is left of the front axle, the only equation that the steering is in."""
     declared = vehicle.cornering_stiffness_front / vehicle.axle_loads[0]
     return _curve_leaves(one.force[0], one.slip[0], declared)
 
 
-def but_front_leaves(
-    one: "AxleMotion", motion: Motion, vehicle: Vehicle, reading: Reading
-) -> float:
+def but_front_leaves(one: _AxleMotion, motion: Motion, vehicle: Vehicle, reading: Reading) -> float:
     """Return what is left of all other equations."""
     froude = abs(reading.v_x) * motion.speed / (math.sqrt(reading.size) * vehicle.froude_speed)
     declared = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
@@ -161,15 +149,7 @@ def but_front_leaves(
     return total
 
 
-class AxleMotion(NamedTuple):
-    """φ and α, rows front and rear (2, m); dv_y/dt + v_x r [m/s^2] (m,)."""
-
-    force: Array
-    slip: Array
-    acceleration: Array
-
-
-def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> AxleMotion:
+def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> _AxleMotion:
     """Return forces over loads and slip angles of the axles as a reading has them."""
     k_x, k_y, k_r = reading.v_x, reading.v_y, reading.r
     l_f, l_r = reading.size * vehicle.l_f, reading.size * vehicle.l_r
@@ -185,7 +165,7 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> Axle
     force = np.stack([acceleration + yaw / l_r, acceleration - yaw / l_f]) / GRAVITY
     front = reading.delta * motion.delta_f - sideslip - l_f * turn
     rear = motion.delta_r - sideslip + l_r * turn
-    return AxleMotion(force, np.stack([front, rear]), acceleration)
+    return _AxleMotion(force, np.stack([front, rear]), acceleration)
 
 
 def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
@@ -202,7 +182,7 @@ def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
 
 def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
     """Return the logarithm of the share of a_y that the motion does not explain."""
-    shown, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
-    slope = float(np.clip(shown @ moved / (moved @ moved + 1e-12), *_ROLLING))
-    left = float(np.sum((shown - slope * moved) ** 2)) / (float(shown @ shown) + 1e-12)
+    measured, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
+    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *_ROLLING))
+    left = float(np.sum((measured - slope * moved) ** 2)) / (float(measured @ measured) + 1e-12)
     return math.log(min(left, 1.0) + EXACT)

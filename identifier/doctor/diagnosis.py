@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from identifier.doctor.faults import Examination, examine, prepared
-from identifier.doctor.finding import Finding
+from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import (
     NEAR,
@@ -105,7 +105,8 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
         return Diagnosis(name=recording.name, findings=(finding,), unobservable=NEVER)
     if recording.logged_v_y is None:
-        given = (*_contradictions(recording, vehicle), *_samples(recording))
+        samples = clock_findings(recording) or sample_findings(recording)
+        given = (*_contradictions(recording, vehicle), *samples)
         return Diagnosis(name=recording.name, findings=given, unobservable=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
@@ -130,7 +131,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     ranked = sorted([*found, *sizes], key=lambda one: not one.matters)
     return Diagnosis(
         name=recording.name,
-        findings=tuple(_told_once(ranked)),
+        findings=tuple(first_of_each(ranked)),
         unobservable=(*_unobservable(recording, replace(gross, blind=blind)), *fine.unobservable),
     )
 
@@ -157,19 +158,6 @@ def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     blind = replace(recording, axle_force=None)
     said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
     return [] if said is None else [Finding(code="contradiction", confidence=SURELY, text=said)]
-
-
-def _samples(recording: Recording) -> list[Finding]:
-    """Return what is wrong with the samples of a log without a v_y."""
-    return list(clock_findings(recording)) or sample_findings(recording)
-
-
-def _told_once(findings: list[Finding]) -> list[Finding]:
-    """Return findings without the second of one code and channel."""
-    kept: dict[tuple[str, str], Finding] = {}
-    for one in findings:
-        kept.setdefault((one.code, one.channel), one)
-    return list(kept.values())
 
 
 def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | None:
@@ -200,12 +188,9 @@ def _unobservable(recording: Recording, gross: Screened) -> tuple[str, ...]:
     """Return what this log cannot tell, a line each."""
     lines = [*NEVER, *gross.unobservable]
     if gross.blind:
-        lines.append(
-            f"offsets, delays, lever arms, scales, center of gravity, inertia: {gross.blind}"
-        )
-        return tuple(lines)
-    if recording.a_y is None:
-        lines.append(
-            "bank of the road, and units of speed against one another: there is no a_y in the log"
-        )
+        sizes = "offsets, delays, lever arms, scales, center of gravity, inertia"
+        lines.append(f"{sizes}: {gross.blind}")
+    elif recording.a_y is None:
+        speeds = "units of speed against one another"
+        lines.append(f"bank of the road, and {speeds}: there is no a_y in the log")
     return tuple(lines)

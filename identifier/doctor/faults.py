@@ -35,7 +35,7 @@ BESIDE = {"ln_inertia": 0.1}  # believed of any car: a declared one is an estima
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
+class _Rules:
     """Limits of the search, chosen on random cars of the plant."""
 
     interval: float = 0.02  # [s] between samples, of a sedan
@@ -53,7 +53,7 @@ class Rules:
     enough: float = 0.3  # [nats] that a step must gain
     telling: float = 2.5  # deviations, with the least size in them, that a size must have
     against: float = 4.0  # [nats] by which the accelerometer may speak against a fault
-    alike: float = 4.0  # [nats] within which two cannot be told apart
+    alike: float = 4.0  # [nats] within which two are alike
     kept: float = 1.0  # deviations by which what was taken in may still move
     temper: float = 2.0  # [nats] for odds of e
     sure: float = 20.0  # [nats] of a sure fault,
@@ -64,7 +64,7 @@ class Rules:
     untold: float = 0.6  # of `wide`, what is left by a drive that does not tell a size
 
 
-RULES = Rules()
+RULES = _Rules()
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
 _SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
@@ -159,9 +159,14 @@ class Search:
     def widened(self, one: Suspect) -> dict[str, float]:
         return {**self.wide, one.parameter: one.scaled(one.wide, self.vehicle)}
 
-    def line(self, p: Array, wide: _Widths) -> Line | None:
-        """Return what the accelerometer says, None where there is none."""
-        return None if self.accelerometer is None else self.accelerometer.line(p, wide)
+    def line(self, p: Array, wide: _Widths) -> Line:
+        """Return what the accelerometer says, where there is one."""
+        assert self.accelerometer is not None
+        return self.accelerometer.line(p, wide)
+
+    def misfit(self, p: Array) -> float:
+        """Return J of the accelerometer [nats], 0 where there is none."""
+        return 0.0 if self.accelerometer is None else self.line(p, self.wide).cost
 
     def left(self, *, of_model: bool) -> list[Suspect]:
         """Return the suspects that were not taken in, of the balance or of the accelerometer."""
@@ -198,17 +203,15 @@ class Search:
 
         Beside it where to begin: the value that the accelerometer asks for, as far as it does.
         """
-        line, least, found = self.line(base.p, self.wide), RULES.promise * RULES.gain, []
+        least, found, senses = RULES.promise * RULES.gain, [], self.accelerometer is not None
         for one, of_balance, value, sd in self.steps(base):
             gain, begin = of_balance, 0.0
-            if line is not None and one.parameter in (*SENSORS, "bank") and one.code != "lag":
+            if senses and one.parameter in (*SENSORS, "bank") and one.code != "lag":
                 size = np.zeros(base.p.size)
                 size[INDEX[one.parameter]] = one.scaled(one.wide, self.vehicle)
 
                 def cost(step: float, size: Array = size) -> float:
-                    moved = self.line(base.p + step * size, self.wide)
-                    assert moved is not None
-                    return 0.5 * step**2 + moved.cost
+                    return 0.5 * step**2 + self.misfit(base.p + step * size)
 
                 step, _, there = descended(cost, 1.0)
                 more = cost(0.0) - there
@@ -221,12 +224,10 @@ class Search:
 
     def fitted(self, one: Suspect, base: Posterior, begin: float = 0.0) -> Candidate:
         """Return a suspect fitted beside what is there, beginning at a value away from it."""
-        wide = self.widened(one)
-        before = self.line(base.p, self.wide)
+        wide, before = self.widened(one), self.misfit(base.p)
         if not one.parameters:
             after = self.line(base.p, wide)
-            assert before is not None and after is not None
-            gain = before.cost - after.cost
+            gain = before - after.cost
             return Candidate(one, *after.of(one.parameter), gain, gain, gain, None)
         problem = self.problem.under(self.priors(wide))
         start = base.p.copy()
@@ -237,9 +238,9 @@ class Search:
         if one.code == "downforce":
             shares = np.array(self.vehicle.axle_loads) / self.vehicle.weight
             value = float(shares @ [post[name] for name in one.parameters])
-        elif before is not None:
+        elif self.accelerometer is not None:
             post, sd, line, moved = self.both(post, one.parameter)
-            value, felt = post[one.parameter], before.cost - line
+            value, felt = post[one.parameter], before - line
             gain += felt - moved
         shown = gain
         if base.sd(one.parameter) > 0.0:
@@ -258,9 +259,7 @@ class Search:
         along = covariance[k] / covariance[k, k]
 
         def cost(step: float) -> float:
-            line = self.line(post.p + step * along, self.wide)
-            assert line is not None
-            return 0.5 * (step / sd) ** 2 + line.cost
+            return 0.5 * (step / sd) ** 2 + self.misfit(post.p + step * along)
 
         step, curvature, best = descended(cost, sd)
         p = np.clip(post.p + step * along, self.problem.priors.low, self.problem.priors.high)
@@ -399,12 +398,10 @@ class Search:
     def findings(self, post: Posterior) -> Iterator[Finding]:
         """Yield what was found: what explains most first, followed by what may be it instead."""
         names: set[str] = set()
-        line = self.line(post.p, self.wide)
         for first, alike, sure in self.found:
             name = first.suspect.parameter
             if name in OF_A_Y:
-                assert line is not None
-                value, sd = line.of(name)
+                value, sd = self.line(post.p, self.wide).of(name)
             elif first.suspect.code == "downforce":
                 value, sd = first.value, first.deviation
             else:

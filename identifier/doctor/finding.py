@@ -1,6 +1,7 @@
 """What the doctor found: one fault, its size and what is known of it, and what takes it out."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +21,7 @@ class Finding:
         right value [-].
     deviation : standard deviation of the size, NaN where nobody knows it.
     unit : of both, "" for a pure number.   confidence : that it is this, from 0 to 1.
-    group : confidence that it is this or one of those that cannot be told from it; 0 where there
+    group : confidence that it is this or one of those that are alike on this drive; 0 where there
         are none.
     text : one line for people: what, how much, and what else it may be.
     repair : what takes it out, None where nothing can.
@@ -53,7 +54,7 @@ class Finding:
 
     @property
     def alarm(self) -> float:
-        """Confidence that something is wrong, be it this or what cannot be told from it."""
+        """Confidence that something is wrong, be it this or what is alike."""
         return max(self.confidence, self.group)
 
     @property
@@ -65,6 +66,11 @@ class Finding:
     def percent(self) -> str:
         """The confidence as text; 99 % at most, as a log alone proves nothing."""
         return f"{100.0 * min(self.confidence, MOST):.0f} %"
+
+    @property
+    def subject(self) -> tuple[str, str]:
+        """Code and channel: a log has one finding of each."""
+        return self.code, self.channel
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and words, ready for JSON; None is what is not known."""
@@ -85,3 +91,11 @@ class Finding:
             "note": self.note,
             "repair": None if self.repair is None else self.repair.tables(),
         }
+
+
+def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
+    """Return findings without the second of one subject."""
+    kept: dict[tuple[str, str], Finding] = {}
+    for one in findings:
+        kept.setdefault(one.subject, one)
+    return list(kept.values())

@@ -2,7 +2,7 @@
 
 What may be wrong grossly is a short list of changes; each is tried, alone and then together, and
 that reading is taken which leaves least unexplained, where every change must earn its place. Two
-readings that leave the same cannot be told apart, and the confidence says so.
+readings that leave the same are alike, and the confidence says so.
 """
 
 import math
@@ -74,6 +74,20 @@ class Change:
         """
         kind = {"sign": "sign", "steering": "ratio"}.get(self.code, "size")
         return frozenset(f"{name} {kind}" for name, _ in self.factors)
+
+    @property
+    def by_channel(self) -> dict[str, float]:
+        """What each channel is multiplied by."""
+        pairs = zip(self.channels, self.factors, strict=True)
+        return {name: factor for name, (_, factor) in pairs}
+
+    @property
+    def parts(self) -> "tuple[Change, ...]":
+        """The same, channel by channel."""
+        return tuple(
+            replace(self, channels=(name,), factors=(factor,))
+            for name, factor in zip(self.channels, self.factors, strict=True)
+        )
 
     def shows_in(self, motion: Motion) -> bool:
         """Return whether a log can tell it: what is hidden in noise has no unit of its own."""

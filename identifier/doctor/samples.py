@@ -5,13 +5,14 @@ Every rule compares a channel with its own noise or with the other channels; non
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.doctor.finding import Finding
+from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.pieces import driven_pieces
 from models.recordings import Recording
 from models.recordings.repair import Repair
@@ -35,7 +36,7 @@ COARSE = 0.05  # quantum over the rms of a channel
 CERTAIN = 0.99
 
 
-class Runs(NamedTuple):
+class _Runs(NamedTuple):
     """Segments of equal neighbors of a channel: index of the first sample, and length, (k,)."""
 
     first: NDArray[np.intp]
@@ -53,15 +54,12 @@ def channels(recording: Recording) -> Mapping[str, Array]:
 def sample_findings(recording: Recording) -> list[Finding]:
     pieces = driven_pieces(recording)
     listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
-    first: dict[tuple[str, str], Finding] = {}
-    for one in listed:
-        first.setdefault((one.code, one.channel), one)
     late = {one.channel: one.size for one in listed if one.code == "jitter"}
     several = len(late) > 1  # all channels are torn then, at every sample
     late = {name: size for name, size in late.items() if _is_late(name, late, recording.dt)}
     return [
         one
-        for one in first.values()
+        for one in first_of_each(listed)
         if (one.code != "jitter" or one.channel in late)
         and not (several and one.code == "clock" and one.confidence < CERTAIN)
     ]
@@ -74,6 +72,14 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
     """
     alike = [one for one, size in late.items() if abs(math.log(size / late[name])) < ALIKE]
     return "r" in alike and len(alike) > 1 and late[name] > 0.7 * dt
+
+
+def _found(
+    code: str, channel: str, size: float, unit: str, confidence: float, text: str
+) -> Finding:
+    return Finding(
+        code=code, channel=channel, size=size, unit=unit, confidence=confidence, text=text
+    )
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:
@@ -112,12 +118,16 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
         text = (
             f"{name} is {value} throughout while the car moves: no sensor, or it was not connected"
             if len(there) == len(pieces)
-            else f"{name} does not change from {float(there[0].t[0]):.4g} s on for "
-            f"{there[0].duration:.3g} s: frozen; cut the log there"
+            else _stopped(name, float(there[0].t[0]), there[0].duration)
         )
-        yield Finding(
-            code="frozen", channel=name, size=length, unit="s", confidence=CERTAIN, text=text
-        )
+        yield _found("frozen", name, length, "s", CERTAIN, text)
+
+
+def _stopped(name: str, since: float, duration: float) -> str:
+    return (
+        f"{name} does not change from {since:.4g} s on for {duration:.3g} s: frozen; cut the log "
+        "there"
+    )
 
 
 def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
@@ -131,14 +141,10 @@ def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
             if float(np.sqrt(np.sum((b - ratio * a) ** 2))) > 1e-7 * size:
                 continue
             what = "is a copy of" if abs(ratio - 1.0) < 1e-7 else f"is {ratio:.4g} times"
-            yield Finding(
-                code="copied",
-                channel=other,
-                size=ratio,
-                confidence=CERTAIN,
-                text=f"{other} {what} {one}, sample by sample: it was computed or mapped, not "
-                "measured",
+            text = (
+                f"{other} {what} {one}, sample by sample: it was computed or mapped, not measured"
             )
+            yield _found("copied", other, ratio, "", CERTAIN, text)
 
 
 def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Iterator[Finding]:
@@ -147,25 +153,18 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
     quantum = _quantum(signal)
     runs = _runs(signal)
     if quantum is not None and quantum > COARSE * float(np.std(signal)):
-        yield Finding(
-            code="quantized",
-            channel=name,
-            size=quantum,
-            unit=UNITS[name],
-            confidence=CERTAIN,
-            text=f"{name} comes in steps of {quantum:.3g} {UNITS[name]}: a coarse sensor, or too "
-            "few digits were written",
+        text = (
+            f"{name} comes in steps of {quantum:.3g} {UNITS[name]}: a coarse sensor, or too few "
+            "digits were written"
         )
+        yield _found("quantized", name, quantum, UNITS[name], CERTAIN, text)
     lost = _lost(signal, noise)
     if lost.size:
-        yield Finding(
-            code="dropout",
-            channel=name,
-            size=float(lost.size),
-            confidence=CERTAIN,
-            text=f"{name} drops to 0 for {lost.size} of {signal.size} samples, first at "
-            f"{recording.t[lost[0]]:.4g} s: a lost sensor; leave these samples out of the log",
+        text = (
+            f"{name} drops to 0 for {lost.size} of {signal.size} samples, first at "
+            f"{recording.t[lost[0]]:.4g} s: a lost sensor; leave these samples out of the log"
         )
+        yield _found("dropout", name, float(lost.size), "", CERTAIN, text)
         return
     stairs = _stairs(runs, signal.size, quantum)
     if stairs is not None:
@@ -185,30 +184,20 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
         yield from _repeats(name, runs, noise > 0.0, recording)
     spikes = _spikes(signal, noise) if not jumps else np.empty(0)
     if 3 <= spikes.size <= 0.1 * signal.size:
-        yield Finding(
-            code="spikes",
-            channel=name,
-            size=float(spikes.size),
-            confidence=0.9,
-            text=f"{name} has {spikes.size} samples far off their neighbors, first at "
-            f"{recording.t[int(spikes[0])]:.4g} s",
-        )
+        first = f"first at {recording.t[int(spikes[0])]:.4g} s"
+        text = f"{name} has {spikes.size} samples far off their neighbors, {first}"
+        yield _found("spikes", name, float(spikes.size), "", 0.9, text)
     late = _jitter(signal, dt)
     if late is not None and stairs is None:
         size, z = late
-        yield Finding(
-            code="jitter",
-            channel=name,
-            size=size,
-            deviation=size / z,
-            unit="s",
-            confidence=0.9,
-            text=f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped on "
-            "arrival, not on sampling",
+        text = (
+            f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped on arrival, "
+            "not on sampling"
         )
+        yield replace(_found("jitter", name, size, "s", 0.9, text), deviation=size / z)
 
 
-def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
+def _repeats(name: str, runs: _Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
     """A channel that holds one number: for long, or again and again, as noise never does."""
     signal, dt = getattr(recording, name), recording.dt
     zero = _zero(name, runs, recording) if name in _ESTIMATED else None
@@ -230,29 +219,17 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
     if known and of_others / len(recording) > enough and again >= FEW:
         typical = float(np.median(runs.length[lost])) * dt
         most = f", the longest for {length * dt:.3g} s from {first:.4g} s on" if frozen else ""
-        yield Finding(
-            code="held",
-            channel=name,
-            size=typical,
-            unit="s",
-            confidence=0.95,
-            text=f"{name} holds its last value {again} times, typically for {1e3 * typical:.3g} ms "
+        text = (
+            f"{name} holds its last value {again} times, typically for {1e3 * typical:.3g} ms "
             f"({100.0 * of_all / len(recording):.2g} % of the log){most}: samples were lost on the "
-            "way and repeated",
+            "way and repeated"
         )
+        yield _found("held", name, typical, "s", 0.95, text)
     elif frozen:
-        yield Finding(
-            code="frozen",
-            channel=name,
-            size=length * dt,
-            unit="s",
-            confidence=0.95,
-            text=f"{name} does not change from {first:.4g} s on for {length * dt:.3g} s: "
-            "frozen; cut the log there",
-        )
+        yield _found("frozen", name, length * dt, "s", 0.95, _stopped(name, first, length * dt))
 
 
-def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
+def _zero(name: str, runs: _Runs, recording: Recording) -> Finding | None:
     """A channel that is exactly 0 for long, again and again, while the car turns.
 
     No sensor does that: an estimate does, which is switched off there.
@@ -272,20 +249,16 @@ def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
     speed = np.abs(recording.v_x)
     slowest, fastest = float(np.percentile(speed[~off], 5)), float(np.percentile(speed[off], 95))
     slow = f", where the car is slower than {slowest:.3g} m/s" if fastest <= slowest else ""
-    return Finding(
-        code="zero",
-        channel=name,
-        size=size,
-        unit="s",
-        confidence=0.95,
-        text=f"{name} reads exactly 0 {len(places)} times, for {size:.3g} s in all "
+    text = (
+        f"{name} reads exactly 0 {len(places)} times, for {size:.3g} s in all "
         f"({100.0 * float(np.mean(off)):.2g} % of the log), as from {recording.t[there.start]:.4g} "
         f"s on for {dt * (there.stop - there.start):.3g} s{slow}: an estimate that is switched off "
-        "there and no measurement; cut these segments out of the log",
+        "there and no measurement; cut these segments out of the log"
     )
+    return _found("zero", name, size, "s", 0.95, text)
 
 
-def _grain(signal: Array, runs: Runs) -> float | None:
+def _grain(signal: Array, runs: _Runs) -> float | None:
     """Return the step of which all values are multiples that a channel keeps for a while.
 
     None where there is none. Between them a channel that was brought to another clock has any
@@ -301,7 +274,7 @@ def _grain(signal: Array, runs: Runs) -> float | None:
     return step if float(np.mean(np.abs(count - np.round(count)) < 0.05)) > ON_GRID else None
 
 
-def _lost_on_the_way(signal: Array, runs: Runs, grain: float | None) -> NDArray[np.bool_]:
+def _lost_on_the_way(signal: Array, runs: _Runs, grain: float | None) -> NDArray[np.bool_]:
     """Return which runs of equal values may be lost samples: a rest of a rounded channel is none.
 
     A rest ends by one step of the rounding, or as the channel begins to move: by a step that others
@@ -379,9 +352,9 @@ def _noise(signal: Array) -> float:
     return float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0)) if together < _ALTERNATE else 0.0
 
 
-def _runs(signal: Array) -> Runs:
+def _runs(signal: Array) -> _Runs:
     starts = np.flatnonzero(np.concatenate([[True], np.diff(signal) != 0.0]))
-    return Runs(starts, np.diff(np.append(starts, signal.size)))
+    return _Runs(starts, np.diff(np.append(starts, signal.size)))
 
 
 def _quantum(signal: Array) -> float | None:
@@ -402,7 +375,7 @@ def _quantum(signal: Array) -> float | None:
     return step if few and bool(np.mean(on_grid) > 0.99) else None
 
 
-def _stairs(runs: Runs, n: int, quantum: float | None) -> int | None:
+def _stairs(runs: _Runs, n: int, quantum: float | None) -> int | None:
     """Return how many samples each value of a slow channel lasts, None where it is not slow."""
     inner = runs.length[1:-1]
     if inner.size < 10:
@@ -496,31 +469,17 @@ _JUMP, _ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two chann
 def _clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
     """Return where the clock jumped, None where it did not."""
     moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
-    again = _logged_again(moving)
-    if again is not None:
-        at, back = again
-        size = -back * recording.dt
-        text = f"{-size:.3g} s before {recording.t[at]:.4g} s are logged twice"
-        return _jump(recording, at, size, 0.0, CERTAIN, text)
-    found = _torn(moving, recording.dt)
+    again, dt = _logged_again(moving), recording.dt
+    found = _torn(moving, dt) if again is None else (again[0], -again[1] * dt, 0.0)
     if found is None:
         return None
-    at, size, deviation = found
-    text = f"all channels jump at once at {recording.t[at]:.4g} s: time is missing or logged twice"
-    return _jump(recording, at, size, deviation, 0.95, text)
-
-
-def _jump(
-    recording: Recording, at: int, size: float, deviation: float, confidence: float, text: str
-) -> Finding:
-    return Finding(
-        code="clock",
-        size=size,
-        deviation=deviation,
-        unit="s",
-        confidence=confidence,
-        text=f"the clock jumps: {text}; cut the log into runs there ({recording.t[at]:.4g} s)",
-    )
+    (at, size, deviation), confidence = found, 0.95 if again is None else CERTAIN
+    there = f"{recording.t[at]:.4g} s"
+    text = f"all channels jump at once at {there}: time is missing or logged twice"
+    if again is not None:
+        text = f"{-size:.3g} s before {there} are logged twice"
+    text = f"the clock jumps: {text}; cut the log into runs there ({there})"
+    return replace(_found("clock", "", size, "s", confidence, text), deviation=deviation)
 
 
 def _logged_again(moving: Mapping[str, Array]) -> tuple[int, int] | None:

@@ -1,4 +1,4 @@
-"""What is grossly wrong with a log or with its car, to be seen before anything is estimated.
+"""What is grossly wrong with a log or with its car, found before anything is estimated.
 
 First the samples themselves, then whether there is anything to learn from, then units, signs and
 the car: by that reading of the log which leaves least unexplained.
@@ -28,7 +28,7 @@ SURE = 0.95
 _SEVERAL = 3  # changes at once, beyond which nothing is sure
 WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
 NEAR = math.log(1.15)  # of a factor to that of a unit
-_PERFECT = 0.999
+_PERFECT = 0.999  # of a drive, from which a channel that does not change is no measurement
 _OFTEN = 0.1  # of a drive, from which a channel that reads exactly 0 so long is no measurement
 SLOW = 1.0  # s between samples, from which a clock is in ms
 
@@ -55,31 +55,22 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     clock = clock_findings(recording)
     if clock:
         return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
-    samples = sample_findings(recording)
-    given = unlike(vehicle)
-    missing = [
-        one.channel
-        for one in samples
-        if one.code == "copied"
-        or (one.code == "frozen" and _lasts(one, recording, _PERFECT))
-        or (one.code == "zero" and _lasts(one, recording, _OFTEN))
-    ]
-    if missing:
-        return Screened(
-            findings=(*samples, *given),
-            repair=Repair(),
-            blind=f"{' and '.join(missing)} was not measured",
-        )
-    quiet = _quiet_finding(recording)
+    samples, given = sample_findings(recording), _unlike(vehicle)
+    driven = sum(one.duration for one in driven_pieces(recording))
+    lasts = {"copied": -math.inf, "frozen": _PERFECT * driven, "zero": _OFTEN * driven}
+    missing = [one.channel for one in samples if one.size >= lasts.get(one.code, math.inf)]
+    blind = f"{' and '.join(missing)} was not measured" if missing else ""
+    quiet = None if missing else _quiet_finding(recording)
     if quiet is not None:
-        return Screened(
-            findings=(quiet, *samples, *given), repair=Repair(), blind="the car hardly corners"
-        )
-    mended, _ = before_sizes(samples).apply(recording, vehicle)
-    motion = Motion.of(mended)
+        samples, blind = [quiet, *samples], "the car hardly corners"
+    mended, motion = recording, None
+    if not blind:
+        mended, _ = before_sizes(samples).apply(recording, vehicle)
+        motion = Motion.of(mended)
     if motion is None:
-        return Screened(findings=(*samples, *given), repair=Repair(), blind="too little is driven")
-    some = looked_at(mended)[0]
+        blind = blind or "too little is driven"
+        return Screened(findings=(*samples, *given), repair=Repair(), blind=blind)
+    some, hidden = looked_at(mended)[0], sorted(motion.hidden)
 
     def possible(changes: tuple[Change, ...]) -> bool:
         try:
@@ -97,7 +88,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             blind="the car is another one" if other else "",
             unobservable=tuple(
                 f"unit of {name}: its signal hardly exceeds its noise on this drive"
-                for name in sorted(motion.hidden)
+                for name in hidden
             ),
             without=None if found.without is None else screened(found.without),
         )
@@ -106,12 +97,14 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
 
 
 def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
-    """Return what the best reading says is grossly wrong."""
+    """Return what the best reading says is grossly wrong; a reading is judged as a whole."""
     gross = [
-        one for change in found.best.gross for one in _reading_findings(change, found, vehicle)
+        _reading_finding(part, found, vehicle)
+        for change in found.best.gross
+        for part in (change.parts if change.code == "unit" else (change,))
     ]
     gross = _one_steering(gross)
-    return doubted(gross, gross)  # a reading is judged as a whole
+    return doubted(gross, gross)
 
 
 def _repair_of(changes: tuple[Change, ...]) -> Repair:
@@ -121,11 +114,7 @@ def _repair_of(changes: tuple[Change, ...]) -> Repair:
         if change.code == ARM:
             repair = repair.merged(Repair(velocity_sensor_x=change.arm))
         elif change.channels:
-            factors = {
-                name: factor
-                for name, (_, factor) in zip(change.channels, change.factors, strict=True)
-            }
-            repair = repair.merged(Repair(factor=factors, sideslip=change.sideslip))
+            repair = repair.merged(Repair(factor=change.by_channel, sideslip=change.sideslip))
     return repair
 
 
@@ -151,11 +140,6 @@ def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Findin
     """
     firm = all(one.sure for one in earlier if one.repair is not None)
     return [replace(one, sure=one.sure and firm) for one in later]
-
-
-def _lasts(finding: Finding, recording: Recording, share: float) -> bool:
-    """Whether a channel stands still in a share of all that is driven."""
-    return finding.size >= share * sum(one.duration for one in driven_pieces(recording))
 
 
 def _quiet_finding(recording: Recording) -> Finding | None:
@@ -193,7 +177,7 @@ def clock_findings(recording: Recording) -> tuple[Finding, ...]:
     )
 
 
-def unlike(vehicle: Vehicle) -> list[Finding]:
+def _unlike(vehicle: Vehicle) -> list[Finding]:
     """Return a yaw inertia that no car of that mass and those lengths has."""
     similar, (least, most) = similar_inertia(vehicle), usual_inertia(vehicle)
     ratio, origin = vehicle.yaw_inertia / similar, vehicle.origin("yaw_inertia")
@@ -209,16 +193,6 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
             repair=Repair(vehicle={"yaw_inertia": similar}),
         )
     ]
-
-
-def _reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
-    if change.code != "unit" or len(change.channels) == 1:
-        return [_reading_finding(change, found, vehicle)]
-    parts = [
-        replace(change, channels=(name,), factors=(factor,))
-        for name, factor in zip(change.channels, change.factors, strict=True)
-    ]
-    return [_reading_finding(part, found, vehicle) for part in parts]
 
 
 def _one_steering(gross: list[Finding]) -> list[Finding]:
@@ -237,7 +211,7 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
         confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
     factors = dict(change.factors)
     names = " and ".join(change.channels)
-    doubt = "" if confidence > SURE else f"; or {words(found.other.changes)}"
+    doubt = "" if confidence > SURE else f"; or {_words(found.other.changes)}"
     if change.code == "other_car":
         size = factors["size"]
         return Finding(
@@ -264,14 +238,11 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     if change.channels == ("delta_f",):
         return steering_finding(factor, confidence, doubt)
     if change.code == "sideslip":
-        repair = Repair(factor={"v_y": factor}, sideslip=True)
         text = f"v_y is the sideslip angle in {change.unit}: take v_x tan of it{doubt}"
     elif change.code == "sign":
-        repair = Repair(factor=dict.fromkeys(change.channels, -1.0))
         verb = "has" if len(change.channels) == 1 else "have"
         text = f"{names} {verb} the wrong sign against the other channels: turn it{doubt}"
     else:
-        repair = Repair(factor=dict.fromkeys(change.channels, factor))
         unit = "deg/s" if change.unit == "deg" and change.channels == ("r",) else change.unit
         text = f"{names} is in {unit}{doubt}"
     return Finding(
@@ -280,7 +251,7 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
         size=1.0 / factor,
         confidence=confidence,
         text=text,
-        repair=repair,
+        repair=_repair_of((change,)),
         sure=confidence > SURE,
     )
 
@@ -328,24 +299,18 @@ def steering_finding(
     )
 
 
-def words(changes: tuple[Change, ...]) -> str:
+def _words(changes: tuple[Change, ...]) -> str:
     """Return changes in words.   changes : of a reading; none is a log that is right."""
     said = []
     for change in changes:
         names = " and ".join(change.channels)
-        match change.code:
-            case "sign":
-                said.append(f"{names} turned")
-            case "velocity_sensor_x":
-                said.append(f"a velocity sensor {change.arm:.2g} m ahead")
-            case "sideslip":
-                said.append(f"the sideslip angle in {change.unit} as v_y")
-            case "steering":
-                said.append("another steering angle")
-            case "other_car":
-                said.append("another car")
-            case "yaw_inertia":
-                said.append("another yaw inertia")
-            case _:
-                said.append(f"{names} in {change.unit}")
+        known = {
+            "sign": f"{names} turned",
+            ARM: f"a velocity sensor {change.arm:.2g} m ahead",
+            "sideslip": f"the sideslip angle in {change.unit} as v_y",
+            "steering": "another steering angle",
+            "other_car": "another car",
+            "yaw_inertia": "another yaw inertia",
+        }
+        said.append(known.get(change.code, f"{names} in {change.unit}"))
     return " with ".join(said) or "nothing of the kind"

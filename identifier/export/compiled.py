@@ -44,7 +44,7 @@ class PackageFileError(TireidError, ValueError):
     """A folder does not hold a package."""
 
 
-class ShippedRun(NamedTuple):
+class _ShippedRun(NamedTuple):
     """A recording through the package: axle_force (n, 2) [N], every output by name, status (n,)."""
 
     axle_force: Array
@@ -156,7 +156,7 @@ class CompiledPackage:
         run = self.run_samples(np.array([sample[: len(self.inputs)]]))
         return Status(int(run.status[0])), run.axle_force[0]
 
-    def run(self, recording: Recording) -> ShippedRun:
+    def run(self, recording: Recording) -> _ShippedRun:
         """Run a whole recording, from the state that the instance is in.
 
         Between segments of it samples are missing, as they are on a car.
@@ -171,9 +171,9 @@ class CompiledPackage:
         samples[resting] = np.nan
         ran = self.run_samples(samples)
         outputs = {name: values[at] for name, values in ran.outputs.items()}
-        return ShippedRun(ran.axle_force[at], outputs, ran.status[at])
+        return _ShippedRun(ran.axle_force[at], outputs, ran.status[at])
 
-    def run_samples(self, samples: Array) -> ShippedRun:
+    def run_samples(self, samples: Array) -> _ShippedRun:
         """Run samples, from the state that the instance is in.
         samples : (n, k): v_x, v_y, r, delta_f, delta_r and, where it is one of `inputs`, a_y, SI.
         """
@@ -187,7 +187,7 @@ class CompiledPackage:
         self._call("instance_run")(self._instance, ctypes.c_long(len(rows)), *pointers)
         ends = np.cumsum(list(self._outputs.values()))[:-1]
         outputs = dict(zip(self._outputs, np.split(given, ends, axis=1), strict=True))
-        return ShippedRun(outputs["axle_force"], outputs, status)
+        return _ShippedRun(outputs["axle_force"], outputs, status)
 
     @property
     def weights(self) -> dict[str, Array]:

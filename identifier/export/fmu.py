@@ -31,10 +31,10 @@ log = logging.getLogger("tireid.export")
 
 MINGW = "x86_64-w64-mingw32-gcc"
 # As elsewhere: no contraction, the same bits on every machine; guards against NaN stay.
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden")
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden")
 
 
-class Target(NamedTuple):
+class _Target(NamedTuple):
     """A platform: its folder in FMI 2.0 and 3.0, ending of a library, and how it is built."""
 
     folder_2: str
@@ -44,26 +44,26 @@ class Target(NamedTuple):
     flags: tuple[str, ...]
 
 
-def targets() -> tuple[Target, ...]:
+def targets() -> tuple[_Target, ...]:
     """Return the platforms that can be built for here; none where there is no compiler."""
     found = []
     compiler = find_compiler()
     if compiler and (platform.system(), platform.machine()) == ("Linux", "x86_64"):
         found.append(
-            Target("linux64", "x86_64-linux", ".so", compiler, ("-fPIC", "-shared", "-lm"))
+            _Target("linux64", "x86_64-linux", ".so", compiler, ("-fPIC", "-shared", "-lm"))
         )
     mingw = shutil.which(MINGW)
     if mingw:
         flags = ("-shared", "-static-libgcc", "-Wl,--no-insert-timestamp", "-s")
-        found.append(Target("win64", "x86_64-windows", ".dll", (mingw,), flags))
+        found.append(_Target("win64", "x86_64-windows", ".dll", (mingw,), flags))
     return tuple(found)
 
 
-Files = tuple[tuple[str, bytes], ...]  # content by name
+_Files = tuple[tuple[str, bytes], ...]  # content by name
 
 
-def build_binary(
-    target: Target, name: str, model: Mapping[str, bytes], around: Mapping[str, bytes]
+def _build_binary(
+    target: _Target, name: str, model: Mapping[str, bytes], around: Mapping[str, bytes]
 ) -> bytes:
     """Compile sources to a shared library and return its content.
     model : content by name of C files and headers that need no other: compiled once for both
@@ -79,7 +79,7 @@ def build_binary(
 
 
 @lru_cache(maxsize=4)
-def _objects(target: Target, model: Files) -> Files:
+def _objects(target: _Target, model: _Files) -> _Files:
     with _folder_of(dict(model)) as folder:
         sources = _c_files(dict(model))
         _compile(target, ["-c", *sources], folder)
@@ -100,8 +100,8 @@ def _folder_of(files: Mapping[str, bytes]) -> Iterator[Path]:
         yield Path(scratch)
 
 
-def _compile(target: Target, words: Sequence[str], folder: Path) -> None:
-    command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *words, *target.flags]
+def _compile(target: _Target, words: Sequence[str], folder: Path) -> None:
+    command = [*target.compiler, *KEEP_GUARDS, *_FLAGS, *words, *target.flags]
     answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if answer.returncode != 0:
         first_lines = "\n".join(answer.stderr.splitlines()[:5])
@@ -124,136 +124,106 @@ def token_header(token: str, version: int) -> str:
     return header(TOKEN, "Generated.", [f'#define MODEL_TOKEN "{token}"\n', standard])
 
 
-def model_files(specialized: SpecializedStep) -> dict[str, str]:
-    """Return header and sources of the C package by file name."""
-    about = summary(specialized, ingredients(specialized, single=False))
-    sources = c_sources(specialized, single=False, about=about)
-    return {PurePosixPath(path).name: text for path, text in sources.items()}
-
-
 # The variables of the FMU, the same in FMI 2.0 and 3.0.
 #
 # Value references and states are those of sources/memory.h.
 
 # What a unit is made of in SI, as attributes of BaseUnit; a radian counts as one of its own.
-UNITS: Mapping[str, Mapping[str, int]] = {
+_UNITS: Mapping[str, Mapping[str, int]] = {
     "s": {"s": 1}, "m/s": {"m": 1, "s": -1}, "rad": {"rad": 1}, "rad/s": {"rad": 1, "s": -1},
     "m/s^2": {"m": 1, "s": -2}, "N": {"kg": 1, "m": 1, "s": -2},
 }  # fmt: skip
-INPUT_REFERENCES = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
-DEGREES = 57.29577951308232  # of a radian: display units of angles
+_INPUTS = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
+_SIDE_SLIP: Mapping[str, tuple[int, str]] = {  # v_y is the name of an input already
+    "v_y": (14, "v_y_estimate"),
+    "v_y_sd": (15, "v_y_sd"),
+    "side_slip_observable": (16, "side_slip_observable"),
+}
+_DEGREES = 57.29577951308232  # of a radian: display units of angles
 
-Kind = Literal["real", "integer", "boolean"]
-Causality = Literal["input", "output", "parameter", "local"]
 
-
-class Variable(NamedTuple):
+class _Variable(NamedTuple):
     """One variable of modelDescription.xml.
     reference : value reference.   start : as text, empty where it is calculated.
     """
 
     reference: int
     name: str
-    kind: Kind
-    causality: Causality
-    variability: Literal["continuous", "discrete", "tunable", "constant"]
-    start: str
-    unit: str
     description: str
+    unit: str = ""
+    kind: Literal["real", "integer", "boolean"] = "real"
+    causality: Literal["input", "output", "parameter", "local"] = "output"
+    variability: Literal["continuous", "discrete", "tunable", "constant"] = "discrete"
+    start: str = ""
+
+    @property
+    def about(self) -> dict[str, object]:
+        """What the standard wants to be said; of the initial value of an input, nothing."""
+        initial = "exact" if self.start else "calculated"
+        return {
+            "name": self.name,
+            "valueReference": self.reference,
+            "description": self.description,
+            "causality": self.causality,
+            "variability": self.variability,
+            "initial": "" if self.causality == "input" else initial,
+        }
 
 
-def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
+def _variables(step: SpecializedStep) -> tuple[_Variable, ...]:
     """Return the variables of a step; an input that may be missing is NaN until it is set."""
-    absent = ("a_y", *["v_y"] * specialized.tells_v_y)
-    inputs = (
-        Variable(
-            INPUT_REFERENCES[port.name],
-            port.name,
-            "real",
-            "input",
-            "continuous",
-            "NaN" if port.name in absent else "0",
-            port.unit,
-            port.description,
-        )
-        for port in specialized.inputs
-    )
+    absent = ("a_y", *["v_y"] * step.tells_v_y)
     side = "left positive, frame of the body"
-    learnt = ", ".join(specialized.learnt) or "nothing: this method has no memory of the tire"
-    return (
-        *inputs,
-        _output(6, "F_yf", "real", "N", f"lateral force of the front axle, {side}"),
-        _output(7, "F_yr", "real", "N", f"lateral force of the rear axle, {side}"),
-        _output(
+    learnt = ", ".join(step.learnt) or "nothing: this method has no memory of the tire"
+    every = "sampling interval, inside and fixed"
+    below = "below it forces are zero, learning rests"
+    dt, slow = repr(float(step.dt)), repr(float(step.min_speed))
+    found = [
+        _Variable(
+            _INPUTS[port.name], port.name, port.description, port.unit, "real", "input",
+            "continuous", "NaN" if port.name in absent else "0",
+        )
+        for port in step.inputs
+    ]  # fmt: skip
+    found += [
+        _Variable(6, "F_yf", f"lateral force of the front axle, {side}", "N"),
+        _Variable(7, "F_yr", f"lateral force of the rear axle, {side}", "N"),
+        _Variable(
             8,
             "status",
-            "integer",
-            "",
             "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is "
             "one that no car can be in, ignored; 3 an input or 4 a result is not finite or "
             "beyond what any car does, the weights stay; 6 that for half a second or more, "
             "forces are zero",
+            kind="integer",
         ),
-        _output(9, "samples", "integer", "", "number of samples taken, those ignored included"),
-        Variable(
-            10,
-            "adaptation",
-            "boolean",
-            "parameter",
-            "tunable",
-            "true",
-            "",
-            f"whether it adapts; false freezes {learnt}",
+        _Variable(9, "samples", "number of samples taken, those ignored included", kind="integer"),
+        _Variable(
+            10, "adaptation", f"whether it adapts; false freezes {learnt}", "", "boolean",
+            "parameter", "tunable", "true",
         ),
-        _constant(11, "sample_time", "s", specialized.dt, "sampling interval, inside and fixed"),
-        _constant(
-            12, "min_speed", "m/s", specialized.min_speed,
-            "below it forces are zero, learning rests",
-        ),
-        *_side_slip(specialized),
-        *_band(specialized),
-    )  # fmt: skip
-
-
-def _side_slip(specialized: SpecializedStep) -> Iterator[Variable]:
-    """Yield what the step tells of v_y, which is the name of an input already."""
-    names: Mapping[str, tuple[int, str, Kind]] = {
-        "v_y": (14, "v_y_estimate", "real"),
-        "v_y_sd": (15, "v_y_sd", "real"),
-        "side_slip_observable": (16, "side_slip_observable", "boolean"),
-    }
-    ports = {port.name: port for port in specialized.outputs}
-    for name in specialized.side_slip:
-        reference, shown, kind = names[name]
-        unit = ports[name].unit if kind == "real" else ""
-        yield _output(reference, shown, kind, unit, ports[name].description)
-
-
-def _band(specialized: SpecializedStep) -> Iterator[Variable]:
-    """Yield half the width of the band of either axle, where the step tells it."""
-    if specialized.tells_band:
-        for reference, axle, letter in ((17, "front", "f"), (18, "rear", "r")):
+        _Variable(11, "sample_time", every, "s", "real", "local", "constant", dt),
+        _Variable(12, "min_speed", below, "m/s", "real", "local", "constant", slow),
+    ]  # fmt: skip
+    ports = {port.name: port for port in step.outputs}
+    for name in step.side_slip:
+        (reference, shown), port = _SIDE_SLIP[name], ports[name]
+        if name == "side_slip_observable":
+            found.append(_Variable(reference, shown, port.description, kind="boolean"))
+        else:
+            found.append(_Variable(reference, shown, port.description, port.unit))
+    for reference, axle, letter in ((17, "front", "f"), (18, "rear", "r")):
+        if step.tells_band:
             words = f"half the width of the 90 % band around F_y{letter} of the {axle} axle"
-            name = f"F_y{letter}_half_band"
-            yield _output(reference, name, "real", "N", f"{words}; 0 where forces read zero")
-
-
-def _output(reference: int, name: str, kind: Kind, unit: str, description: str) -> Variable:
-    return Variable(reference, name, kind, "output", "discrete", "", unit, description)
-
-
-def _constant(reference: int, name: str, unit: str, value: float, description: str) -> Variable:
-    return Variable(
-        reference, name, "real", "local", "constant", repr(float(value)), unit, description
-    )
+            words += "; 0 where forces read zero"
+            found.append(_Variable(reference, f"F_y{letter}_half_band", words, "N"))
+    return tuple(found)
 
 
 # XML: elements with attributes in the order in which they are given.
 
-DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
-
-def element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
+def _element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
     """Return an element; attributes that are empty strings are left out.
     attributes : by name; True and False become true and false.
     """
@@ -263,10 +233,10 @@ def element(tag: str, attributes: Mapping[str, object], *children: Element) -> E
     return made
 
 
-def document(root: Element) -> str:
+def _document(root: Element) -> str:
     """Return a whole XML file, indented."""
     indent(root)
-    return f"{DECLARATION}{tostring(root, encoding='unicode')}\n"
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
 
 def _text(value: object) -> str:
@@ -275,154 +245,96 @@ def _text(value: object) -> str:
 
 # modelDescription.xml of FMI 2.0 and 3.0, and the list of sources for whoever builds it again.
 
-TOOL = "tireid"
-
-
-def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
-    table = variables(specialized)
-    unknowns = [
-        element("Unknown", {"index": i})
-        for i, variable in enumerate(table, start=1)
-        if variable.causality == "output"
-    ]
-    simulation = element(
-        "CoSimulation",
-        {
-            "modelIdentifier": specialized.name,
-            "canHandleVariableCommunicationStepSize": True,
-            "canNotUseMemoryManagementFunctions": True,
-            "canGetAndSetFMUstate": True,
-            "canSerializeFMUstate": True,
-        },
-        element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
-    )
-    structure = element("Outputs", {}, *unknowns), element("InitialUnknowns", {}, *unknowns)
-    listed = map(_variable_2, table)
-    return _description(specialized, ("2.0", "guid", token), simulation, listed, structure)
-
-
-def description_3(specialized: SpecializedStep, token: str) -> str:
-    table = variables(specialized)
-    outputs = [variable for variable in table if variable.causality == "output"]
-    time = element(
-        "Float64",
-        {"name": "time", "valueReference": 0, "causality": "independent", "unit": "s"}
-        | {"variability": "continuous", "description": "simulation time"},
-    )
-    simulation = element(
-        "CoSimulation",
-        {
-            "modelIdentifier": specialized.name,
-            "canGetAndSetFMUState": True,
-            "canSerializeFMUState": True,
-            "canHandleVariableCommunicationStepSize": True,
-        },
-    )
-    structure = [
-        element(tag, {"valueReference": variable.reference})
-        for tag in ("Output", "InitialUnknown")
-        for variable in outputs
-    ]
-    said, listed = ("3.0", "instantiationToken", token), [time, *map(_variable_3, table)]
-    return _description(specialized, said, simulation, listed, structure)
-
 
 def _description(
-    specialized: SpecializedStep,
-    said: tuple[str, str, str],
-    simulation: Element,
-    listed: Iterable[Element],
-    structure: Iterable[Element],
+    step: SpecializedStep, version: "Version", token: str, sources: Sequence[str]
 ) -> str:
     """Return modelDescription.xml."""
-    version, key, token = said
-    table = variables(specialized)
+    table = _variables(step)
+    outputs = [(i, one) for i, one in enumerate(table, start=1) if one.causality == "output"]
+    simulation = {"modelIdentifier": step.name}
+    if version == 2:
+        key, can, listed = "guid", _CAN_2, list(map(_variable_2, table))
+        names = (_element("File", {"name": name}) for name in sources)
+        files = [_element("SourceFiles", {}, *names)]
+        known = [_element("Unknown", {"index": i}) for i, _ in outputs]
+        structure = [_element(tag, {}, *known) for tag in ("Outputs", "InitialUnknowns")]
+    else:
+        time = {"name": "time", "valueReference": 0, "causality": "independent", "unit": "s"}
+        time |= {"variability": "continuous", "description": "simulation time"}
+        listed = [_element("Float64", time), *map(_variable_3, table)]
+        key, can, files = "instantiationToken", _CAN_3, []
+        structure = [
+            _element(tag, {"valueReference": one.reference})
+            for tag in ("Output", "InitialUnknown")
+            for _, one in outputs
+        ]
     about = {
-        "fmiVersion": version,
-        "modelName": specialized.name,
+        "fmiVersion": f"{version}.0",
+        "modelName": step.name,
         key: token,
-        "description": _sentence(specialized),
-        "generationTool": TOOL,
+        "description": f"Lateral tire forces of a car, identified while it drives, every "
+        f"{step.dt:g} s. Outputs are those of the last sample; slip angles inside have the sign in "
+        "which F_y = +C alpha.",
+        "generationTool": "tireid",
         "variableNamingConvention": "flat",
     }
-    experiment = {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
-    model = element(
+    experiment = {"startTime": 0.0, "stopTime": 10.0, "stepSize": step.dt}
+    model = _element(
         "fmiModelDescription",
         about,
-        simulation,
+        _element("CoSimulation", simulation | dict.fromkeys(can, True), *files),
         _units(table),
-        element("DefaultExperiment", experiment),
-        element("ModelVariables", {}, *listed),
-        element("ModelStructure", {}, *structure),
+        _element("DefaultExperiment", experiment),
+        _element("ModelVariables", {}, *listed),
+        _element("ModelStructure", {}, *structure),
     )
-    return document(model)
+    return _document(model)
 
 
-def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
+_CAN_2: tuple[str, ...] = (
+    "canHandleVariableCommunicationStepSize",
+    "canNotUseMemoryManagementFunctions",
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+)
+_CAN_3: tuple[str, ...] = (
+    "canGetAndSetFMUState",
+    "canSerializeFMUState",
+    "canHandleVariableCommunicationStepSize",
+)
+
+
+def _build_description(name: str, sources: Sequence[str]) -> str:
     """Return sources/buildDescription.xml of FMI 3.0."""
-    files = (element("SourceFile", {"name": name}) for name in sources)
-    build = element(
-        "fmiBuildDescription",
-        {"fmiVersion": "3.0"},
-        element(
-            "BuildConfiguration",
-            {"modelIdentifier": specialized.name},
-            element("SourceFileSet", {"language": "C99"}, *files),
-        ),
-    )
-    return document(build)
+    files = (_element("SourceFile", {"name": name}) for name in sources)
+    listed = _element("SourceFileSet", {"language": "C99"}, *files)
+    configuration = _element("BuildConfiguration", {"modelIdentifier": name}, listed)
+    return _document(_element("fmiBuildDescription", {"fmiVersion": "3.0"}, configuration))
 
 
-def _sentence(specialized: SpecializedStep) -> str:
-    return (
-        f"Lateral tire forces of a car, identified while it drives, every {specialized.dt:g} s. "
-        "Outputs are those of the last sample; slip angles inside have the sign in which "
-        "F_y = +C alpha."
-    )
-
-
-def _units(table: Sequence[Variable]) -> Element:
+def _units(table: Sequence[_Variable]) -> Element:
     used = {variable.unit for variable in table}
-    angle = {"rad": ("deg", DEGREES), "rad/s": ("deg/s", DEGREES)}
+    angle = {"rad": ("deg", _DEGREES), "rad/s": ("deg/s", _DEGREES)}
     units = []
-    for name, base in UNITS.items():
-        if name not in used:
-            continue
-        children = [element("BaseUnit", dict(base))]
+    for name in filter(used.__contains__, _UNITS):
+        children = [_element("BaseUnit", dict(_UNITS[name]))]
         if name in angle:
             shown, factor = angle[name]
-            children.append(element("DisplayUnit", {"name": shown, "factor": factor}))
-        units.append(element("Unit", {"name": name}, *children))
-    return element("UnitDefinitions", {}, *units)
+            children.append(_element("DisplayUnit", {"name": shown, "factor": factor}))
+        units.append(_element("Unit", {"name": name}, *children))
+    return _element("UnitDefinitions", {}, *units)
 
 
-def _about(variable: Variable) -> dict[str, object]:
-    return {
-        "name": variable.name,
-        "valueReference": variable.reference,
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-        "initial": _initial(variable),
-    }
-
-
-def _variable_2(variable: Variable) -> Element:
+def _variable_2(variable: _Variable) -> Element:
     tag = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}[variable.kind]
-    kind = element(tag, {"unit": variable.unit, "start": variable.start})
-    return element("ScalarVariable", _about(variable), kind)
+    kind = _element(tag, {"unit": variable.unit, "start": variable.start})
+    return _element("ScalarVariable", variable.about, kind)
 
 
-def _variable_3(variable: Variable) -> Element:
+def _variable_3(variable: _Variable) -> Element:
     tag = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}[variable.kind]
-    return element(tag, {**_about(variable), "unit": variable.unit, "start": variable.start})
-
-
-def _initial(variable: Variable) -> str:
-    """Return what the standard wants to be said of an initial value; of an input, nothing."""
-    if variable.causality == "input":
-        return ""
-    return "exact" if variable.start else "calculated"
+    return _element(tag, {**variable.about, "unit": variable.unit, "start": variable.start})
 
 
 Version = Literal[2, 3]
@@ -461,13 +373,15 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     for target in built:
         folder = target.folder_2 if version == 2 else target.folder_3
         library = f"binaries/{folder}/{specialized.name}{target.ending}"
-        members[library] = build_binary(target, specialized.name, model, around)
+        members[library] = _build_binary(target, specialized.name, model, around)
     write_atomically(path, _archive(members))
 
 
 def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
     """Return the text files of an FMU by their path inside it.   version : of FMI, 2 or 3."""
-    shared = model_files(specialized)
+    about = summary(specialized, ingredients(specialized, single=False))
+    sources = c_sources(specialized, single=False, about=about)
+    shared = {PurePosixPath(path).name: text for path, text in sources.items()}
     blank = _text_with(specialized, shared, version, "")
     content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))
     return _text_with(specialized, shared, version, _token(content))
@@ -481,11 +395,9 @@ def _text_with(
     text |= {**shared, TOKEN: token_header(token, version)}
     sources = sorted(name for name in text if name.endswith(".c"))
     members = {f"sources/{name}": content for name, content in text.items()}
-    if version == 2:
-        members["modelDescription.xml"] = description_2(specialized, token, sources)
-    else:
-        members["modelDescription.xml"] = description_3(specialized, token)
-        members["sources/buildDescription.xml"] = build_description(specialized, sources)
+    members["modelDescription.xml"] = _description(specialized, version, token, sources)
+    if version == 3:
+        members["sources/buildDescription.xml"] = _build_description(specialized.name, sources)
     return members
 
 

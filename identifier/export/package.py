@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
@@ -146,7 +145,7 @@ SAMPLES = 240
 REST = 10  # samples at rest, and some as long in between
 
 
-class Vectors(NamedTuple):
+class _Vectors(NamedTuple):
     """Samples (n, k) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
 
     samples: Array
@@ -186,24 +185,16 @@ def run_in_virtual_machine(
     samples : (n, k) in the order of the inputs.
     """
     limits, method = specialized.limits, specialized.method
-    function, n = specialized.function, len(specialized.carry)
-    in_place = _InPlace(function)
-    arguments, results = in_place.arguments, in_place.results
-    for array, value in zip(arguments, specialized.carry.values(), strict=False):
-        array[:] = np.ravel(value, order="F")
-    x, delta, *scalars = arguments[n:]
+    state = [np.asarray(value) for value in specialized.carry.values()]
     now, missed, started = np.zeros(sum(port.size for port in specialized.outputs)), 0, False
     table = []
 
     def step(sample: Array) -> Array:
         v_x, v_y, r, delta_f, delta_r, *a_y = sample
-        x[:], delta[:] = (limits.possible(v_y), r), (delta_f, delta_r)
-        for array, value in zip(scalars, (v_x, *a_y), strict=True):
-            array[:] = value
-        in_place.compute()
-        for carried, following in zip(arguments, results[:n], strict=False):
-            carried[:] = following
-        return np.concatenate(results[n:])
+        x, delta = (limits.possible(v_y), r), (delta_f, delta_r)
+        results = [np.array(one) for one in specialized.function(*state, x, delta, v_x, *a_y)]
+        state[:], outputs = results[: len(state)], results[len(state) :]
+        return np.concatenate([one.ravel(order="F") for one in outputs])
 
     absent = np.array([port == ACCELERATION for port in specialized.inputs])
     nowhere = np.where(absent, np.nan, 0.0)
@@ -223,33 +214,17 @@ def run_in_virtual_machine(
             if missed >= stale_samples(STALE_TIME, specialized.dt):
                 now = np.zeros_like(now)
         table.append(now)
-    last = [array.reshape(function.size_in(i), order="F") for i, array in enumerate(arguments[:n])]
-    return np.array(table), dict(zip(specialized.carry, last, strict=True))
+    return np.array(table), dict(zip(specialized.carry, state, strict=True))
 
 
-class _InPlace:
-    """A dense function whose `results` are computed of its `arguments`, flat arrays by columns."""
-
-    def __init__(self, function: ca.Function) -> None:
-        buffers: Any  # typed as in C, where memory does not know its size
-        buffers, self.compute = function.buffer()
-        self.arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
-        self.results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        for i, array in enumerate(self.arguments):
-            buffers.set_arg(i, array.data)
-        for i, array in enumerate(self.results):
-            buffers.set_res(i, array.data)
-        self._buffers = buffers  # which nothing else keeps
-
-
-def vectors(specialized: SpecializedStep) -> Vectors:
+def vectors(specialized: SpecializedStep) -> _Vectors:
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
-    return Vectors(samples, outputs[:, :2])
+    return _Vectors(samples, outputs[:, :2])
 
 
-def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
-    double, single = tolerances(specialized)
+def vectors_header(specialized: SpecializedStep, found: _Vectors) -> str:
+    double, single = _tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     names = ", ".join(port.name for port in specialized.inputs)
     size = len(specialized.inputs)
@@ -312,7 +287,7 @@ def _programs(specialized: SpecializedStep) -> dict[str, str]:
     }
 
 
-def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
+def _tolerances(specialized: SpecializedStep) -> tuple[str, str]:
     """Return the largest difference of a force that the self-test allows [N], double and float."""
     force = specialized.limits.force
     return f"{TOLERANCE_DOUBLE * force:.2g}", f"{TOLERANCE_SINGLE * force:.2g}"
@@ -325,7 +300,7 @@ def readme(package: Package, about_figures: str) -> str:
         f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n" for m in state
     )
     modes = _modes(specialized)
-    double, single = tolerances(specialized)
+    double, single = _tolerances(specialized)
     equations = package.files[f"src/{specialized.name}_equations.c"]
     called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(

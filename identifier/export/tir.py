@@ -24,7 +24,7 @@ MOST_MISSED = 0.1  # of the peak: past that a curve is no Magic Formula
 PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
 
 
-class MagicCurve(NamedTuple):
+class _MagicCurve(NamedTuple):
     """The Magic Formula nearest to the curve of an axle.
 
     numbers : K [axle loads/rad], μ, C, E (4,).   sd : of them (4,).   reach : slip up to which it
@@ -37,7 +37,7 @@ class MagicCurve(NamedTuple):
     missed: float
 
 
-def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> MagicCurve:
+def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> _MagicCurve:
     """Return the Magic Formula nearest to the curve of an axle; refuse one beyond `MOST_MISSED`."""
     i, known = AXLES.index(axle), model.known_slip
     reach = REACH if known is None else max(LEAST_REACH, float(known[i]))
@@ -69,7 +69,7 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
     steps = [step @ (one.force_at(slip)[:, i] / load - phi) for one in drawn]
     scale = np.array([*np.exp(z[:2]), 1.0, 1.0])
     sd = scale * np.std(steps, axis=0) if steps else np.zeros(4)
-    return MagicCurve(np.array([*scale[:2], *z[2:]]), sd, reach, missed)
+    return _MagicCurve(np.array([*scale[:2], *z[2:]]), sd, reach, missed)
 
 
 def formula(slip: Array, z: Array) -> Array:

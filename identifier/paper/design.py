@@ -19,16 +19,31 @@ from codegen import Scan
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from identifier.certificate import Certificate
-from identifier.driving import Driving, natural_driving
+from identifier.driving import SPEED_SPREAD, Driving, natural_driving
 from identifier.method import Method
 from identifier.paper.laws import INPUT_SOURCES, INTEGRATORS, LAWS, Gains, diagonal
-from identifier.paper.network import Network, NetworkModel, Weights, first_weights, natural_network
+from identifier.paper.network import (
+    Network,
+    NetworkModel,
+    Weights,
+    first_weights,
+    natural_network,
+    network_signals,
+)
 from identifier.paper.step import CARRY, GAINS, OVER, PORTS, Structure, build_step
 from identifier.setup import Port, Setup, in_force_unit
 from identifier.stability.certificate import certify
 from identifier.stability.gain_design import KEEPINGS, decay_rate, design_gains
 from identifier.stability.loop import direction_matrix
-from identifier.stability.operation import Operation, minimal_decay, operation, proven_bounds
+from identifier.stability.operation import (
+    Operation,
+    declared_signals,
+    disturbance,
+    estimated_input_feedback,
+    expected_residual,
+    minimal_decay,
+    proven_bounds,
+)
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
 from models.rules import require_within
@@ -175,7 +190,7 @@ class PaperIdentifier(Method):
         driving : how hard it is driven; None takes what it was designed for, else
             `natural_driving`.
         """
-        return operation(self, vehicle, driving or self.driving or natural_driving(vehicle))
+        return _operation(self, vehicle, driving or self.driving or natural_driving(vehicle))
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
         """Return what is proven of its gains."""
@@ -275,6 +290,66 @@ def _natural_force_unit(mass: float) -> float:
     return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
 
 
+# What the certificate of a design must know.
+
+
+def _largest_input(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> float:
+    """Bound on |x_bar| [-], noise of the sensors in it."""
+    signals, slow = declared_signals(vehicle, driving), (1.0 - SPEED_SPREAD) * driving.v_x
+    sideways = driving.noise_v_y + vehicle.wheelbase * driving.noise_r
+    speed = driving.noise_v_x * (signals["v_y"] + vehicle.wheelbase * signals["r"]) / slow
+    slip = driving.noise_delta + (sideways + speed) / (slow - driving.noise_v_x)
+    noise = {
+        "v_y": driving.noise_v_y, "r": driving.noise_r, "delta_f": driving.noise_delta,
+        "delta_r": driving.noise_delta, "v_x": driving.noise_v_x, "alpha_f": slip, "alpha_r": slip,
+    }  # fmt: skip
+    assert design.network.scale is not None
+    named = zip(design.network.inputs, design.network.scale, strict=True)
+    return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
+
+
+def _input_per_error(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> float:
+    """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
+    driving : how hard it is driven; the slowest speed counts.
+    """
+    slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x
+    x = ca.SX.sym("x", 2)
+    signals = network_signals(vehicle.bicycle, slowest, x, ca.SX.zeros(2))
+    x_bar = design.network.normalized_input(signals)
+    K = bicycle(vehicle.bicycle, slowest).K
+    per_error = ca.jacobian(x_bar, x) @ ca.DM(K) * design.force_unit
+    return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
+
+
+def _operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> Operation:
+    """Return what the certificate of a design needs.
+
+    The V layer is judged up to twice the smallest weights that hold the expected residual with
+    every unit saturated: units half open.
+    """
+    found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
+    expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
+    feedback = estimated_input_feedback(
+        m=vehicle.mass, I_z=vehicle.yaw_inertia, l_f=vehicle.l_f, l_r=vehicle.l_r,
+        stiffness_lost=(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear),
+        v_x=(1.0 - SPEED_SPREAD) * driving.v_x,
+    )  # fmt: skip
+    estimated = design.input_source == "estimated"
+    return Operation(
+        n_h=design.network.hidden,
+        dt=design.dt,
+        integrator=design.integrator,
+        bandwidth=driving.bandwidth,
+        disturbance=found,
+        needed_force=expected / design.force_unit,
+        x_bar_max=_largest_input(design, vehicle, driving),
+        V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
+        input_feedback=feedback if estimated else None,
+        input_per_error=_input_per_error(design, vehicle, driving) if estimated else 0.0,
+        W_large=2.0 * expected / design.force_unit / math.sqrt(design.network.hidden),
+    )
+
+
 # Gains by the margin of the learning loop: sizes follow from the car by similarity.
 
 PHASE_MARGIN = 60.0  # deg
@@ -300,8 +375,11 @@ def design_for(
     dt : sampling interval [s].
     """
     network = network or natural_network(vehicle)
+    placeholder = Gains(  # until the design around it is known
+        A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0
+    )
     frame = PaperIdentifier(
-        gains=_placeholder(),
+        gains=placeholder,
         network=network,
         law=law,
         input_source=input_source,
@@ -316,7 +394,7 @@ def design_for(
     feedback = known.input_feedback
     slowest = 0.0 if feedback is None else minimal_decay(feedback)
     lead = LAWS[law].lead / decay_rate(driving.bandwidth, slowest)
-    designed = design_gains(
+    gains = design_gains(
         law=LAWS[law].error(lead),
         bandwidth=driving.bandwidth,
         dt=dt,
@@ -329,12 +407,7 @@ def design_for(
         integrator=integrator,
         minimal_decay=slowest,
     )
-    return replace(frame, gains=replace(designed.gains, lead=lead))
-
-
-def _placeholder() -> Gains:
-    """Gains that are replaced once the design around them is known."""
-    return Gains(A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)
+    return replace(frame, gains=replace(gains, lead=lead))
 
 
 def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:

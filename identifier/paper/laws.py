@@ -36,7 +36,7 @@ def _static_direction(A_d: Any, drive: Any) -> Any:
     return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
 
 
-def lyapunov_direction(A_d: Any, drive: Any) -> Any:
+def _lyapunov_direction(A_d: Any, drive: Any) -> Any:
     """Return -P drive with A_dᵀ P + P A_d = -2 I, (2,): -A_d⁻¹ where A_d is symmetric.
 
     P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
@@ -84,23 +84,16 @@ class Law:
 
 
 # The integral law is that of (11)-(12); the instantaneous one the conventional scheme. z + τ ξ̃:
-# with τ long enough the loop is positive real, and along `lyapunov_direction` no gain is then too
-# high, whatever the Hurwitz A_d; for A_d = -a I long enough is 1/a, else `lead_time` of
-# `identifier.stability.pi_lead`.
+# with τ long enough the loop is positive real, and along `_lyapunov_direction` no gain is then too
+# high, whatever the Hurwitz A_d; for A_d = -a I long enough is 1/a.
 LAWS: Mapping[str, Law] = {
     law.name: law
     for law in (
         Law(name="integral", z=1.0),
         Law(name="instantaneous", xi=1.0),
-        Law(name="pi_lead", z=1.0, lead=1.0, direction=lyapunov_direction),
+        Law(name="pi_lead", z=1.0, lead=1.0, direction=_lyapunov_direction),
     )
 }
-
-
-def unbounded(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: the leakage alone bounds them."""
-    del radius
-    return weights
 
 
 def ball(weights: Any, radius: Any) -> Any:
@@ -111,7 +104,7 @@ def ball(weights: Any, radius: Any) -> Any:
 
 
 def whole(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: all of them leak, as in (11)-(12)."""
+    """Return the weights as they are: all of them leak, as in (11)-(12), and none is projected."""
     del radius
     return weights
 
@@ -171,8 +164,6 @@ def weight_rates(
 # ξ, ξ̂ [U s]: axle impulse, measured and estimated.   u = [δ_f, δ_r] [rad].   f̂ [U]: network
 # output.
 
-_InputSource = Callable[[Any, Any], Any]
-
 
 def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
     """Return dξ̂/dt of (8), (2,) [U].
@@ -189,22 +180,12 @@ def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
     return -forgetting * z + xi_tilde  # (10)
 
 
-def measured(xi: Any, xi_hat: Any) -> Any:
-    """Read the network's input from the measured state, which opens the loop through x̂."""
-    del xi_hat
-    return xi
-
-
-def estimated(xi: Any, xi_hat: Any) -> Any:
-    """Read the network's input from the estimated state, as (8) prints it.
-
-    It closes a loop: A_d must then be fast against the slope of the tire.
-    """
-    del xi
-    return xi_hat
-
-
-INPUT_SOURCES: Mapping[str, _InputSource] = {"measured": measured, "estimated": estimated}
+# Reading the estimate, as (8) prints it, closes a loop: A_d must then be fast against the slope of
+# the tire.
+INPUT_SOURCES: Mapping[str, Callable[[Any, Any], Any]] = {  # of ξ and ξ̂
+    "measured": lambda xi, _: xi,
+    "estimated": lambda _, xi_hat: xi_hat,
+}
 
 # One step of an ordinary differential equation, with its inputs held over the step.
 
@@ -217,12 +198,8 @@ def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
     return [s + h * r for s, r in zip(state, rate, strict=True)]
 
 
-def free(state: list[Any]) -> list[Any]:
-    return state
-
-
 def euler(
-    derivative: Derivative, state: list[Any], dt: Any, project: Projection = free
+    derivative: Derivative, state: list[Any], dt: Any, project: Projection = list
 ) -> list[Any]:
     """Return the state one explicit Euler step later.
     project : puts a state back within its bounds; Euler has no inner stage that needs it.
@@ -231,7 +208,7 @@ def euler(
     return _ahead(state, derivative(state), dt)
 
 
-def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection = free) -> list[Any]:
+def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection = list) -> list[Any]:
     """Return the state one classical fourth-order Runge-Kutta step later.
 
     The inner stages are projected: else a high gain leaves the bounds within the step, and the

@@ -140,7 +140,7 @@ _LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be 
 _LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
 
 
-def build_frozen(network: Network) -> ca.Function:
+def _build_frozen(network: Network) -> ca.Function:
     """Return the frozen model as a function of weights, state and steering.
 
     Ports: W (2, n_h) and V (n_h, n_in); x = [v_y, r], u = [δ_f, δ_r], v_x, SI; vehicle (6,) = m,
@@ -165,7 +165,7 @@ def build_frozen(network: Network) -> ca.Function:
 
 def _build_replay(network: Network) -> ca.Function:
     """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port."""
-    frozen = build_frozen(network)
+    frozen = _build_frozen(network)
     ports = {name: ca.SX.sym(name, *frozen.size_in(name)) for name in frozen.name_in()}
     min_speed, v_x = ca.SX.sym("min_speed"), ports["v_x"]
     read = {**ports, "v_x": ca.fmax(v_x, min_speed)}
@@ -234,7 +234,7 @@ class NetworkModel(StaticModel):
         W, V = self.weights
         vehicle, unit = self.vehicle.bicycle, self.force_unit
         u = ca.vertcat(delta, 0)
-        return build_frozen(self.network)(W, V, x, u, v_x, ca.vertcat(*vehicle), unit)[1]
+        return _build_frozen(self.network)(W, V, x, u, v_x, ca.vertcat(*vehicle), unit)[1]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""

@@ -21,7 +21,6 @@ from identifier.paper.laws import (
     beyond_ball,
     filter_rate,
     observer_rate,
-    unbounded,
     weight_rates,
     whole,
 )
@@ -63,7 +62,7 @@ class Structure:
     rests: bool = False
 
 
-def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+def _plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     """Return whether a car can be in this state: its axles slide less than 63°, its wheels turn.
 
     A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is given:
@@ -96,7 +95,7 @@ def build_step(structure: Structure) -> ca.Function:
     xi = model.K_inv @ x / unit
     law, source = LAWS[structure.law], INPUT_SOURCES[structure.input_source]
     error = law.error(lead)
-    bounded = ball if structure.projects else unbounded
+    bounded = ball if structure.projects else whole
 
     def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
         x_read = unit * model.K @ source(xi, xi_hat)
@@ -132,7 +131,7 @@ def build_step(structure: Structure) -> ca.Function:
         return [state[0], state[1], bounded(state[2], W_max), bounded(state[3], V_max)]
 
     moving = v_x >= min_speed
-    plausible_sample = ca.logic_and(plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
+    plausible_sample = ca.logic_and(_plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
     used = ca.logic_and(moving, plausible_sample)
     f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)

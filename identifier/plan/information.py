@@ -51,7 +51,7 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     return P
 
 
-class Doubt(NamedTuple):
+class _Doubt(NamedTuple):
     """Slips (s,) [rad] of an axle pair, (2, s), and their units t and slopes φ' per offset."""
 
     slips: Array
@@ -59,7 +59,7 @@ class Doubt(NamedTuple):
     zero: Array
 
 
-def asked(tires: PlausibleTires, v_x: float) -> Doubt:
+def asked(tires: PlausibleTires, v_x: float) -> _Doubt:
     """Return where the curves are asked: evenly up to where the first one is flat.
     v_x : speed [m/s].
     """
@@ -67,10 +67,10 @@ def asked(tires: PlausibleTires, v_x: float) -> Doubt:
     slips = tires.slip_at(FLAT)[0][:, None] * np.linspace(0.0, 1.0, _MATTERING + 1)[1:]
     units = np.stack([unit_matrix(one, tires.method.ladder) for one in slips])
     slope = np.einsum("asj,aj->as", (1.0 - units**2) / ladder, tires.W[0])
-    return Doubt(slips, units, slope * np.array([[1.0], [1.0 / v_x]]))
+    return _Doubt(slips, units, slope * np.array([[1.0], [1.0 / v_x]]))
 
 
-def deviation(doubt: Doubt, P: Array) -> Array:
+def deviation(doubt: _Doubt, P: Array) -> Array:
     """Return the standard deviation of the force at the slips asked [static loads], (..., 2, s).
     P : covariances (..., 2, q, q).
     """
@@ -80,7 +80,7 @@ def deviation(doubt: Doubt, P: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def expected_error(tires: PlausibleTires, doubt: Doubt, P: Array) -> Array:
+def expected_error(tires: PlausibleTires, doubt: _Doubt, P: Array) -> Array:
     """Return the expected root mean square error of the forces over the grip [-], (...,).
     P : covariances (..., 2, q, q).
     """

@@ -22,7 +22,6 @@ from identifier.plan.search import (
     PlanError,
     Search,
     Space,
-    after_pass,
     body_of,
     edge_distance,
     swing_time,
@@ -131,7 +130,7 @@ class Plan:
         return float(max(one.max() for one in felt)) / self.tires.vehicle.mass
 
 
-def longest_pass(tires: PlausibleTires, space: Space) -> float:
+def _longest_pass(tires: PlausibleTires, space: Space) -> float:
     """Return how long a pass may last [s]: inf where the car can turn inside the area."""
     body = body_of(tires)
     slippery = float(tires.grip.min(axis=1).min())
@@ -170,7 +169,7 @@ def make_plan(
             f"the area is {space.width:g} m wide and the car with its margins {narrowest:.3g} m: "
             "give more room or less margin"
         )
-    longest = longest_pass(tires, space)
+    longest = _longest_pass(tires, space)
     needed = FEWEST * swing_time(tires, space)
     if min(longest, time) < needed:
         if longest >= needed:
@@ -195,7 +194,7 @@ def make_plan(
                 progress((before + done) / count)
 
         passes.append(search.best(rng, share))
-        known = after_pass(known, passes[-1])
+        known = known.after(passes[-1].covariance)
     rivals = _rivals(tires, space, time, passes[-1].error)
     return Plan(tires=tires, space=space, passes=tuple(passes), rivals=rivals)
 

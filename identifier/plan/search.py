@@ -13,7 +13,7 @@ axles.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +31,7 @@ from models.vehicle import GRAVITY
 _POPULATION, GENERATIONS = 32, 100
 _STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
 SWING = 0.75  # sqrt(L/g): least mean duration of a change from angle to angle, 0.4 s in a sedan
-_CHIRP = math.log(
-    3.0
-)  # largest ratio of the last to the mean duration, and of the mean to the first
+_CHIRP = math.log(3.0)  # largest, of the last to the mean duration, and of the mean to the first
 CALM = 0.5  # share of the grip that the rear axle may still need at the end of a pass
 REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
 OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
@@ -77,7 +75,7 @@ class Space:
         require_within(PlanError, math.radians(1.0), math.radians(60.0), max_angle=self.max_angle)
 
 
-class Body(NamedTuple):
+class _Body(NamedTuple):
     """How far a car reaches from its center of gravity [m]: ahead, behind, to each side."""
 
     ahead: float
@@ -85,17 +83,17 @@ class Body(NamedTuple):
     side: float
 
 
-def body_of(tires: PlausibleTires) -> Body:
+def body_of(tires: PlausibleTires) -> _Body:
     car = tires.vehicle
     over = OVERHANG * car.wheelbase
     side = _HALF_WIDTH * car.wheelbase
     if car.chassis is not None:
         track = max(car.chassis.track_front, car.chassis.track_rear)
         side = 0.5 * _WIDER * track
-    return Body(car.l_f + over, car.l_r + over, side)
+    return _Body(car.l_f + over, car.l_r + over, side)
 
 
-def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> Array:
+def edge_distance(space: Space, body: _Body, X: Array, Y: Array, psi: Array) -> Array:
     """Return the least distance of a body on its way to the edge of the area [m], (...).
     X, Y, psi : center of gravity [m] and heading [rad] over time, (n, ...).
     """
@@ -119,7 +117,7 @@ def swing_time(tires: PlausibleTires, space: Space) -> float:
     return max(SWING * tires.vehicle.froude_time, across)
 
 
-class Steerings(NamedTuple):
+class _Steerings(NamedTuple):
     """m steerings: times (m, N + 1) [s], angles (m, N + 1) [rad], and entries."""
 
     times: Array
@@ -190,7 +188,7 @@ class Search:
         bend = car.wheelbase * grip * GRAVITY / self.space.speed**2
         return min(self.space.max_angle, bend + 1.5 * float(self.tires.slip_at(REAR)[0, 0]))
 
-    def steerings(self, numbers: Array) -> Steerings:
+    def steerings(self, numbers: Array) -> _Steerings:
         """Return the steerings that numbers between -1 and 1 stand for; rates are kept.
         numbers : N - 1 angles, ratio of durations, place and heading of the entry, (m, N + 2).
         """
@@ -201,14 +199,11 @@ class Search:
         angles = np.zeros((len(numbers), N + 1))
         angles[:, 1:N] = u * self.largest_angle
         reach = 2.0 / math.pi * space.rate_limit * spans * (1.0 - 1e-9)
-        for k in range(1, N):
-            angles[:, k] = np.clip(
-                angles[:, k], angles[:, k - 1] - reach[:, k - 1], angles[:, k - 1] + reach[:, k - 1]
-            )
-        for k in range(N - 1, 0, -1):
-            angles[:, k] = np.clip(
-                angles[:, k], angles[:, k + 1] - reach[:, k], angles[:, k + 1] + reach[:, k]
-            )
+        forward = ((k, k - 1, k - 1) for k in range(1, N))
+        back = ((k, k + 1, k) for k in range(N - 1, 0, -1))
+        for k, beside, span in (*forward, *back):
+            low, high = angles[:, beside] - reach[:, span], angles[:, beside] + reach[:, span]
+            angles[:, k] = np.clip(angles[:, k], low, high)
         again = [(-1.0) ** k * angles[:, 1:] for k in range(self.repeats)]
         angles = np.column_stack([angles[:, :1], *again])
         spans = np.tile(spans, self.repeats)
@@ -217,7 +212,7 @@ class Search:
         psi = _LARGEST_HEADING * heading
         free = 0.5 * space.width - space.margin - body.side
         X = space.margin + body.behind * np.cos(psi) + body.side * np.abs(np.sin(psi))
-        return Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
+        return _Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
 
     def costs(self, numbers: Array) -> Array:
         """Return the expected error of steerings, more than 1 where they are not possible, (m,)."""
@@ -232,7 +227,7 @@ class Search:
             cost[possible] = expected_error(self.tires, doubt, P).mean(axis=1)
         return cost
 
-    def motion(self, steerings: Steerings) -> Motion:
+    def motion(self, steerings: _Steerings) -> Motion:
         """Return what all tires do under steerings."""
         t = steps_of(self.tires, self.duration)
         space, hold = self.space, hold_of(self.tires, self.space.speed)
@@ -325,7 +320,3 @@ class Search:
             duration=self.duration,
         )
         return Pass(steering, steerings.entry, motion, P[0, 0], float(error.mean()), t)
-
-
-def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:
-    return replace(tires, covariance=one.covariance)

@@ -3,11 +3,11 @@
 from identifier.certificate import Certificate, Property
 from identifier.paper.laws import DrivingError
 from identifier.stability.certificate import certify
-from identifier.stability.gain_design import DesignError, GainDesign, design_gains
+from identifier.stability.gain_design import DesignError, design_gains
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.operation import Operation
 
 __all__ = [
-    "INSTANTANEOUS", "INTEGRAL", "Certificate", "DesignError", "DrivingError", "GainDesign",
+    "INSTANTANEOUS", "INTEGRAL", "Certificate", "DesignError", "DrivingError",
     "Operation", "Property", "certify", "design_gains",
 ]  # fmt: skip

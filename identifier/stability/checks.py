@@ -1,21 +1,17 @@
-"""Properties of the learning loop: poles, sampling, margins, damping, drift."""
+"""Properties of the learning loop: poles, sampling, margins, damping, drift, bounds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.certificate import Property, Status, at_least, at_most, statement
+from identifier.certificate import Property, Status, at_least, statement
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.loop import ComplexArray, Loop, eigenvalues, exact
 from identifier.stability.lyapunov import lyapunov
-from identifier.stability.margins import (
-    drift_frequency,
-    gain_margin,
-    phase_margin,
-    sufficient_leakage,
-)
+from identifier.stability.margins import drift_frequency, gain_margin, phase_margin
 from identifier.stability.operation import Operation, Proven
 from identifier.stability.printed import printed_bounds, trivial_bound
 
@@ -23,21 +19,21 @@ _ENOUGH_GAIN, _ENOUGH_PHASE, _ENOUGH_DAMPING = 2.0, 30.0, 0.2
 _LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
 
 
-_CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, or lower eta_W"}
-
-
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
     gains : of (8) to (12).
     """
-    A_d = gains.matrix
+    A_d, dt = gains.matrix, operation.dt
     poles = _state_space_poles(A_d)
-    step = float(np.abs(poles).max()) * operation.dt
-    sampled = np.abs(operation.step(poles * operation.dt))
-    slowest = -math.log(float(sampled.max())) / operation.dt
-    filtered = gains.forgetting * operation.dt
-    resolved = operation.resolves(A_d)
+    step = float(np.abs(poles).max()) * dt
+    sampled = np.abs(operation.step(poles * dt))
+    slowest = -math.log(float(sampled.max())) / dt
     lyapunov(A_d, np.eye(2))  # raises where P does not solve its equation
+    finer = f"slow A_d down or sample every {1e3 * dt * _LARGEST_STEP / step:.3g} ms"
+    title = "fastest pole of A_d times the sampling interval"
+    sampling = Property.judged("sampling", title, step, "-", limit=_LARGEST_STEP, advice=finer)
+    if not operation.resolves(A_d):
+        sampling = replace(sampling, status="fail", advice=finer)
     entries = [
         _above_zero(
             "error_dynamics",
@@ -45,31 +41,16 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
             slowest,
             "give A_d poles with a negative real part that the step resolves",
         ),
-        Property(
-            name="filter_step",
-            title="lambda times the sampling interval",
-            value=filtered,
+        Property.judged(
+            "filter_step",
+            "lambda times the sampling interval",
+            gains.forgetting * dt,
+            "-",
             limit=1.0,
-            margin=1.0 / filtered,
-            status=at_most(filtered, good=1.0, bad=1.0),
-            unit="-",
-            advice=""
-            if filtered <= 1.0
-            else f"lambda below {1.0 / operation.dt:.3g} 1/s, or sample faster",
+            bad=1.0,
+            advice=f"lambda below {1.0 / dt:.3g} 1/s, or sample faster",
         ),
-        Property(
-            name="sampling",
-            title="fastest pole of A_d times the sampling interval",
-            value=step,
-            limit=_LARGEST_STEP,
-            margin=_LARGEST_STEP / step,
-            status=at_most(step, good=_LARGEST_STEP, bad=None) if resolved else "fail",
-            unit="-",
-            advice=""
-            if step <= _LARGEST_STEP and resolved
-            else f"slow A_d down or sample every "
-            f"{1e3 * operation.dt * _LARGEST_STEP / step:.3g} ms",
-        ),
+        sampling,
     ]
     if operation.input_feedback is not None:
         need = float(np.linalg.eigvals(operation.input_feedback).real.max())
@@ -86,30 +67,30 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
 
 def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
     """Gain margin in continuous time and sampled, phase margin, damping."""
-    phase = phase_margin(loop, operation.step, operation.dt)
-    damping = worst_damping(loop)
     return [
-        _gain_check(
-            "gain_continuous", "loop gain, continuous time", loop, operation, sampled=False
+        _gain_check("gain_continuous", "continuous time", loop, operation, sampled=False),
+        _gain_check("gain_sampled", "sampled", loop, operation, sampled=True),
+        Property.judged(
+            "phase_margin",
+            "phase margin of the sampled loop",
+            phase_margin(loop, operation.step, operation.dt),
+            "deg",
+            limit=_ENOUGH_PHASE,
+            bad=1e-9,
+            least=True,
+            advice="lower eta_W",
         ),
-        _gain_check("gain_sampled", "loop gain, sampled", loop, operation, sampled=True),
-        _enough("phase_margin", "phase margin of the sampled loop", phase, _ENOUGH_PHASE, "deg"),
-        _enough("damping", "damping ratio of the learning loop", damping, _ENOUGH_DAMPING, "-"),
+        Property.judged(
+            "damping",
+            "damping ratio of the learning loop",
+            _worst_damping(loop),
+            "-",
+            limit=_ENOUGH_DAMPING,
+            bad=1e-9,
+            least=True,
+            advice="raise A_d and forgetting, or lower eta_W",
+        ),
     ]
-
-
-def _enough(name: str, title: str, value: float, least: float, unit: str) -> Property:
-    """Return a margin of the loop that is to be above zero, and better above a least one."""
-    return Property(
-        name=name,
-        title=title,
-        value=value,
-        limit=least,
-        margin=value / least,
-        status=at_least(value, good=least, bad=1e-9),
-        unit=unit,
-        advice="" if value >= least else _CALMER[name],
-    )
 
 
 def weight_check(gains: Gains, operation: Operation, kept: float, judged: float) -> Property:
@@ -160,27 +141,12 @@ def drift_check(
     found = drift_frequency(
         A_d=gains.matrix, forgetting=gains.forgetting, law=law, direction=direction
     )
-    limit = found / (2 * math.pi)
-    advice = ""
-    if operation.bandwidth > limit:
-        leakage = sufficient_leakage(
-            A_d=gains.matrix, forgetting=gains.forgetting, law=law, eta_W=gains.eta_W,
-            n_h=operation.n_h, direction=direction,
-        )  # fmt: skip
-        advice = f"raise A_d and forgetting; a leakage of {leakage:.3g} 1/s would stop the drift"
-    return Property(
-        name="drift",
-        title="steering bandwidth, against the frequency above which weights drift",
-        value=operation.bandwidth,
-        limit=limit,
-        margin=limit / operation.bandwidth,
-        status=at_most(operation.bandwidth, good=limit, bad=None),
-        unit="Hz",
-        advice=advice,
-    )
+    title = "steering bandwidth, against the frequency above which weights drift"
+    limit, advice = found / (2 * math.pi), "raise A_d and forgetting"
+    return Property.judged("drift", title, operation.bandwidth, "Hz", limit=limit, advice=advice)
 
 
-def worst_damping(loop: Loop) -> float:
+def _worst_damping(loop: Loop) -> float:
     """Smallest -Re/|.| of the oscillating eigenvalues of the loop, 1 if none oscillates.
 
     sqrt(a³/g)/2 for the instantaneous law with A_d = -a I; negative where the loop is unstable.
@@ -193,7 +159,7 @@ def worst_damping(loop: Loop) -> float:
 
 
 def _gain_check(
-    name: str, title: str, loop: Loop, operation: Operation, *, sampled: bool
+    name: str, how: str, loop: Loop, operation: Operation, *, sampled: bool
 ) -> Property:
     found = gain_margin(loop, operation.step if sampled else exact, operation.dt)
     value = float(np.linalg.eigvalsh(loop.G)[-1])
@@ -206,7 +172,7 @@ def _gain_check(
             advice += f"; at the limit it oscillates at {found.frequency / (2 * math.pi):.2g} Hz"
     return Property(
         name=name,
-        title=title,
+        title=f"loop gain, {how}",
         value=value,
         limit=value * found.factor,
         margin=found.factor,
@@ -257,17 +223,10 @@ def bound_checks(
         dt=operation.dt if operation.integrator == "euler" else None,
         direction=direction,
     )
+    fewer = "" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}, or project W"
+    title = "theta: below 1 error and weights are proven bounded"
     entries = [
-        Property(
-            name="small_gain",
-            title="theta: below 1 error and weights are proven bounded",
-            value=theta,
-            limit=1.0,
-            margin=1.0 / theta if theta > 0.0 else math.inf,
-            status=at_most(theta, good=math.nextafter(1.0, 0.0), bad=None),
-            unit="-",
-            advice="" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}, or project W",
-        ),
+        Property.judged("small_gain", title, theta, "-", limit=1.0, advice=fewer),
         statement(
             "trivial_bound", "error bound of an identifier without a network", trivial, "U s"
         ),
@@ -284,67 +243,36 @@ def bound_checks(
 
 def _stated(proven: Proven) -> list[Property]:
     """State what is proven; warn where nothing bounds the error or a layer."""
-    entries = []
+    entries, error = [], "proven bound of |xi - xi_hat|"
     if proven.leakage is not None:
         entries += [
             statement(
-                "error_bound",
-                "proven bound of |xi - xi_hat| by the leakage",
-                proven.leakage.xi_tilde,
-                "U s",
-                _CONDITION,
+                "error_bound", f"{error} by the leakage", proven.leakage.xi_tilde, "U s", _CONDITION
             ),
             statement("weight_bound", "proven bound of |W|", proven.leakage.W, "U", _CONDITION),
         ]
     if proven.projection is not None:
-        entries.append(
-            statement(
-                "projection_bound", "proven bound of |xi - xi_hat| by the projection",
-                proven.projection.xi_tilde, "U s", _CONDITION,
-            )
-        )  # fmt: skip
+        value = proven.projection.xi_tilde
+        title = f"{error} by the projection"
+        entries.append(statement("projection_bound", title, value, "U s", _CONDITION))
     if not math.isfinite(proven.xi_tilde):
-        entries.append(
-            _unproven(
-                "error_bound",
-                "proven bound of |xi - xi_hat|: there is none",
-                "U s",
-                "lower eta_W until theta is below 1 and give W a leakage, or project W",
-            )
-        )
+        advice = "lower eta_W until theta is below 1 and give W a leakage, or project W"
+        none = statement("error_bound", f"{error}: there is none", math.inf, "U s", advice)
+        entries.append(replace(none, status="warn"))
     if math.isfinite(proven.V):
         entries.append(statement("V_bound", "proven bound of |V|", proven.V, "-", _CONDITION))
     else:
-        entries.append(
-            _unproven(
-                "V_bound",
-                "proven bound of |V|: there is none",
-                "-",
-                "give V a leakage below that of one sample, or project V",
-            )
-        )
+        advice = "give V a leakage below that of one sample, or project V"
+        none = statement("V_bound", "proven bound of |V|: there is none", math.inf, "-", advice)
+        entries.append(replace(none, status="warn"))
     return entries
-
-
-def _unproven(name: str, title: str, unit: str, advice: str) -> Property:
-    return Property(
-        name=name, title=title, value=math.inf, limit=None, margin=None, status="warn", unit=unit,
-        advice=advice,
-    )  # fmt: skip
 
 
 def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
     """Judge ρ dt |ξ̃|: up to 1 leakage shrinks the weights, beyond 2 it throws them about."""
-    return Property(
-        name=name,
-        title=f"largest share of {layer} that leaks in one sample",
-        value=step,
-        limit=1.0,
-        margin=1.0 / step if step > 0.0 else math.inf,
-        status=at_most(step, good=1.0, bad=2.0),
-        unit="-",
-        advice="" if step <= 1.0 else f"rho_{layer} below {rho / step:.3g}, or sample faster",
-    )
+    title = f"largest share of {layer} that leaks in one sample"
+    advice = "" if step <= 1.0 else f"rho_{layer} below {rho / step:.3g}, or sample faster"
+    return Property.judged(name, title, step, "-", limit=1.0, bad=2.0, advice=advice)
 
 
 def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Array) -> Property:
@@ -354,17 +282,8 @@ def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: 
         gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
         n_h=operation.n_h, direction=direction,
     )  # fmt: skip
-    need = operation.needed_force
-    enough = capacity >= need
-    return Property(
-        name="capacity",
-        title="largest steady force of the network with this leakage",
-        value=capacity,
-        limit=need,
-        margin=capacity / need,
-        status=at_least(capacity, good=need, bad=None),
-        unit="U",
-        advice=""
-        if enough
-        else f"rho_W below {gains.rho_W * (capacity - resting) / (need - resting):.3g}",
-    )
+    need, advice = operation.needed_force, ""
+    if capacity < need:
+        advice = f"rho_W below {gains.rho_W * (capacity - resting) / (need - resting):.3g}"
+    title = "largest steady force of the network with this leakage"
+    return Property.judged("capacity", title, capacity, "U", limit=need, least=True, advice=advice)

@@ -13,7 +13,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from identifier.stability.operation import Operation
 from identifier.stability.sampled_bound import (
     Disturbance,
     Learning,
-    SampledBounds,
     by_leakage,
     error_gains,
     output_layer,
@@ -40,19 +39,7 @@ class DesignError(TireidError, ValueError):
     """What is asked of the gains cannot be had at this sampling interval."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GainDesign:
-    """Gains and what is proved of them.
-    gains : of (8) to (12).   bounds : proven bounds of |ξ̃| and |W_hat|.
-    """
-
-    gains: Gains
-    loop_gain: float
-    bounds: SampledBounds
-    V_max: float
-
-
-def gain_for_phase_margin(
+def _gain_for_phase_margin(
     *, a: float, lam: float, law: DrivingError, phase_margin: float, dt: float | None = None
 ) -> float:
     """Loop gain g that gives the scalar loop (A_d = -a I, no leakage) its phase margin, exactly.
@@ -110,7 +97,7 @@ def design_gains(
     capacity: float = 4.0,
     integrator: str = "euler",
     minimal_decay: float = 0.0,
-) -> GainDesign:
+) -> Gains:
     """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
     bandwidth : highest frequency of steering that matters [Hz].   dt : sampling interval T_s [s].
     needed_force : that the network is expected to hold [U].
@@ -131,7 +118,7 @@ def design_gains(
             f"{FASTEST / (_LAG_RULE * 2.0 * math.pi * dt):.3g} Hz"
         )
     lam, A_d = a, diagonal(a)
-    g = gain_for_phase_margin(
+    g = _gain_for_phase_margin(
         a=a, lam=lam, law=law, phase_margin=phase_margin, dt=dt if integrator == "euler" else None
     )
     eta_W = g / n_h
@@ -158,7 +145,7 @@ def design_gains(
     if memory > 0.0:
         eta_V = min(eta_V, 0.5 * V_max / memory)
     rho_V = _leakage_of_V(replace(layer, drive=eta_V * layer.drive), V_max, bounds.stage)
-    gains = Gains(
+    return Gains(
         A_d=A_d,
         forgetting=lam,
         eta_W=eta_W,
@@ -167,7 +154,6 @@ def design_gains(
         rho_V=rho_V,
         lead=c_xi if c_z > 0.0 else 0.0,
     )
-    return GainDesign(gains=gains, loop_gain=g, bounds=bounds, V_max=V_max)
 
 
 def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
@@ -200,27 +186,11 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
 # that random first weights are expected to have. Neither reads anything but the car and its
 # driving.
 
-
-def leakage(gains: Gains, known: Operation) -> Gains:
-    """Return the gains as they are: the paper's leakage alone.   gains : of `design_gains`."""
-    del known
-    return gains
-
-
-def dead_zone(gains: Gains, known: Operation) -> Gains:
-    """Return the gains with a leakage of what lies beyond the balls.
-    gains : of `design_gains`.
-    """
-    return replace(gains, W_free=known.W_large, V_free=known.V_start)
-
-
-def projection(gains: Gains, known: Operation) -> Gains:
-    return replace(gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start)
-
-
 KEEPINGS: Mapping[str, Callable[[Gains, Operation], Gains]] = {
-    "leakage": leakage,
-    "dead_zone": dead_zone,
-    "projection": projection,
+    "leakage": lambda gains, _: gains,
+    "dead_zone": lambda gains, known: replace(gains, W_free=known.W_large, V_free=known.V_start),
+    "projection": lambda gains, known: replace(
+        gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start
+    ),
 }
 DEFAULT_KEEPING = "projection"  # of designs that are found; measured by benchmarks/forgetting.py

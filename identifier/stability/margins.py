@@ -13,7 +13,6 @@ forgetting : λ [1/s].   direction : (2, 2) D, None for -A_d⁻ᵀ.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,11 +30,8 @@ from identifier.stability.loop import (
 )
 from identifier.stability.lyapunov import require_hurwitz
 
-if TYPE_CHECKING:
-    pass
-
 _LARGEST_FACTOR = 1e6
-AT_ONCE = 150  # points of a grid whose eigenvalues are found together
+_AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +91,7 @@ def _first_crossing(
     """
     growth = np.empty(0)
     while growth.size < grid.size and not np.any(growth > threshold):
-        growth = np.append(growth, growth_at(grid[growth.size : growth.size + AT_ONCE]))
+        growth = np.append(growth, growth_at(grid[growth.size : growth.size + _AT_ONCE]))
     unstable = np.flatnonzero(growth > threshold)
     if unstable.size == 0:
         return None
@@ -133,10 +129,9 @@ def _rate(loop: Loop) -> float:
 # over a regressor of frequency ω leaves -η He H(jω): a direction in which the Hermitian part is
 # negative drifts away, at any η. For A_d = -a I the integral law has
 # Re H ∝ (a λ - ω²): it drifts where the maneuver is faster than sqrt(a λ).
-# A constant leakage s0 > η |s|² max(-λ_min He H) stops it for every s(t) (shortage of passivity).
 
 
-def passivity(
+def _passivity(
     frequency: ArrayLike,
     *,
     A_d: ArrayLike,
@@ -169,7 +164,7 @@ def drift_frequency(
 
     def relative(frequency: ArrayLike) -> Array:
         """λ_min He H with the decay of H taken out, so that round-off is no sign."""
-        lowest = passivity(frequency, A_d=A_d, forgetting=forgetting, law=law, direction=direction)
+        lowest = _passivity(frequency, A_d=A_d, forgetting=forgetting, law=law, direction=direction)
         return lowest * (size + np.atleast_1d(np.asarray(frequency))) / reference
 
     size = float(np.linalg.norm(require_hurwitz(A_d), 2)) + forgetting
@@ -186,48 +181,3 @@ def drift_frequency(
     if relative(low)[0] <= 0.0:
         return low
     return root(lambda w: float(relative(w)[0]), low, high, xtol=1e-13 * size)
-
-
-def passivity_shortage(
-    *, A_d: ArrayLike, forgetting: float, law: DrivingError, direction: Array | None = None
-) -> float:
-    """Max over ω of -λ_min He H(jω), zero where H is positive real.
-
-    For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²). The other
-    arguments are those of `drift_frequency`, `direction` (2, 2) [s].
-    """
-
-    def lowest(log_frequency: ArrayLike) -> Array:
-        return passivity(
-            np.exp(log_frequency), A_d=A_d, forgetting=forgetting, law=law, direction=direction
-        )
-
-    size = float(np.linalg.norm(require_hurwitz(A_d), 2)) + forgetting
-    grid = np.log(size * np.geomspace(1e-4, 1e3, 1401))
-    worst = int(np.argmin(lowest(grid)))
-    around = (grid[max(worst - 1, 0)], grid[min(worst + 1, grid.size - 1)])
-    from scipy.optimize import minimize_scalar
-
-    found = minimize_scalar(
-        lambda x: float(lowest(x)[0]), bounds=around, method="bounded", options={"xatol": 1e-10}
-    )
-    shortage = -min(float(found.fun), float(lowest(grid)[worst]))
-    return shortage if shortage > 1e-12 * float(np.max(np.abs(lowest(grid)))) else 0.0
-
-
-def sufficient_leakage(
-    *,
-    A_d: ArrayLike,
-    forgetting: float,
-    law: DrivingError,
-    eta_W: float,
-    n_h: int,
-    direction: Array | None = None,
-) -> float:
-    """Constant leakage rate s0 [1/s] above which no regressor can drift, η |s|²_max shortage.
-
-    The leakage ρ |ξ̃| of (11) reaches it where |ξ̃| = s0/ρ: about the error at which a drift ends.
-    eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
-    """
-    shortage = passivity_shortage(A_d=A_d, forgetting=forgetting, law=law, direction=direction)
-    return eta_W * n_h * shortage

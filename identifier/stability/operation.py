@@ -9,7 +9,6 @@ friction : μ [-].
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -18,7 +17,6 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
 from identifier.paper.laws import DrivingError, Gains
-from identifier.paper.network import Network, network_signals
 from identifier.stability.loop import INTEGRATORS, Integrator, Loop, spectral_radius, worst_gain
 from identifier.stability.sampled_bound import (
     Disturbance,
@@ -35,30 +33,6 @@ from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 
-class Sampled(Protocol):
-    """What of a design its operation follows from: the network that it samples, and how."""
-
-    @property
-    def network(self) -> Network:
-        """Structure and scales of the network."""
-
-    @property
-    def input_source(self) -> str:
-        """Where the network reads the state: "measured" or "estimated"."""
-
-    @property
-    def integrator(self) -> str:
-        """Of the step: "euler", "rk4" or "exact"."""
-
-    @property
-    def dt(self) -> float:
-        """Sampling interval [s]."""
-
-    @property
-    def force_unit(self) -> float:
-        """Unit of the weights of the output [N]."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Operation:
     """Where and how the identifier runs: what the certificate must know besides the gains.
@@ -67,8 +41,6 @@ class Operation:
     needed_force : that the network should be able to hold against its leakage [U].
     x_bar_max : bound on |x_bar| [-], without what the error adds where the network reads x_hat.
     input_feedback : (2, 2) J_f K [1/s] where the network reads x_hat; None where it reads x.
-    W_M : bound on the ideal weights (Frobenius) [U], for (14).
-    w_bar : bound on the approximation error [U], for (14).
     V_start : largest |V_hat| to begin with (Frobenius) [-].
     W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this one
         (Frobenius) [U]; the V layer's share of the loop gain grows with it.
@@ -83,8 +55,6 @@ class Operation:
     needed_force: float
     x_bar_max: float
     input_feedback: Array | None
-    W_M: float
-    w_bar: float
     V_start: float = 0.0
     W_large: float = math.inf
     input_per_error: float = 0.0
@@ -100,7 +70,7 @@ class Operation:
             )
         if not self.W_large > 0.0:
             raise ValueError(f"W_large must be positive, it is {self.W_large}")
-        for name in ("W_M", "w_bar", "V_start", "input_per_error"):
+        for name in ("V_start", "input_per_error"):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
 
@@ -236,26 +206,20 @@ def worst_loop(
 # F' = 0. (8)c prints x_hat; x is measured, so that reading x costs nothing and has no such limit.
 
 
-def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
-    """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6)."""
-    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
-    K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
-    slip = np.array([[1.0, l_f], [1.0, -l_r]])
-    coupling: Array = slip @ K
-    return coupling
-
-
 def estimated_input_feedback(
     *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
 ) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
     """
-    require_positive(ValueError, v_x=v_x)
+    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
     if lost.shape != (2,) or not np.all(np.isfinite(lost)):
         raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
-    return np.diag(lost) @ axle_coupling(m=m, I_z=I_z, l_f=l_f, l_r=l_r) / v_x
+    K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
+    slip = np.array([[1.0, l_f], [1.0, -l_r]])
+    feedback: Array = np.diag(lost) @ (slip @ K) / v_x
+    return feedback
 
 
 def minimal_decay(feedback: ArrayLike) -> float:
@@ -276,7 +240,7 @@ def minimal_decay(feedback: ArrayLike) -> float:
 # rate times T_s/2 from that.
 
 
-def largest_signals(
+def _largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI."""
@@ -294,7 +258,7 @@ def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
     """Bound of every signal over the whole range of speeds, SI."""
     at = {"slip": driving.slip, "friction": driving.friction}
     speeds = [(1.0 + share) * driving.v_x for share in (-SPEED_SPREAD, SPEED_SPREAD)]
-    slow, fast = (largest_signals(vehicle, v_x=v_x, **at) for v_x in speeds)
+    slow, fast = (_largest_signals(vehicle, v_x=v_x, **at) for v_x in speeds)
     return {name: max(slow[name], fast[name]) for name in slow}
 
 
@@ -304,7 +268,7 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
     return omega * signals["delta_f"], omega * signals["delta_r"]
 
 
-def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
+def _residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
     vehicle : the car; its stiffness is at least half that of the tires.
     """
@@ -352,70 +316,10 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
 
     turning = K_inv[:, 0] * fast * r
     return Disturbance(
-        residual=(residual_bound(vehicle, slip=driving.slip) + held + misread) / unit,
+        residual=(_residual_bound(vehicle, slip=driving.slip) + held + misread) / unit,
         noise=float(np.linalg.norm(K_inv @ n_x)) / unit,
         rate=float(np.linalg.norm(push + turning)) / unit,
         known=(float(np.linalg.norm(C * driving.slip + turning)) + misread) / unit,
-    )
-
-
-def _largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
-    """Bound on |x_bar| [-], noise of the sensors in it."""
-    signals, slow = declared_signals(vehicle, driving), (1.0 - SPEED_SPREAD) * driving.v_x
-    sideways = driving.noise_v_y + vehicle.wheelbase * driving.noise_r
-    speed = driving.noise_v_x * (signals["v_y"] + vehicle.wheelbase * signals["r"]) / slow
-    slip = driving.noise_delta + (sideways + speed) / (slow - driving.noise_v_x)
-    noise = {
-        "v_y": driving.noise_v_y, "r": driving.noise_r, "delta_f": driving.noise_delta,
-        "delta_r": driving.noise_delta, "v_x": driving.noise_v_x, "alpha_f": slip, "alpha_r": slip,
-    }  # fmt: skip
-    assert design.network.scale is not None
-    named = zip(design.network.inputs, design.network.scale, strict=True)
-    return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
-
-
-def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
-    """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
-    driving : how hard it is driven; the slowest speed counts.
-    """
-    slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x
-    x = ca.SX.sym("x", 2)
-    signals = network_signals(vehicle.bicycle, slowest, x, ca.SX.zeros(2))
-    x_bar = design.network.normalized_input(signals)
-    K = bicycle(vehicle.bicycle, slowest).K
-    per_error = ca.jacobian(x_bar, x) @ ca.DM(K) * design.force_unit
-    return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
-
-
-def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
-    """Return what the certificate of a design needs.
-
-    (14) is given what holds for sure: the ideal weights W = 0, that leave all of f as w_bar. The V
-    layer is judged up to twice the smallest weights that hold the expected residual with every
-    unit saturated: units half open.
-    """
-    found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
-    expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
-    feedback = estimated_input_feedback(
-        m=vehicle.mass, I_z=vehicle.yaw_inertia, l_f=vehicle.l_f, l_r=vehicle.l_r,
-        stiffness_lost=(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear),
-        v_x=(1.0 - SPEED_SPREAD) * driving.v_x,
-    )  # fmt: skip
-    estimated = design.input_source == "estimated"
-    return Operation(
-        n_h=design.network.hidden,
-        dt=design.dt,
-        integrator=design.integrator,
-        bandwidth=driving.bandwidth,
-        disturbance=found,
-        needed_force=expected / design.force_unit,
-        x_bar_max=_largest_input(design, vehicle, driving),
-        V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
-        input_feedback=feedback if estimated else None,
-        input_per_error=input_per_error(design, vehicle, driving) if estimated else 0.0,
-        W_M=0.0,
-        w_bar=found.residual,
-        W_large=2.0 * expected / design.force_unit / math.sqrt(design.network.hidden),
     )
 
 

@@ -9,7 +9,6 @@ w_bar bounds f - W tanh(V_hat x_bar): it includes W [tanh(V x_bar) - tanh(V_hat 
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +27,7 @@ from identifier.stability.operation import Operation
 from models.rules import require_positive
 
 
-def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
+def _printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h (|P| + (η/ρ) |A_d⁻¹|)]/2, the one that gives (14) as printed [U].
     W_M : bound on the ideal weights (Frobenius) [U].   n_h : hidden units; |s| <= √n_h.
     eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
@@ -39,18 +38,18 @@ def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
 
-def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
+def _tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h |P + (η/ρ) A_d⁻¹|]/2: the two couplings cancel before the norm is taken.
 
-    W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `canceling_pair`. Arguments are
-    those of `printed_k_b`.
+    W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `_canceling_pair`. Arguments are
+    those of `_printed_k_b`.
     """
     require_positive(ValueError, rho_W=rho_W)
     coupling = float(np.linalg.norm(pair.P + eta_W / rho_W * np.linalg.inv(pair.A_d), 2))
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
 
-def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
+def _canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
     A_d : (2, 2) Hurwitz error dynamics [1/s].   eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
@@ -65,41 +64,10 @@ def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPai
     return LyapunovPair(A_d=matrix, P=P, Q=Q, residual=lyapunov_residual(matrix, P, Q))
 
 
-def k_b_with_V(
-    k_b: float,
-    *,
-    A_d: ArrayLike,
-    W_M: float,
-    V_M: float,
-    x_bar_max: float,
-    eta_V: float,
-    rho_V: float,
-    weight: float = 1.0,
-) -> float:
-    """k_b where tr V_tᵀ V_t / (2 ρ_V), times `weight` c, is added to L [U].
-
-    With l2 = (η_V/ρ_V) |A_d⁻¹| x_bar_max and K2 = (V_M + l2 W_M)/2,
-    k_b² = (K1² + c l2 K1 K2 + c K2²)/(1 - c l2²/4), c l2² < 4. It grows with c: as c -> 0 the V
-    layer costs nothing, because w_bar already holds what V_hat does to the force, and V_hat itself
-    is bounded by its leakage.
-    k_b : K1, of `printed_k_b` or `tight_k_b` [U].   A_d : (2, 2) error dynamics [1/s].
-    W_M : bound on the ideal W (Frobenius) [U].   V_M : bound on the ideal V (Frobenius) [-].
-    eta_V : learning rate of (12).   rho_V : leakage gain of (12) [1/(U s²)].   weight : c > 0.
-    """
-    require_positive(ValueError, rho_V=rho_V, weight=weight)
-    inverse = float(np.linalg.norm(np.linalg.inv(np.asarray(A_d, dtype=np.float64)), 2))
-    l2 = eta_V / rho_V * inverse * x_bar_max
-    if not weight * l2**2 < 4.0:
-        raise ValueError(f"weight l2² must be below 4, it is {weight * l2**2:.4g}")
-    K2 = (V_M + l2 * W_M) / 2.0
-    squared = k_b**2 + weight * l2 * k_b * K2 + weight * K2**2
-    return math.sqrt(squared / (1.0 - weight * l2**2 / 4.0))
-
-
-def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
+def _bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     """B = 2 (|P| w_bar + k_b²)/λ_min(Q) of (14) [U s]: where L' < 0, not yet an ultimate bound.
     w_bar : bound on the approximation error [U].
-    k_b : of `printed_k_b`, `tight_k_b` or `k_b_with_V` [U].
+    k_b : of `_printed_k_b` or `_tight_k_b` [U].
     """
     return float(2.0 * (np.linalg.norm(pair.P, 2) * w_bar + k_b**2) / np.linalg.eigvalsh(pair.Q)[0])
 
@@ -113,29 +81,18 @@ def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
     return peak_gain(A_d) * residual_bound
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _UltimateBound:
-    """The largest |ξ̃| of the sublevel set of L that contains the whole set L' >= 0.
-    xi_tilde : limsup |ξ̃| does not exceed it [U s].
-    worst_y : |W_t| at which the maximum is taken [U].
-    """
-
-    xi_tilde: float
-    worst_y: float
-
-
-def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float) -> _UltimateBound:
-    """Return the true ultimate bound of the instantaneous law, at least b of (14).
+def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float) -> float:
+    """Return the true ultimate bound of the instantaneous law [U s], at least b of (14).
 
     b_UUB² = max over 0 <= y <= w_b of [λ_max(P) x(y)² + y²/ρ_W]/λ_min(P), with
     x(y) = max(0, b - (2/λ_min(Q)) (y - k_b)²) and w_b = k_b + sqrt(k_b² + |P| w_bar). The objective
     is a quartic where x > 0: its stationary points are roots of a cubic, none is missed.
-    w_bar : bound on the approximation error [U].   k_b : of `printed_k_b` or `tight_k_b` [U].
+    w_bar : bound on the approximation error [U].   k_b : of `_printed_k_b` or `_tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """
     require_positive(ValueError, rho_W=rho_W)
     p = np.linalg.eigvalsh(pair.P)
-    b, curve = bound_14(pair, w_bar=w_bar, k_b=k_b), 2.0 / np.linalg.eigvalsh(pair.Q)[0]
+    b, curve = _bound_14(pair, w_bar=w_bar, k_b=k_b), 2.0 / np.linalg.eigvalsh(pair.Q)[0]
     w_b = k_b + math.sqrt(k_b**2 + p[1] * w_bar)
     x = np.polynomial.Polynomial([b - curve * k_b**2, 2.0 * curve * k_b, -curve])
     level = p[1] * x * x + np.polynomial.Polynomial([0.0, 0.0, 1.0 / rho_W])
@@ -144,13 +101,10 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     candidates = np.concatenate(([0.0, k_b, w_b], inside))
     candidates = candidates[x(candidates) >= -1e-12 * b]
     values = p[1] * np.maximum(x(candidates), 0.0) ** 2 + candidates**2 / rho_W
-    worst = int(np.argmax(values))
-    return _UltimateBound(
-        xi_tilde=math.sqrt(float(values[worst]) / p[0]), worst_y=float(candidates[worst])
-    )
+    return math.sqrt(float(values.max()) / p[0])
 
 
-# Statements about (14): as printed, by the tight route, with the V layer; the true bound.
+# Statements about (14): as printed, by the tight route; the true bound.
 #
 # They say how little (14) says: every one stands beside the bound of an identifier with no network.
 # (14) needs ideal weights and a bound w_bar on what they leave. Nothing but W = 0, w_bar = sup|f|
@@ -161,66 +115,44 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
 def printed_bounds(
     gains: Gains, law: DrivingError, operation: Operation, trivial: float
 ) -> list[Property]:
-    """State b of (14) by the printed and the tight route, with the V layer, and b_UUB [U s].
+    """State b of (14) by the printed and the tight route, and b_UUB [U s].
     gains : of (8) to (12), with leakage.
     trivial : bound of an identifier without a network [U s].
     """
-    pair, tight_pair = _best_pair(gains, operation), _tight_pair(gains, operation)
-    W_M, n_h, w_bar = operation.W_M, operation.n_h, operation.w_bar
+    pair, tight_pair = _best_pair(gains), _tight_pair(gains)
+    w_bar, n_h = operation.disturbance.residual, operation.n_h
     eta_W, rho_W = gains.eta_W, gains.rho_W
-    k_b = printed_k_b(pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
-    tight = tight_k_b(tight_pair, W_M=W_M, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
+    k_b = _printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
+    tight = _tight_k_b(tight_pair, W_M=0.0, n_h=n_h, eta_W=eta_W, rho_W=rho_W)
     entries = {
-        "printed_bound": ("bound (14), printed route", bound_14(pair, w_bar=w_bar, k_b=k_b)),
-        "tight_bound": ("bound (14), tight route", bound_14(tight_pair, w_bar=w_bar, k_b=tight)),
+        "printed_bound": ("bound (14), printed route", _bound_14(pair, w_bar=w_bar, k_b=k_b)),
+        "tight_bound": ("bound (14), tight route", _bound_14(tight_pair, w_bar=w_bar, k_b=tight)),
         "ultimate_bound": (
             "true ultimate bound behind (14)",
-            ultimate_bound(pair, w_bar=w_bar, k_b=k_b, rho_W=rho_W).xi_tilde,
+            ultimate_bound(pair, w_bar=w_bar, k_b=k_b, rho_W=rho_W),
         ),
     }
-    with_V = _with_V(gains, operation, pair, k_b)
-    if with_V is not None:
-        entries["printed_bound_V"] = ("bound (14), printed route, V layer in it", with_V)
     return [
         statement(name, title, value, "U s", _remark(law, value, trivial))
         for name, (title, value) in entries.items()
     ]
 
 
-def _best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
-    """Return P and Q = q I with |P| = W_M/√n_h + (η/ρ) |A_d⁻¹|, where the printed b is smallest.
+def _best_pair(gains: Gains) -> LyapunovPair:
+    """Return P and Q = q I with |P| = (η/ρ) |A_d⁻¹|, where the printed b is smallest.
     gains : of (8) to (12), with leakage.
     """
     unit = lyapunov(gains.matrix, np.eye(2))
     inverse = float(np.linalg.norm(np.linalg.inv(gains.matrix), 2))
-    size = operation.W_M / math.sqrt(operation.n_h) + gains.eta_W / gains.rho_W * inverse
+    size = gains.eta_W / gains.rho_W * inverse
     return lyapunov(gains.matrix, size / float(np.linalg.norm(unit.P, 2)) * np.eye(2))
 
 
-def _tight_pair(gains: Gains, operation: Operation) -> LyapunovPair:
+def _tight_pair(gains: Gains) -> LyapunovPair:
     try:
-        return canceling_pair(gains.matrix, eta_W=gains.eta_W, rho_W=gains.rho_W)
+        return _canceling_pair(gains.matrix, eta_W=gains.eta_W, rho_W=gains.rho_W)
     except LyapunovError:
-        return _best_pair(gains, operation)
-
-
-def _with_V(gains: Gains, operation: Operation, pair: LyapunovPair, k_b: float) -> float | None:
-    """B with tr V_tᵀ V_t/(2 ρ_V) in L at the weight that halves its own limit; V_M = √n_h."""
-    if not (gains.rho_V > 0.0 and gains.eta_V > 0.0):
-        return None
-    inverse = float(np.linalg.norm(np.linalg.inv(gains.matrix), 2))
-    l2 = gains.eta_V / gains.rho_V * inverse * operation.x_bar_max
-    larger = k_b_with_V(
-        k_b,
-        A_d=gains.matrix,
-        W_M=operation.W_M,
-        V_M=math.sqrt(operation.n_h),
-        x_bar_max=operation.x_bar_max,
-        eta_V=gains.eta_V,
-        rho_V=gains.rho_V,
-        weight=2.0 / l2**2,
-    )
-    return bound_14(pair, w_bar=operation.w_bar, k_b=larger)
+        return _best_pair(gains)
 
 
 def _remark(law: DrivingError, value: float, trivial: float) -> str:

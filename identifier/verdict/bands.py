@@ -100,9 +100,6 @@ def calibrated(
     if found is None:
         return model
 
-    def teach(halting: Recording) -> TireModel:
-        return run.taught(halting, history.vehicle)
-
     speeds = found.windows.mean(recording.v_x)
     speed = float(np.sqrt(np.mean(speeds**2)))
     one, each = found.measured.shape, (len(CENTERS), *found.measured.shape)
@@ -110,7 +107,7 @@ def calibrated(
     empty = np.zeros((3, *each))
     missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
     given = BandCalibration.declared(speed)
-    for mine, other in taught_elsewhere(teach, recording, found):
+    for mine, other in taught_elsewhere(run.taught, recording, found):
         if other is None:
             continue
         asked_of = _missed(other.with_calibration(given), recording, found)

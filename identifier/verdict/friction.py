@@ -8,7 +8,7 @@ grid, and one that no friction explains them, each window changes
     p ← [(1 - h) p + h p₀] L,     h = 1 - exp(-Δt/`LASTS`),
 
 scaled to a sum of one: a road goes on, or another begins, as likely as p₀ has it; L is how likely
-its friction makes the force that was shown. The slip of each axle may be off by a zero, which each
+its friction makes the measured force. The slip of each axle may be off by a zero, which each
 friction estimates for itself and a road that begins takes over (interacting multiple models; Blom
 and Bar-Shalom, IEEE Trans. Automatic Control 33, 1988): where tires do not slide, a friction tells
 itself from a wrong zero by nothing. The answer at a time is from what came until then.
@@ -142,7 +142,7 @@ def filtered(t: Array, grid: Array, away: Array, slope: Array, variance: Array) 
     """Return the friction that windows tell one after the other.
     t : end of the windows [s], rising, (m,).
     grid : ln μ of the frictions that are held for possible, rising, one of them 0, (k,).
-    away : what each of them leaves of the force that was shown [static axle loads], (k, m, 2).
+    away : what each of them leaves of the measured force [static axle loads], (k, m, 2).
     slope : of its force over the slip [static axle loads/rad], (k, m, 2).
     variance : of what the right one leaves (m, 2).
     """

@@ -42,7 +42,7 @@ ROADS = 3  # segments of another friction that are listed one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
+class _Rules:
     """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
     missed : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
@@ -62,10 +62,10 @@ class Rules:
     rolling: tuple[float, float] = (0.85, 1.25)
 
 
-RULES = Rules()
+RULES = _Rules()
 
 
-class Asked(NamedTuple):
+class _Asked(NamedTuple):
     """A model and a drive.
 
     portion : what of the drive is asked.   found : what the model explains of it.   own : whether
@@ -134,7 +134,7 @@ def judge_prediction(
 
 def _asked(
     model: TireModel, recording: Recording, *, own: bool, frozen: int | None = None
-) -> Asked | None:
+) -> _Asked | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model))
@@ -148,7 +148,7 @@ def _asked(
     if some is not None:
         t, starts = recording.t[part.samples], found.windows.starts
         left_out = float(t[starts[some[0]]]), float(t[starts[some[1] - 1] + found.windows.n])
-    return Asked(model, part, judged, own, left_out)
+    return _Asked(model, part, judged, own, left_out)
 
 
 def _road(recording: Recording, model: TireModel) -> Array | None:
@@ -165,7 +165,7 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
     return bank
 
 
-def _findings(asked: Asked) -> list[Objection]:
+def _findings(asked: _Asked) -> list[Objection]:
     rules = (
         _v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning,
         _unobserved,
@@ -173,7 +173,7 @@ def _findings(asked: Asked) -> list[Objection]:
     return [finding for rule in rules for finding in rule(asked)]
 
 
-def _v_y_stuck(asked: Asked) -> Iterator[Objection]:
+def _v_y_stuck(asked: _Asked) -> Iterator[Objection]:
     recording, brisk = asked.recording, asked.found.windows.starts
     v_y = recording.logged_v_y
     if v_y is None:
@@ -184,41 +184,34 @@ def _v_y_stuck(asked: Asked) -> Iterator[Objection]:
         yield Objection("v_y_stuck", None, text, True)
 
 
-def _no_force(asked: Asked) -> Iterator[Objection]:
-    forceless = asked.forceless
-    hidden = np.sqrt(asked.found.noise) > RULES.force
-    for axle, peak, none, noisy in zip(AXLES, asked.found.peak, forceless, hidden, strict=True):
+def _no_force(asked: _Asked) -> Iterator[Objection]:
+    forceless, noise = asked.forceless, np.sqrt(asked.found.noise)
+    for axle, peak, none, sd in zip(AXLES, asked.found.peak, forceless, noise, strict=True):
         if not none:
             continue
-        if noisy:
+        if sd > RULES.force:
             advice = "noise of v_y and yaw rate hides it: repair the sensors"
         elif asked.own:
             advice = "its numbers are default values; drive a slalom"
         else:
             advice = "this drive cannot judge the model"
-        yield Objection(
-            "no_force",
-            axle,
-            f"lateral force reaches {peak:.2g} of the static load, {RULES.force:g} are needed: "
-            f"{advice}",
-            asked.own or all(forceless),
-        )
+        need = f"{RULES.force:g} are needed"
+        text = f"lateral force reaches {peak:.2g} of the static load, {need}: {advice}"
+        yield Objection("no_force", axle, text, asked.own or all(forceless))
 
 
-def _missed(asked: Asked) -> Iterator[Objection]:
+def _missed(asked: _Asked) -> Iterator[Objection]:
     limit = RULES.missed
     for axle, missed, none in zip(AXLES, asked.found.missed, asked.forceless, strict=True):
         if not (missed <= limit or none):
-            yield Objection(
-                "force_missed",
-                axle,
+            text = (
                 f"model error {PERCENT * missed:.0f} % of the force in the motion (limit "
-                f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause",
-                True,
+                f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause"
             )
+            yield Objection("force_missed", axle, text, True)
 
 
-def _left_out(asked: Asked) -> Iterator[Objection]:
+def _left_out(asked: _Asked) -> Iterator[Objection]:
     if asked.left_out is not None:
         begin, end = asked.left_out
         text = (
@@ -229,7 +222,7 @@ def _left_out(asked: Asked) -> Iterator[Objection]:
         yield Objection("segment", None, text, False)
 
 
-def _unsure(asked: Asked) -> Iterator[Objection]:
+def _unsure(asked: _Asked) -> Iterator[Objection]:
     if not asked.own:
         return
     car, windows = asked.model.vehicle, asked.found.windows
@@ -241,46 +234,40 @@ def _unsure(asked: Asked) -> Iterator[Objection]:
         power = asked.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
         if not (mean <= RULES.doubt or asked.forceless[i]):
-            yield Objection(
-                "prior",
-                axle,
+            text = (
                 f"the drive reduced the uncertainty of the curve to {PERCENT * mean:.0f} % of the "
-                f"prior's (limit {PERCENT * RULES.doubt:.0f} %): drive longer",
-                True,
+                f"prior's (limit {PERCENT * RULES.doubt:.0f} %): drive longer"
             )
+            yield Objection("prior", axle, text, True)
 
 
-def _no_tire(asked: Asked) -> Iterator[Objection]:
+def _no_tire(asked: _Asked) -> Iterator[Objection]:
     loads = np.array(asked.model.vehicle.axle_loads)
     stiffness = asked.model.force_at(np.array([_SECANT]))[0] / _SECANT
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
-            yield Objection(
-                "no_tire",
-                axle,
+            text = (
                 f"cornering stiffness {C / 1e3:.3g} kN/rad is {each:.2g} static loads per rad, "
-                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file",
-                True,
+                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file"
             )
+            yield Objection("no_tire", axle, text, True)
 
 
-def _beyond(asked: Asked) -> Iterator[Objection]:
+def _beyond(asked: _Asked) -> Iterator[Objection]:
     beyond, known = beyond_known(asked.model, asked.recording), asked.model.known_slip
     if beyond is None or known is None or asked.own:
         return
     for axle, share, slip in zip(AXLES, beyond, known, strict=True):
         if share > RULES.beyond:
-            yield Objection(
-                "beyond_known",
-                axle,
+            text = (
                 f"{PERCENT * share:.0f} % of the samples exceed the identified slip range "
-                f"({np.degrees(slip):.1f} deg); there the curve is extrapolated",
-                False,
+                f"({np.degrees(slip):.1f} deg); there the curve is extrapolated"
             )
+            yield Objection("beyond_known", axle, text, False)
 
 
-def _turning(asked: Asked) -> Iterator[Objection]:
+def _turning(asked: _Asked) -> Iterator[Objection]:
     """Judge an estimated v_y by the accelerometer; means tell of bank and offset, and are left."""
     recording, windows = asked.recording, asked.found.windows
     if recording.logged_v_y is not None or recording.v_y is None or recording.a_y is None:
@@ -288,21 +275,19 @@ def _turning(asked: Asked) -> Iterator[Objection]:
     felt = windows.mean(recording.a_y)
     motion = windows.rate(recording.v_y) + windows.mean(recording.v_x * recording.r)
     felt, motion = felt - felt.mean(), motion - motion.mean()
-    power = float(np.mean(motion**2)) - lateral_noise(recording, windows)[0]
+    power = float(np.mean(motion**2)) - lateral_noise(recording, windows)
     if not power > (RULES.force * GRAVITY) ** 2:
         return
     slope, (least, most) = float(np.mean(felt * motion)) / power, RULES.rolling
     if not least <= slope <= most:
-        yield Objection(
-            "a_y_disagrees",
-            None,
+        text = (
             f"the recorded a_y is {slope:.2g} times what v_x, r and the estimated v_y give "
-            f"({least:g} to {most:g} are usual): check the scales of v_x, r and a_y, and delays",
-            True,
+            f"({least:g} to {most:g} are usual): check the scales of v_x, r and a_y, and delays"
         )
+        yield Objection("a_y_disagrees", None, text, True)
 
 
-def _unobserved(asked: Asked) -> Iterator[Objection]:
+def _unobserved(asked: _Asked) -> Iterator[Objection]:
     """Refuse where the side slip that the model is judged at is hardly known."""
     recording = asked.recording
     if recording.logged_v_y is not None or recording.a_y is None:
@@ -313,13 +298,11 @@ def _unobserved(asked: Asked) -> Iterator[Objection]:
     at = asked.found.windows.starts
     sd = float(np.median(found.sd[at] / recording.v_x[at]))
     if not sd <= RULES.side_slip:
-        yield Objection(
-            "side_slip_unknown",
-            None,
+        text = (
             f"side slip is estimated to ± {np.degrees(sd):.2g} deg (limit "
-            f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom",
-            True,
+            f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom"
         )
+        yield Objection("side_slip_unknown", None, text, True)
 
 
 def _at_bound(one: Reached) -> Objection:
@@ -337,7 +320,7 @@ def _roads(found: RoadFriction | None) -> list[Objection]:
     return listed
 
 
-def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict:
+def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdict:
     model, recording, found = asked.model, asked.recording, asked.found
     if len(recording) < len(whole):
         minutes = len(recording) * whole.dt / 60.0, whole.duration / 60.0
@@ -349,9 +332,9 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
     )
     lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
-        "force_missed": _pair(found.missed),
-        "rms_force_static_loads": _pair(found.force),
-        "peak_force_static_loads": _pair(found.peak),
+        "force_missed": tuple(map(float, found.missed)),
+        "rms_force_static_loads": tuple(map(float, found.force)),
+        "peak_force_static_loads": tuple(map(float, found.peak)),
         "explained_lateral": lateral,
         "explained_yaw": yaw,
     }
@@ -364,7 +347,6 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
         )
         for one in model.estimates()
     )
-    blind = WITHOUT_V_Y if recording.logged_v_y is None else ()
     clock, starts, n = whole.t[asked.portion.samples], found.windows.starts, found.windows.n
     middle = 0.5 * (clock[starts] + clock[starts + n])
     return Verdict(
@@ -372,7 +354,7 @@ def _verdict(asked: Asked, listed: list[Objection], whole: Recording) -> Verdict
         numbers=numbers,
         measures=measures,
         reach=_reach(model, recording),
-        blind=blind,
+        blind=WITHOUT_V_Y if recording.logged_v_y is None else (),
         shown=WindowForces(middle, found.measured, found.modelled),
     )
 
@@ -390,17 +372,8 @@ def _reach(model: TireModel, recording: Recording) -> str:
     return f"{speeds[0]:.3g} to {speeds[1]:.3g} m/s, {slip}"
 
 
-def _pair(values: Array | None) -> tuple[float, ...] | None:
-    return None if values is None else tuple(float(value) for value in values)
-
-
 def _too_short(model: TireModel) -> Verdict:
-    finding = Objection(
-        "too_short",
-        None,
-        f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly: there is nothing to "
-        "judge by",
-        True,
-    )
+    few = f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly"
+    finding = Objection("too_short", None, f"{few}: there is nothing to judge by", True)
     numbers = tuple(Number(*one, valid=False) for one in model.estimates())
     return Verdict(findings=(finding,), numbers=numbers, measures={})

@@ -21,7 +21,7 @@ from models.vehicle import GRAVITY, Vehicle
 WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
-SEGMENT = 0.3  # share of the windows that may be missed in one piece
+_SEGMENT = 0.3  # share of the windows that may be missed in one piece
 _REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
 _CONFINED = 0.6  # and of what is missed with the piece
 
@@ -110,22 +110,19 @@ def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
     """Return the variance that white noise of v_y and r leaves in `measured_force`, (2,)."""
-    inertia = car_numbers(vehicle)[:, 2]
-    v_y, turning = recording.logged_v_y, (inertia * white_noise(recording.r)) ** 2
+    turning = (car_numbers(vehicle)[:, 2] * white_noise(recording.r)) ** 2
+    v_y = recording.logged_v_y
+    lateral = 0.0 if v_y is None else white_noise(v_y) / GRAVITY
+    variance: Array = 2.0 * (lateral**2 + turning) / windows.duration**2
     if v_y is None:
-        felt = (white_noise(recording.needed("a_y")) / GRAVITY) ** 2 / windows.n
-        without: Array = 2.0 * turning / windows.duration**2 + felt
-        return without
-    lateral = white_noise(v_y) / GRAVITY
-    variance: Array = 2.0 * (lateral**2 + turning)
-    return variance / windows.duration**2
+        variance += (white_noise(recording.needed("a_y")) / GRAVITY) ** 2 / windows.n
+    return variance
 
 
-def lateral_noise(recording: Recording, windows: Windows) -> tuple[float, float]:
-    """Return the variance that white noise leaves in means of v̇_y + v_x r, and of a_y [m²/s⁴]."""
-    v_y, a_y = (white_noise(recording.needed(name)) for name in ("v_y", "a_y"))
+def lateral_noise(recording: Recording, windows: Windows) -> float:
+    """Return the variance that white noise leaves in means of v̇_y + v_x r [m²/s⁴]."""
     turning = float(np.mean(recording.v_x**2)) * white_noise(recording.r) ** 2 / windows.n
-    return 2.0 * (v_y / windows.duration) ** 2 + turning, a_y**2 / windows.n
+    return 2.0 * (white_noise(recording.needed("v_y")) / windows.duration) ** 2 + turning
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,8 +151,11 @@ class Evidence:
 
     @property
     def missed(self) -> Array:
-        """Share of the measured force that is not explained, noise taken off, (2,)."""
-        return clean_share(self.measured - self.modelled, self.measured, self.noise)
+        """Share of the measured force that is not explained, noise taken off, (2,); else one."""
+        size = np.sqrt(np.mean(self.measured**2, axis=0))
+        rms = clean_rms(self.measured - self.modelled, self.noise)
+        share: Array = np.divide(rms, size, out=np.ones(2), where=size > 0.0)
+        return share
 
     def where(self, kept: NDArray[np.bool_]) -> "Evidence":
         """Return the evidence of some of the windows (m,)."""
@@ -174,7 +174,7 @@ class Evidence:
         """
         if (self.missed <= _REST_MISSED).all():
             return self, None
-        first, last = self.worst_segment(SEGMENT)
+        first, last = self._worst_segment()
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
         confined = (rest.missed <= np.minimum(_REST_MISSED, _CONFINED * self.missed.max())).all()
@@ -182,11 +182,9 @@ class Evidence:
             return rest, (first, last)
         return self, None
 
-    def worst_segment(self, share: float) -> tuple[int, int]:
-        """Return the segment of a share of the windows in which most is missed: first, past
-        last.
-        """
-        n = max(1, int(share * len(self.windows)))
+    def _worst_segment(self) -> tuple[int, int]:
+        """Return the segment in which most is missed: first window, past last."""
+        n = max(1, int(_SEGMENT * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
         missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
         total = np.concatenate([[0.0], np.cumsum(missed)])
@@ -200,15 +198,6 @@ def clean_rms(signal: Array, noise: Array) -> Array:
     """
     rms: Array = np.sqrt(np.maximum(np.mean(signal**2, axis=0) - noise, 0.0))
     return rms
-
-
-def clean_share(missed: Array, force: Array, noise: Array) -> Array:
-    """Return the rms of what is missed over that of the force, (2,); one where there is no force.
-    missed, force : (m, 2).   noise : variance in `missed` (2,).
-    """
-    size = np.sqrt(np.mean(force**2, axis=0))
-    share: Array = np.divide(clean_rms(missed, noise), size, out=np.ones(2), where=size > 0.0)
-    return share
 
 
 def brisk_from(model: TireModel) -> float:

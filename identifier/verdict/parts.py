@@ -14,7 +14,6 @@ from identifier.tire_model import TireModel
 from identifier.verdict.motion import Evidence
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
-from models.vehicle import Vehicle
 
 PARTS = 4  # of the drive, each of which is left out once
 _Teach = Callable[[Recording], TireModel]
@@ -35,9 +34,10 @@ class _AskedRun(NamedTuple):
     until: float | None
     road: Array | None
 
-    def taught(self, recording: Recording, vehicle: Vehicle) -> TireModel:
+    def taught(self, recording: Recording) -> TireModel:
         """Return what the run's method learns of another drive until the freeze."""
-        return learn(recording, vehicle, self.history.design, self.history.start, self.until)
+        run = self.history
+        return learn(recording, run.vehicle, run.design, run.start, self.until)
 
 
 def asked_run(history: History, t: float | None = None) -> _AskedRun:

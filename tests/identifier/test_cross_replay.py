@@ -9,9 +9,10 @@ from identifier.baselines import LinearBaseline
 from identifier.compare.course import (
     INFINITE,
     Course,
+    Trial,
     cross_replay,
-    frozen_shares,
     same_and_other,
+    shares,
 )
 from identifier.reproducibility import AxleRmse
 
@@ -38,9 +39,8 @@ def test_shares_are_means_over_the_right_drives(course):
     sizes = {recording.name: course.size(recording) for recording in course.recordings}
     none = AxleRmse(front=0.0, rear=0.0)
     frozen = {"a": {"a": none, "b": sizes["b"]}, "b": {"a": sizes["a"], "b": none}}
-    own, other = frozen_shares(frozen, course)
-    assert own == pytest.approx(0.0)
-    assert other == pytest.approx(100.0)
+    found = shares(Trial(online={"a": none, "b": none}, frozen=frozen, diverged_at={}), course)
+    assert found == pytest.approx((0.0, 0.0, 100.0))
 
 
 def test_a_method_without_learning_errs_by_the_same_on_a_drive_wherever_it_learnt(course, car):

@@ -4,7 +4,7 @@
  *
  * The log is CSV with a header and, in any order, the columns t [s], vx, vy [m/s], r [rad/s],
  * delta_f [rad], where the step reads it ay [m/s^2] and, where there is one, delta_r [rad]; one row
- * each TIREID_SAMPLE_TIME. Where v_y is told, vy may be left out, and v_y stands beside the forces.
+ * each TIREID_SAMPLE_TIME. Where v_y is an output, vy may be left out: v_y stands by the forces.
  */
 #include <math.h>
 #include <stdio.h>

@@ -122,15 +122,15 @@ static tireid_input tireid_possible(const tireid_params *params, const tireid_in
 #endif
 
 #if TIREID_LEARNS || !TIREID_SUMS
-/* Sum of all numbers that a step tells. */
+/* Sum of all numbers that a step outputs. */
 static inline tireid_real tireid_sum_of(const tireid_values *next, const tireid_output *out)
 {
-    const tireid_real *told = tireid_numbers(out);
+    const tireid_real *given = tireid_numbers(out);
     tireid_real sum =
         tireid_sum(tireid_numbers(next), (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
     uint32_t i;
     for (i = 0U; i < (uint32_t)(sizeof(tireid_output) / sizeof(tireid_real)); i++) {
-        sum += told[i];
+        sum += given[i];
     }
     return sum;
 }

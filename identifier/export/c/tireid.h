@@ -27,7 +27,7 @@
 extern "C" {
 #endif
 
-/* Samples in a row that are refused after which no force is told any more. */
+/* Samples in a row that are refused after which no force is output any more. */
 #define TIREID_STALE_SAMPLES ((uint32_t)((TIREID_STALE_TIME / TIREID_SAMPLE_TIME) + 0.5))
 
 typedef enum {

@@ -23,7 +23,7 @@ enum {
   VR_SAMPLE_TIME = 11,
   VR_MIN_SPEED = 12,
   VR_A_Y = 13,
-  VR_V_Y = 14, /* that is told */
+  VR_V_Y = 14, /* output */
   VR_V_Y_SD = 15,
   VR_OBSERVABLE = 16,
   VR_HALF_BAND = 17 /* of the front axle, then of the rear one */

@@ -1,15 +1,13 @@
-"""The step of a car with downforce in C: the bits of CasADi, and of both compilers."""
+"""The step of a car with downforce in C: the bits of CasADi."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from codegen.processor import replay
 from identifier.export.compiled import CompiledPackage, samples_of
 from identifier.export.onnx import onnx_bytes
 from identifier.export.package import build_package, run_in_virtual_machine
-from identifier.export.processor import recording_program
 from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
@@ -39,25 +37,6 @@ def test_c_computes_the_bits_of_casadi(package, rows):
     np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)
     for name, value in run.weights.items():
         np.testing.assert_array_equal(value, state[name].reshape(value.shape))
-
-
-def test_float_is_within_a_tenth_of_a_newton_over_45_s(slalom):
-    package = build_package(AXLE, RACER)
-    double, single = (
-        CompiledPackage.of(package, single=choice).run(slalom) for choice in (False, True)
-    )
-    assert 0.0 < np.abs(double.axle_force - single.axle_force).max() <= 0.1
-
-
-@pytest.mark.parametrize("single", [False, True])
-def test_both_compilers_make_the_same_bits(package, rows, single, run):
-    for compiler in ("gcc", "clang"):
-        run(compiler, "--version")  # skips where there is none
-    gcc, clang = (
-        replay(recording_program("tireid", package.files, rows), compiler, single=single)
-        for compiler in ("gcc", "clang")
-    )
-    assert gcc.hash == clang.hash
 
 
 def test_the_package_learns_what_identify_learns(package, slalom):

@@ -147,12 +147,6 @@ def test_forces_are_those_of_python_to_the_last_bit(master, version, dt):
     assert np.abs(forces - in_python(drive)["axle_force"]).max() == 0.0
 
 
-def test_forces_are_those_of_identify(master):
-    drive = swaying(1500)
-    history = identify(drive, CAR, design())
-    assert np.abs(master().run(rows(drive), 0.01) - history.axle_force).max() < 1e-9
-
-
 @pytest.mark.parametrize("version", [2, 3])
 def test_fmpy_simulates_it_in_one_call(exported, version):
     drive = swaying(300)

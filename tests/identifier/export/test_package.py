@@ -189,24 +189,21 @@ def test_cmake_builds_and_the_self_test_passes(law, single, packages, write, run
     assert np.sqrt((error**2).mean()) < 0.2 * np.sqrt((slalom.axle_force[2000:] ** 2).mean())
 
 
-def test_the_self_test_sees_a_wrong_sign(packages, write, run, compiler):
+@pytest.mark.parametrize(
+    ("file", "right", "wrong"),
+    [
+        ("src/tireid_equations.c", r"next->z\[0\] = \(", "next->z[0] = -("),
+        ("tests/tireid_vectors.h", r"(?<=\{ )(?=-?[1-9]\d{2,}\.)", "1"),  # in one force
+    ],
+    ids=["sign", "vector"],
+)
+def test_the_self_test_sees_a_wrong_sign_and_a_wrong_vector(
+    file, right, wrong, packages, write, run, compiler
+):
     folder = write(packages["integral"])
-    equations = folder / "src" / "tireid_equations.c"
-    text = equations.read_text()
-    assert "next->z[0] = (" in text
-    equations.write_text(text.replace("next->z[0] = (", "next->z[0] = -("))
-    sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
-    run(compiler, "-std=c99", "-Iinclude", *sources, "-lm", "-o", "self_test", cwd=folder)
-    answer = run(str(folder / "self_test"))
-    assert answer.returncode == 1
-    assert "FAILED: forces are those of the vectors" in answer.stdout
-
-
-def test_the_self_test_sees_a_wrong_vector(packages, write, run, compiler):
-    folder = write(packages["integral"])
-    vectors = folder / "tests" / "tireid_vectors.h"
-    *head, last = re.split(r"(?<=\{ )(?=-?[1-9]\d{2,}\.)", vectors.read_text())
-    vectors.write_text("".join(head) + "1" + last)  # one digit more in one force
+    text, count = re.subn(right, wrong, (folder / file).read_text(), count=1)
+    assert count == 1
+    (folder / file).write_text(text)
     sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
     run(compiler, "-std=c99", "-Iinclude", *sources, "-lm", "-o", "self_test", cwd=folder)
     answer = run(str(folder / "self_test"))

@@ -14,13 +14,12 @@ from identifier.plan import PlanError, PlausibleTires, Space, hold_of, make_plan
 from identifier.plan import search as search_module
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
 from identifier.plan.motion import LEAST_SLOPE, NO_HOLD, Entry, Hold, simulate, steps_of
-from identifier.plan.plan import _rated, longest_pass, random_of, slalom_of
+from identifier.plan.plan import _longest_pass, _rated, random_of, slalom_of
 from identifier.plan.search import (
     CALM,
     REAR,
     Search,
-    Steerings,
-    after_pass,
+    _Steerings,
     body_of,
     edge_distance,
     swing_time,
@@ -192,7 +191,7 @@ def test_a_swing_takes_as_long_as_its_rate_wants(tires):
     slow, angle = replace(SPACE, rate_limit=0.2), float(tires.slip_at(SPACE.share)[0, 0])
     took = swing_time(tires, slow)
     at = np.zeros(1)
-    swing = Steerings(np.array([[0.0, took]]), np.array([[angle, -angle]]), Entry(at, at, at))
+    swing = _Steerings(np.array([[0.0, took]]), np.array([[angle, -angle]]), Entry(at, at, at))
     t = np.linspace(0.0, took, 2001)
     delta = swing.delta(t)[:, 0]
     assert delta[0] == angle and delta[-1] == -angle and abs(delta[1000]) < 1e-12
@@ -299,7 +298,6 @@ def test_costs_are_the_errors_of_passes_and_more_than_1_beyond_a_limit(tires):
     one = int(np.flatnonzero(over <= 0.0)[0])
     taken = search.as_pass(begin[one : one + 1])
     assert costs[one] == pytest.approx(taken.error) and taken.error < 1.0
-    assert after_pass(tires, taken).covariance is taken.covariance
     np.testing.assert_allclose(taken.course(taken.t[[0, -1]])[:, 0], taken.motion.X[[0, -1], 0, 0])
 
 
@@ -371,7 +369,7 @@ def test_a_car_turns_where_a_circle_at_four_fifths_of_its_share_has_room(tires):
     wide = 2.0 * (math.hypot(radius + body.side, body.ahead) + SPACE.margin)
     for share, endless in ((1.001, True), (0.999, False)):
         space = replace(SPACE, speed=8.0, length=100.0, width=share * wide)
-        assert (longest_pass(tires, space) == math.inf) is endless
+        assert (_longest_pass(tires, space) == math.inf) is endless
 
 
 def test_an_area_is_large_enough_when_it_is_as_large_as_was_asked(tires):

@@ -13,7 +13,7 @@ from identifier.plan import information as information_module
 from identifier.plan import search as search_module
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
 from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, simulate, steps_of, time_step
-from identifier.plan.plan import extent, free_motion, hardest, longest_pass, slalom_of
+from identifier.plan.plan import _longest_pass, extent, free_motion, hardest, slalom_of
 from identifier.plan.search import Search, body_of
 from identifier.run import identify
 from models.bicycle import BicycleParameters, bicycle
@@ -223,8 +223,10 @@ def test_an_area_that_a_car_crosses_is_driven_several_times_and_each_teaches(tir
 
 
 def test_where_a_car_can_turn_a_pass_has_no_end(tires):
-    assert longest_pass(tires, space(length=80.0, width=80.0, speed=6.0)) == math.inf
-    assert longest_pass(tires, space()) == pytest.approx((60.0 - 2.0 - 1.64 * CAR.wheelbase) / 15.0)
+    assert _longest_pass(tires, space(length=80.0, width=80.0, speed=6.0)) == math.inf
+    assert _longest_pass(tires, space()) == pytest.approx(
+        (60.0 - 2.0 - 1.64 * CAR.wheelbase) / 15.0
+    )
 
 
 @pytest.mark.parametrize(

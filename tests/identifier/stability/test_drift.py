@@ -1,28 +1,22 @@
-import math
+"""Slow drift of the weights, and the PI-lead law z + τ ξ̃ that takes it away, τ long enough."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
+from identifier.paper.laws import LAWS, DrivingError, Gains
+from identifier.stability import Operation, certify
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
-from identifier.stability.margins import drift_frequency, passivity_shortage, sufficient_leakage
-from tests.identifier.stability.storage import lead_time, pi_lead
+from identifier.stability.margins import drift_frequency, gain_margin
+from identifier.stability.sampled_bound import Disturbance
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])
+LEAD = 0.75  # s: along P positive real from 0.735 on
 
 
-def shortage_formula(a: float, lam: float) -> float:
-    """1/(a (a + λ) (√a + √λ)²): shortage of passivity of the integral law with A_d = -a I.
-
-    Parameters
-    ----------
-    a : decay rate of A_d = -a I [1/s].
-    lam : forgetting factor λ [1/s].
-    """
-    return 1.0 / (a * (a + lam) * (math.sqrt(a) + math.sqrt(lam)) ** 2)
-
-
-def weight_error_after(a, lam, eta, frequency, leakage=0.0, law=INTEGRAL, duration=400.0, dt=2e-3):
+def weight_error_after(a, lam, eta, frequency, law=INTEGRAL, duration=400.0, dt=2e-3):
     """|W_t| of one weight under a regressor s = sin(frequency t), from 1, no residual."""
     s = np.sin(frequency * np.arange(round(duration / dt)) * dt)
     error, z, weight = 0.0, 0.0, 1.0
@@ -31,7 +25,7 @@ def weight_error_after(a, lam, eta, frequency, leakage=0.0, law=INTEGRAL, durati
         error, z, weight = (
             error + dt * (-a * error + weight * regressor),
             z + dt * (error - lam * z),
-            weight + dt * (-eta / a * drive * regressor - leakage * weight),
+            weight + dt * (-eta / a * drive * regressor),
         )
     return abs(weight)
 
@@ -44,35 +38,74 @@ def test_weights_drift_above_the_drift_frequency_at_a_gain_far_within_the_limit(
     assert weight_error_after(a, lam, eta, 3.2, law=INSTANTANEOUS) < 0.1
 
 
-def test_the_sufficient_leakage_stops_the_drift():
-    a, lam, eta = 2.0, 2.0, 0.4
-    A_d = -a * np.eye(2)
-    s0 = sufficient_leakage(A_d=A_d, forgetting=lam, law=INTEGRAL, eta_W=eta, n_h=1)
-    assert s0 == pytest.approx(eta * shortage_formula(a, lam), rel=1e-8)
-    assert weight_error_after(a, lam, eta, 3.2, leakage=s0) < 1.0
-
-
 def test_the_drift_frequency_of_every_law_with_equal_poles_is_the_closed_form():
     a, lam = 5.0, 3.0
     A_d = -a * np.eye(2)
     assert drift_frequency(A_d=A_d, forgetting=lam, law=INSTANTANEOUS) == np.inf
     for tau in (0.05, 0.1, 0.19):
         expected = np.sqrt(a * lam * (1 + tau * lam) / (1 - tau * a))
-        found = drift_frequency(A_d=A_d, forgetting=lam, law=pi_lead(tau))
+        found = drift_frequency(A_d=A_d, forgetting=lam, law=DrivingError(1.0, tau))
         assert found == pytest.approx(expected, rel=1e-9)
-    assert drift_frequency(A_d=A_d, forgetting=lam, law=pi_lead(1.0 / a)) == np.inf
-
-
-def test_the_shortage_of_passivity_is_the_closed_form_and_zero_for_the_instantaneous_law():
-    for a, lam in ((5.0, 3.0), (1.0, 20.0), (8.0, 8.0)):
-        A_d = -a * np.eye(2)
-        found = passivity_shortage(A_d=A_d, forgetting=lam, law=INTEGRAL)
-        assert found == pytest.approx(shortage_formula(a, lam), rel=1e-8)
-        assert passivity_shortage(A_d=A_d, forgetting=lam, law=INSTANTANEOUS) == 0.0
+    for lead, limited in ((1.0 / a, False), (0.999 / a, True)):
+        found = drift_frequency(A_d=A_d, forgetting=lam, law=DrivingError(1.0, lead))
+        assert np.isfinite(found) is np.bool_(limited)
 
 
 def test_for_skewed_error_dynamics_only_the_lyapunov_direction_is_positive_real():
     pair = lyapunov(SKEWED, 2.0 * np.eye(2))
-    law = pi_lead(1.01 * lead_time(pair, forgetting=3.0))
+    law = DrivingError(1.0, LEAD)
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law) < 1e4
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law, direction=pair.P) == np.inf
+
+
+def test_the_lead_removes_the_gain_limit_that_the_integral_law_has():
+    for law, limited in ((INTEGRAL, True), (DrivingError(1.0, 0.25), False)):
+        loop = Loop(A_d=-4.0 * np.eye(2), forgetting=3.0, law=law, G=np.eye(2))
+        assert np.isfinite(gain_margin(loop).factor) is np.bool_(limited)
+
+
+def test_with_skewed_error_dynamics_the_printed_direction_has_a_limit_even_with_lead():
+    pair, law = lyapunov(SKEWED, 2.0 * np.eye(2)), DrivingError(1.0, LEAD)
+    printed = Loop(A_d=SKEWED, forgetting=3.0, law=law, G=np.eye(2))
+    passive = Loop(A_d=SKEWED, forgetting=3.0, law=law, G=np.eye(2), direction=pair.P)
+    assert np.isfinite(gain_margin(printed).factor)
+    assert gain_margin(passive).factor == np.inf
+
+
+def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        A_d = -rng.uniform(1.0, 8.0) * np.eye(2) + 2.0 * rng.standard_normal((2, 2))
+        if np.linalg.eigvals(A_d).real.max() > -0.1:
+            continue
+        P = direction_matrix(LAWS["pi_lead"], A_d)
+        np.testing.assert_allclose(A_d.T @ P + P @ A_d, -2.0 * np.eye(2), atol=1e-10)
+        printed = direction_matrix(LAWS["integral"], A_d)
+        np.testing.assert_allclose(A_d.T @ printed, -np.eye(2), atol=1e-10)
+
+
+def test_the_certificate_finds_no_gain_limit_of_the_lead_even_for_skewed_error_dynamics():
+    task = Operation(
+        n_h=4,
+        dt=0.001,
+        integrator="rk4",
+        bandwidth=0.5,
+        disturbance=Disturbance(residual=2.0),
+        needed_force=2.0,
+        x_bar_max=1.0,
+        input_feedback=None,
+    )
+    gains = Gains(
+        A_d=tuple(map(tuple, SKEWED)),
+        forgetting=3.0,
+        eta_W=1.0,
+        eta_V=0.0,
+        rho_W=0.1,
+        rho_V=0.1,
+        lead=LEAD,
+    )
+    certificate = certify(gains, LAWS["pi_lead"], task)
+    assert certificate["gain_continuous"].margin == np.inf
+    assert certificate["drift"].limit == np.inf
+    short = certify(replace(gains, lead=0.2 * LEAD), LAWS["pi_lead"], task)
+    assert short["drift"].limit < np.inf

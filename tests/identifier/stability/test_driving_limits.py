@@ -11,14 +11,12 @@ from identifier.paper.network import Network
 from identifier.stability import certify
 from identifier.stability.operation import (
     SPEED_SPREAD,
+    _largest_signals,
+    _residual_bound,
     declared_signals,
     disturbance,
     expected_residual,
-    input_per_error,
-    largest_signals,
     minimal_decay,
-    operation,
-    residual_bound,
 )
 
 HARD = {"v_x": 20.0, "slip": 0.12, "friction": 0.9}
@@ -26,7 +24,7 @@ DRIVING = Driving(**HARD, bandwidth=0.5)
 
 
 def test_a_random_state_within_slip_and_grip_stays_within_the_signals(car):
-    limits = largest_signals(car, **HARD)
+    limits = _largest_signals(car, **HARD)
     rng = np.random.default_rng(0)
     alpha = rng.uniform(-0.12, 0.12, (1000, 2))
     r = 1.5 * rng.uniform(-1, 1, 1000) * 0.9 * 9.81 / 20.0
@@ -39,7 +37,7 @@ def test_a_random_state_within_slip_and_grip_stays_within_the_signals(car):
 def test_no_tire_between_none_and_twice_the_stated_stiffness_misses_more_than_the_bound(car):
     """Magic curves of any friction and shape; those that slide late are the ones that counted."""
     rng, C = np.random.default_rng(1), (car.cornering_stiffness_front, car.cornering_stiffness_rear)
-    bound, worst = residual_bound(car, slip=0.12), 0.0
+    bound, worst = _residual_bound(car, slip=0.12), 0.0
     for _ in range(300):
         alpha, friction = rng.uniform(-0.12, 0.12, 2), rng.uniform(0.05, 1.2, 2)
         shape, stiffer = rng.uniform(1.0, 1.9), rng.uniform(0.1, 2.0)
@@ -53,7 +51,7 @@ def test_a_smooth_tire_misses_force_long_before_it_slides(car):
     """At half the slip of sliding nothing slides, and yet the linear tire is wrong."""
     sliding = min(car.axle_loads) / max(car.cornering_stiffness_front, car.cornering_stiffness_rear)
     missed = expected_residual(car, slip=0.5 * sliding, friction=1.0)
-    assert 0.0 < 100.0 < missed < residual_bound(car, slip=0.5 * sliding)
+    assert 0.0 < 100.0 < missed < _residual_bound(car, slip=0.5 * sliding)
     late = expected_residual(car, slip=0.12, friction=0.9)
     slid = 0.12 * np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
     assert late == pytest.approx(np.linalg.norm(slid - 0.9 * np.array(car.axle_loads)), rel=0.05)
@@ -116,7 +114,7 @@ def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_
 def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
     for law in ("integral", "instantaneous_scaled"):
         design = PaperIdentifier.for_vehicle(car, law=law)
-        task = operation(design, car, DRIVING)
+        task = design.operation(car, DRIVING)
         certificate = certify(design.gains, LAWS[design.law], task)
         assert certificate["gain_sampled"].margin > 1.0
         a = -design.gains.A_d[0][0]
@@ -126,7 +124,7 @@ def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
 
 def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):
     design = replace(PaperIdentifier.for_vehicle(car), input_source="estimated")
-    task = operation(design, car, DRIVING)
+    task = design.operation(car, DRIVING)
     assert task.input_feedback is not None
     assert 5.0 < minimal_decay(task.input_feedback) < 12.0
 
@@ -153,4 +151,4 @@ def test_an_error_of_the_estimate_adds_most_to_the_input_at_the_slowest_speed_th
     shown = 0.95 * 20.0 - 4.0
     angles = np.array([[1.0, car.l_f], [1.0, -car.l_r]]) / shown
     expected = np.linalg.norm(angles / [[0.1], [0.2]] @ K * design.force_unit, 2)
-    assert input_per_error(design, car, noisy) == pytest.approx(expected, rel=1e-9)
+    assert design.operation(car, noisy).input_per_error == pytest.approx(expected, rel=1e-9)

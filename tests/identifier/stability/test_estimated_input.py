@@ -6,7 +6,7 @@ from benchmarks.steady_cornering import jacobian_feedback
 from identifier.paper.network import hidden_layer
 from identifier.stability.loop import INTEGRAL, Loop
 from identifier.stability.margins import gain_margin
-from identifier.stability.operation import axle_coupling, estimated_input_feedback, minimal_decay
+from identifier.stability.operation import estimated_input_feedback, minimal_decay
 from models.bicycle import BicycleParameters, bicycle, slip_angles
 
 CAR = {"m": 1500.0, "I_z": 2500.0, "l_f": 1.15, "l_r": 1.55}
@@ -35,7 +35,7 @@ def test_the_feedback_is_the_jacobian_of_what_the_linear_tire_misses():
 
 
 def test_the_coupling_is_symmetric_and_positive_so_that_the_minimal_decay_is_a_real_eigenvalue():
-    N = axle_coupling(**CAR)
+    N = estimated_input_feedback(**CAR, stiffness_lost=(1.0, 1.0), v_x=1.0)
     np.testing.assert_allclose(N, N.T)
     assert np.linalg.eigvalsh(N)[0] > 0.0
     feedback = saturated_car_feedback(20.0)

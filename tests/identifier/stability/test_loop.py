@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from identifier.paper.laws import LAWS, Law, filter_rate, weight_rates
+from identifier.paper.laws import LAWS, DrivingError, Law, filter_rate, weight_rates
 from identifier.paper.laws import euler as euler_step
 from identifier.paper.laws import rk4 as rk4_step
 from identifier.paper.network import hidden_layer
@@ -19,7 +19,6 @@ from identifier.stability.loop import (
     root_locus,
     spectral_radius,
 )
-from tests.identifier.stability.storage import pi_lead
 
 A_D = np.array([[-6.0, 2.5], [-0.7, -4.0]])
 
@@ -103,7 +102,7 @@ def test_the_exact_integrator_is_the_matrix_exponential():
 def test_a_law_gives_the_coefficients_of_its_driving_error_and_one_that_drives_away_is_refused():
     assert LAWS["integral"].error(0.2) == INTEGRAL == (1.0, 0.0)
     assert LAWS["instantaneous"].error(0.2) == INSTANTANEOUS == (0.0, 1.0)
-    assert LAWS["pi_lead"].error(0.2) == pi_lead(0.2) == (1.0, 0.2)
+    assert LAWS["pi_lead"].error(0.2) == DrivingError(1.0, 0.2) == (1.0, 0.2)
     with pytest.raises(ValueError, match="positively"):
         Law(name="away", z=-1.0, xi=1.0)
     with pytest.raises(ValueError, match="positively"):

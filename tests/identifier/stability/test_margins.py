@@ -9,7 +9,6 @@ from benchmarks.limits import integral_limit
 from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
 from identifier.stability.margins import gain_margin, phase_margin
-from tests.identifier.stability.storage import pi_lead
 
 
 def scalar_loop(
@@ -118,7 +117,7 @@ def test_the_instantaneous_law_too_has_a_gain_limit_where_error_dynamics_are_not
     assert gain_margin(symmetric).factor == np.inf
 
 
-@pytest.mark.parametrize("law", [INTEGRAL, INSTANTANEOUS, pi_lead(0.05)])
+@pytest.mark.parametrize("law", [INTEGRAL, INSTANTANEOUS, DrivingError(1.0, 0.05)])
 @pytest.mark.parametrize(("integrator", "dt"), [(exact, None), (euler, 0.01)])
 def test_eigenvalues_and_python_control_find_the_same_margins(law, integrator, dt):
     a, lam, g, leakage = 6.0, 9.0, 500.0, 0.2

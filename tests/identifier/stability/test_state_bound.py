@@ -3,7 +3,7 @@ import pytest
 
 from benchmarks.limits import integral_euler_limit
 from identifier.paper.design import PaperIdentifier
-from identifier.paper.laws import Gains, diagonal
+from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.paper.network import Network
 from identifier.run import identify
 from identifier.stability.bounds import small_gain, steady_capacity, transient_peak
@@ -11,10 +11,10 @@ from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.operation import Operation, proven_bounds
 from identifier.stability.printed import (
-    bound_14,
-    canceling_pair,
-    printed_k_b,
-    tight_k_b,
+    _bound_14,
+    _canceling_pair,
+    _printed_k_b,
+    _tight_k_b,
     trivial_bound,
 )
 from identifier.stability.sampled_bound import (
@@ -24,10 +24,9 @@ from identifier.stability.sampled_bound import (
     error_gains,
     output_layer,
 )
-from tests.identifier.stability.storage import pi_lead
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
-LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead(0.3)}
+LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": DrivingError(1.0, 0.3)}
 
 
 def learning_of(A_d, law, *, lam, eta_W, rho_W, n_h, integrator="euler", dt=2e-3):
@@ -249,8 +248,6 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
         needed_force=f_max,
         x_bar_max=x_bar_max,
         input_feedback=None,
-        W_M=0.0,
-        w_bar=f_max,
         V_start=V_start,
     )
     inverse = np.eye(2) / 6.0
@@ -272,9 +269,9 @@ def test_the_integral_law_passes_bound_14_many_times_over():
     f, s = np.zeros((40000, 2)), np.ones((40000, n_h))
     f[:50] = 1e-2  # a nudge
     error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
-    pair = canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
+    pair = _canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
     ideal = {"W_M": 1.0, "n_h": n_h, "eta_W": eta, "rho_W": rho}  # generous: W_M is 0
-    tight = bound_14(pair, w_bar=0.0, k_b=tight_k_b(pair, **ideal))
+    tight = _bound_14(pair, w_bar=0.0, k_b=_tight_k_b(pair, **ideal))
     assert error > 100.0 * tight
 
 
@@ -285,7 +282,7 @@ def test_the_integral_law_passes_even_the_printed_route_where_a_is_slow():
     f[:50] = 1e-3
     error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
     pair = lyapunov(-a * np.eye(2), 2.0 * eta / rho * np.eye(2))  # |P| = (η/ρ)/a: b is smallest
-    k_b = printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
-    printed = bound_14(pair, w_bar=0.0, k_b=k_b)
+    k_b = _printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
+    printed = _bound_14(pair, w_bar=0.0, k_b=k_b)
     assert error > 1.2 * printed
     assert trivial_bound(-a * np.eye(2), 1e-3) < printed
