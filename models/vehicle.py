@@ -4,7 +4,6 @@ SI units, ISO axes. The cornering stiffness is per axle (both tires), in the pap
 F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the ISO 8855 slip angle.
 """
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,7 @@ from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
 from models.rules import require_number, require_positive, require_within
-from models.schema import Table, read_toml, require_name
+from models.schema import Table, read_toml, require_name, toml_value
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
 #
@@ -98,7 +97,7 @@ class Chassis:
 # A dataclass of a vehicle as the text of a TOML file, with exact numbers.
 
 
-def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
+def _toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
     """Return the TOML text of a dataclass and of the one dataclass inside it.
     record : the dataclass to write; fields that are None are left out.
     """
@@ -109,7 +108,7 @@ def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str]
     ]
     inner = getattr(record, table, None)
     if inner is not None:
-        lines += ["", f"[{table}]", toml_text(inner, folder=folder, table="")]
+        lines += ["", f"[{table}]", _toml_text(inner, folder=folder, table="")]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -119,9 +118,7 @@ def _value(value: Any, folder: Path) -> str:
             value = Path(os.path.relpath(value, folder)).as_posix()
         except ValueError:  # another drive
             value = value.as_posix()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(float(value))  # the shortest text that reads back to the same bits
+    return toml_value(value)
 
 
 GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
@@ -136,12 +133,12 @@ GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 
 _MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
 _STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
-RULES = {
+_RULES = {
     "yaw_inertia": f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car",
     "cornering_stiffness_front": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
     "cornering_stiffness_rear": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
 }
-UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
+_UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 
 # Downforce of an axle grows with the square of speed, ½ ρ A v_x², and adds to its static load.
 #
@@ -182,7 +179,7 @@ __all__ = [
 
 
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
-    """Return yaw inertia and cornering stiffnesses of a car of that size, by `RULES`.
+    """Return yaw inertia and cornering stiffnesses of a car of that size, by `_RULES`.
     mass : total mass [kg].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     """
@@ -259,8 +256,8 @@ class Vehicle:
     def __post_init__(self) -> None:
         require_name(VehicleError, "name", self.name)
         for name in self.estimated:
-            if name not in RULES:
-                raise VehicleError(f"estimated must be of {', '.join(RULES)}, not {shown(name)}")
+            if name not in _RULES:
+                raise VehicleError(f"estimated must be of {', '.join(_RULES)}, not {shown(name)}")
         require_positive(
             VehicleError, mass=self.mass, yaw_inertia=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
             cornering_stiffness_front=self.cornering_stiffness_front,
@@ -420,10 +417,10 @@ class Vehicle:
     @property
     def estimates(self) -> str:
         """What of the car is estimated, with values and rules, in one line; empty if nothing is."""
-        units = dict(zip(RULES, UNITS, strict=True))
+        units = dict(zip(_RULES, _UNITS, strict=True))
         found = [
             f"{name} = {getattr(self, name):.4g} {units[name]} ({rule})"
-            for name, rule in RULES.items()
+            for name, rule in _RULES.items()
             if name in self.estimated
         ]
         return f"estimated, as the vehicle file leaves it out: {'; '.join(found)}" if found else ""
@@ -456,7 +453,7 @@ class Vehicle:
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")
         table.only_fields(cls, skip=outside)  # before what is missing
         size = [table.number(key) for key in ("mass", "l_f", "l_r")]
-        missing = tuple(key for key in RULES if key not in data)
+        missing = tuple(key for key in _RULES if key not in data)
         try:
             data |= {key: value for key, value in estimate(*size).items() if key in missing}
         except VehicleError as error:
@@ -491,7 +488,7 @@ class Vehicle:
         file = Path(path)
         without = (name for name in AREAS if getattr(self, name) == 0.0)
         out = ("estimated", *self.estimated, *without)
-        content = toml_text(self, folder=file.parent, table="chassis", leave_out=out)
+        content = _toml_text(self, folder=file.parent, table="chassis", leave_out=out)
         if not overwrite and file.exists():
             raise FileExistsError(f"{file} exists; overwrite=True replaces it")
         write_atomically(file, content)

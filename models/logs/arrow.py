@@ -19,7 +19,7 @@ from models.logs.preamble import Layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Kind, Words
 
-WORTH = 1 << 22  # bytes of a text from which on importing pyarrow takes less than it saves
+_WORTH = 1 << 22  # bytes of a text from which on importing pyarrow takes less than it saves
 ODD_NAN = re.compile(rb"(?i)nan\(")  # a number to pyarrow alone
 _NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]
 
@@ -36,7 +36,7 @@ def is_installed() -> bool:
 
 def is_used(path: Path) -> bool:
     """Whether pyarrow is imported already, or a text is long enough to import it."""
-    return "pyarrow" in sys.modules or path.stat().st_size > WORTH
+    return "pyarrow" in sys.modules or path.stat().st_size > _WORTH
 
 
 def _of_arrow(block: bytes) -> Any:

@@ -40,10 +40,10 @@ from models.schema import require_few
 
 _NS = 1e9  # in a second
 _OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
-PROBED = 20  # messages that a rate is taken from
-TOGETHER, BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
+_PROBED = 20  # messages that a rate is taken from
+_TOGETHER, _BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
 _STAMPS = ("header.stamp.", "stamp.")
-TIME = ("sec", "nanosec")
+_TIME = ("sec", "nanosec")
 
 # Messages that cars tell their motion by and that are in no distribution of ROS.
 _DRIVE = "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n" + (
@@ -64,7 +64,7 @@ KNOWN = {
     "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
 }
 # By package-free type and field: the unit of it and of all in it.
-UNITS = {
+_UNITS = {
     ("Twist", "linear"): "m/s", ("Twist", "angular"): "rad/s", ("Accel", "linear"): "m/s^2",
     ("Accel", "angular"): "rad/s^2", ("Pose", "position"): "m",
     ("Imu", "angular_velocity"): "rad/s", ("Imu", "linear_acceleration"): "m/s^2",
@@ -75,7 +75,7 @@ UNITS = {
     ("VelocityReport", "longitudinal_velocity"): "m/s",
     ("VelocityReport", "lateral_velocity"): "m/s", ("VelocityReport", "heading_rate"): "rad/s",
 }  # fmt: skip
-PACKAGES = (
+_PACKAGES = (
     "geometry_msgs", "sensor_msgs", "ackermann_msgs", "autoware_vehicle_msgs",
     "autoware_auto_vehicle_msgs",
 )  # fmt: skip
@@ -300,7 +300,7 @@ def _topics(
 
 
 def _has_time(fields: Sequence[Field], stamp: str) -> bool:
-    return {stamp + one for one in TIME} <= {field.path for field in fields}
+    return {stamp + one for one in _TIME} <= {field.path for field in fields}
 
 
 def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
@@ -330,7 +330,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
     """
     received: list[int] = []
     stamps: list[int] = []
-    for _, time, raw in islice(_messages(bag, [topic]), PROBED):
+    for _, time, raw in islice(_messages(bag, [topic]), _PROBED):
         try:
             layout = layout_of(definitions, topic.kind, raw)
         except CdrError:
@@ -373,7 +373,7 @@ class _Reading:
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)
-        if len(self.raws) == TOGETHER or self.bytes > BYTES:
+        if len(self.raws) == _TOGETHER or self.bytes > _BYTES:
             self._read()
 
     def _read(self) -> None:
@@ -435,7 +435,7 @@ def _stamps(layout: Layout, rows: NDArray[np.uint8], stamp: str) -> NDArray[np.i
     """Return the stamps of messages [ns]."""
     sec, nanosec = (
         numbers(layout, rows, Field(stamp + name, (), kind)).astype(np.int64)
-        for name, kind in zip(TIME, ("i4", "u4"), strict=True)
+        for name, kind in zip(_TIME, ("i4", "u4"), strict=True)
     )
     return np.asarray(sec * 1_000_000_000 + nanosec)
 
@@ -444,8 +444,8 @@ def _unit(field: Field) -> str:
     """Return the unit that the type of a known message gives."""
     for kind, name in reversed(field.owners):
         package, _, word = kind.partition("/")
-        unit = UNITS.get((word.rpartition("/")[2], name))
-        if unit and package in PACKAGES:
+        unit = _UNITS.get((word.rpartition("/")[2], name))
+        if unit and package in _PACKAGES:
             return unit
     return ""
 

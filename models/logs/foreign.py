@@ -25,7 +25,7 @@ from models.extras import needs
 from models.logs.log import RecordingError
 
 _LONGEST_REASON = 160  # characters
-FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 _LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 
@@ -58,7 +58,7 @@ def one_line(path: Path, format: str) -> Iterator[None]:
                 raise RecordingError(f"{path}: there is no such file") from None
             if isinstance(error, PermissionError):
                 raise RecordingError(f"{path}: may not be read") from None
-            if isinstance(error, OSError) and error.errno in FULL:
+            if isinstance(error, OSError) and error.errno in _FULL:
                 raise RecordingError(
                     f"{path}: cannot be unpacked, there is no room in {tempfile.gettempdir()}; "
                     "name a folder with room by TMPDIR"

@@ -30,19 +30,19 @@ from models.logs.mdf_blocks import is_bus, opened
 from models.logs.stamps import CALENDAR, nanoseconds, since
 from models.schema import require_few
 
-FRAME = "CAN_DataFrame"  # of MDF
+_FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
 TOGETHER = 1 << 16  # frames that are stored at a time
-SHORT = 0x7FF  # largest identifier of 11 bits
+_SHORT = 0x7FF  # largest identifier of 11 bits
 EXTENDED = 1 << 31  # marks an identifier of 29 bits
-IDENTIFIER = (1 << 29) - 1
+_IDENTIFIER = (1 << 29) - 1
 _INFLATION = 1032  # most bytes that deflate makes of one
-OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
-_CONTAINER, DEFLATED = 10, 2
-METHOD = struct.Struct("<H14x")  # of a container, before its data
+_OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
+_CONTAINER, _DEFLATED = 10, 2
+_METHOD = struct.Struct("<H14x")  # of a container, before its data
 _FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
-Key = tuple[str, int]  # bus, identifier with EXTENDED
+_Key = tuple[str, int]  # bus, identifier with EXTENDED
 FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 
 
@@ -122,18 +122,18 @@ def _in_order(frames: Frames) -> Frames:
     return Frames(times, sorted_data.finished().reshape(-1, data.shape[1]))
 
 
-class Log(NamedTuple):
+class _Log(NamedTuple):
     """Frames of a log by bus and identifier; how many others it has, by what they are."""
 
     format: str
-    frames: dict[Key, Frames]
+    frames: dict[_Key, Frames]
     others: Counter[str]
 
 
-def gather(path: Path, kind: str, known: Known) -> Log:
+def gather(path: Path, kind: str, known: Known) -> _Log:
     if kind == "MDF4":
         return _of_mdf(path, known)
-    found: dict[Key, _Gathered] = {}
+    found: dict[_Key, _Gathered] = {}
     others: Counter[str] = Counter()
     count = 0
     for message in _messages(path, kind):
@@ -157,7 +157,7 @@ def gather(path: Path, kind: str, known: Known) -> Log:
     if first > CALENDAR:
         for key, kept in frames.items():
             frames[key] = kept._replace(t=since(kept.t, first))
-    return Log(f"CAN {kind}", frames, others)
+    return _Log(f"CAN {kind}", frames, others)
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
@@ -259,14 +259,14 @@ def _of_table(path: Path) -> Iterator[_Frame]:
                 # SavvyCAN counts whole microseconds, all others seconds.
                 time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
                 given = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
-                extended = given in ("true", "1") if given else identifier > SHORT
+                extended = given in ("true", "1") if given else identifier > _SHORT
                 bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"
             except (ValueError, IndexError):
                 raise RecordingError(
                     f"{path}: line {number} must hold a frame: time, identifier and bytes in "
                     f"hexadecimal, not {shown(','.join(row))}"
                 ) from None
-            yield _Frame(time, identifier & IDENTIFIER, data, bus, extended)
+            yield _Frame(time, identifier & _IDENTIFIER, data, bus, extended)
 
 
 def _require_whole_blf(path: Path) -> None:
@@ -279,16 +279,16 @@ def _require_whole_blf(path: Path) -> None:
         if given > size:
             raise RecordingError(f"{path}: is cut off, it has {size} of {given} bytes")
         file.seek(struct.unpack_from("<I", head, 4)[0])
-        while len(mark := file.read(OBJECT.size)) == OBJECT.size:
-            signature, _, _, length, kind = OBJECT.unpack(mark)
-            if signature != b"LOBJ" or length < OBJECT.size or length > size:
+        while len(mark := file.read(_OBJECT.size)) == _OBJECT.size:
+            signature, _, _, length, kind = _OBJECT.unpack(mark)
+            if signature != b"LOBJ" or length < _OBJECT.size or length > size:
                 return  # the reader says so
-            body = length - OBJECT.size
+            body = length - _OBJECT.size
             if kind == _CONTAINER and body * _INFLATION > most:
                 data = file.read(body)
-                size_of = len(data) - METHOD.size
-                if size_of > 0 and METHOD.unpack_from(data)[0] == DEFLATED:
-                    unpacked = zlib.decompressobj().decompress(data[METHOD.size :], int(most) + 1)
+                size_of = len(data) - _METHOD.size
+                if size_of > 0 and _METHOD.unpack_from(data)[0] == _DEFLATED:
+                    unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
                     size_of = len(unpacked)
                 require_few(
                     RecordingError, str(path), size_of / 1e6, "block", "megabytes of a block"
@@ -297,9 +297,9 @@ def _require_whole_blf(path: Path) -> None:
             file.seek(body + length % 4, 1)
 
 
-def _of_mdf(path: Path, known: Known) -> Log:
+def _of_mdf(path: Path, known: Known) -> _Log:
     """Read the frames of the buses that an MDF4 file logs."""
-    found: dict[Key, _Gathered] = {}
+    found: dict[_Key, _Gathered] = {}
     others: Counter[str] = Counter()
     with opened(path, "CAN frames of MDF") as file:
         if str(file.version) < "4":
@@ -315,7 +315,7 @@ def _of_mdf(path: Path, known: Known) -> Log:
             for first in range(0, samples, TOGETHER):
                 part = _of_group(file, number, first, min(TOGETHER, samples - first))
                 _sort(part, known, found, others)
-    return Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
+    return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
 
 
 def _names(group: Any) -> set[str]:
@@ -324,7 +324,7 @@ def _names(group: Any) -> set[str]:
 
 def _has_data(group: Any) -> bool:
     """Whether a group holds data frames of a CAN bus."""
-    return {f"{FRAME}.ID", f"{FRAME}.DataBytes"} <= _names(group)
+    return {f"{_FRAME}.ID", f"{_FRAME}.DataBytes"} <= _names(group)
 
 
 def _what(group: Any) -> str:
@@ -346,7 +346,7 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
     names = _names(file.groups[number])
 
     def signal(name: str) -> Any:
-        full = f"{FRAME}.{name}"
+        full = f"{_FRAME}.{name}"
         if full not in names:
             return None
         return file.get(
@@ -361,8 +361,8 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
     identifiers, data = signal("ID"), signal("DataBytes")
     bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
     raw = identifiers.samples.astype(np.int64)
-    ids = raw & IDENTIFIER
-    is_long = whole("IDE", (raw & EXTENDED != 0) | (ids > SHORT)) != 0
+    ids = raw & _IDENTIFIER
+    is_long = whole("IDE", (raw & EXTENDED != 0) | (ids > _SHORT)) != 0
     return _Part(
         np.asarray(identifiers.timestamps, dtype=np.float64),
         np.where(is_long, ids | EXTENDED, ids),
@@ -372,7 +372,7 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
     )
 
 
-def _sort(part: _Part, known: Known, found: dict[Key, _Gathered], others: Counter[str]) -> None:
+def _sort(part: _Part, known: Known, found: dict[_Key, _Gathered], others: Counter[str]) -> None:
     """Add frames to those of their bus and identifier."""
     for identifier in np.unique(part.ids).tolist():
         mine = part.ids == identifier

@@ -15,8 +15,8 @@ from models.logs.table import Kind, Table, TableLog, kind_of
 from models.schema import require_few
 
 # A table with a row for each value: what the columns of names and of values are called.
-NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
-VALUES = ("value", "val", "data", "values", "reading")
+_NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
+_VALUES = ("value", "val", "data", "values", "reading")
 
 
 def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:
@@ -72,8 +72,8 @@ def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
 def long_log(table: Table) -> GroupedLog[Any] | None:
     """Return the log in a table with a row for each value: time, name, value; None of any other."""
     bare = ["".join(filter(str.isalpha, one.lower())) for one in table.names]
-    name = next((bare.index(one) for one in NAMES if one in bare), None)
-    value = next((bare.index(one) for one in VALUES if one in bare), None)
+    name = next((bare.index(one) for one in _NAMES if one in bare), None)
+    value = next((bare.index(one) for one in _VALUES if one in bare), None)
     if name is None or value is None or table.numeric[name] or not table.numeric[value]:
         return None
     words = [one for one in table.first_rows(name) if one]

@@ -29,9 +29,9 @@ _FORMULA = re.compile(
     r"(?:[\s\d.+\-*/(),]|\d[eE][+-]?\d|\b[xX]1?\b|\b(?:sin|cos|tan|asin|acos|atan|sinh|cosh|tanh"
     r"|exp|log|log10|abs|sqrt|pow)\b)*"
 )
-VALUES, TIME = (0, 6), 1  # types of a channel, of what a master counts
+_VALUES, _TIME = (0, 6), 1  # types of a channel, of what a master counts
 # Why a channel is not listed, by its kind.
-REASONS = {
+_REASONS = {
     "word": "enumerations and texts are no signals",
     "array": "arrays are not read",
     "formula": "a conversion must be a formula of numbers, x, + - * / and functions",
@@ -39,7 +39,7 @@ REASONS = {
     "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
 TOGETHER = 1 << 23  # numbers that are read at a time
-PROBED = 200  # samples of a clock that its rate is taken from
+_PROBED = 200  # samples of a clock that its rate is taken from
 
 
 class _Place(NamedTuple):
@@ -107,7 +107,7 @@ class _Found:
 
     def __init__(self) -> None:
         self.channels: list[tuple[str, Listed, _Place]] = []
-        self.others: dict[str, list[str]] = {reason: [] for reason in REASONS}
+        self.others: dict[str, list[str]] = {reason: [] for reason in _REASONS}
 
     def group(self, file: Any, number: int, is_4: bool) -> None:
         group = file.groups[number]
@@ -120,7 +120,7 @@ class _Found:
         clock = master is not None and _tells_time(group.channels[master], is_4)
         rate = float("nan")
         if clock and samples:
-            probed = min(samples, PROBED)
+            probed = min(samples, _PROBED)
             t = file.get_master(number, record_offset=0, record_count=probed)
             rate = typical_rate(np.asarray(t, dtype=np.float64))
         for index, channel in enumerate(group.channels):
@@ -141,7 +141,7 @@ def _list(path: Path, file: Any) -> GroupedLog[_Place]:
     for number in range(len(file.groups)):
         found.group(file, number, is_4)
     said = tuple(
-        note for kind, reason in REASONS.items() for note in noted(reason, found.others[kind])
+        note for kind, reason in _REASONS.items() for note in noted(reason, found.others[kind])
     )
     return GroupedLog.of(
         path,
@@ -165,7 +165,7 @@ def _group_name(group: Any, number: int) -> str:
 
 def _tells_time(master: Any, is_4: bool) -> bool:
     """Whether a master channel is a time; others are angles, distances or counts."""
-    return not is_4 or int(master.sync_type) in (0, TIME)
+    return not is_4 or int(master.sync_type) in (0, _TIME)
 
 
 def _kind(group: Any, index: int, is_4: bool) -> str:
@@ -173,7 +173,7 @@ def _kind(group: Any, index: int, is_4: bool) -> str:
     channel = group.channels[index]
     if group.channel_dependencies[index]:
         return "array"
-    if is_4 and int(channel.channel_type) not in VALUES:
+    if is_4 and int(channel.channel_type) not in _VALUES:
         return "word"
     if channel.data_type not in (_NUMERIC_4 if is_4 else _NUMERIC_3):
         return "word"

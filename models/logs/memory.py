@@ -13,9 +13,9 @@ from models.logs.spelling import without_unit
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
 
-TIMES = ("t", "time", "timestamp")  # what the clock is called
-RUN = "run"
-EVEN = "(even)"  # a time that a rate makes
+_TIMES = ("t", "time", "timestamp")  # what the clock is called
+_RUN = "run"
+_EVEN = "(even)"  # a time that a rate makes
 _NANOSECONDS = 1e9  # of a second
 
 
@@ -54,12 +54,12 @@ class ArrayLog:
                 f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
             ) from None
         if rate and arrays:
-            clock = EVEN
-            arrays[EVEN] = np.arange(next(iter(arrays.values())).size) / rate
+            clock = _EVEN
+            arrays[_EVEN] = np.arange(next(iter(arrays.values())).size) / rate
         self._name, self._arrays, self._mend = name, arrays, mend
         self._noted: list[str] = []
         lower = {column.lower(): column for column in reversed(header)}
-        named = next((lower[one] for one in TIMES if one in lower), None)
+        named = next((lower[one] for one in _TIMES if one in lower), None)
         if clock and clock not in arrays:  # it may stand with its unit
             clock = next((one for one in header if without_unit(one) == clock), clock)
         self._clock, self._second = clock or named, to_si(clock_unit, TIME, f"{name}: {clock}")
@@ -81,7 +81,7 @@ class ArrayLog:
 
     def headings(self) -> tuple[Heading, ...]:
         """Return the columns, but for the time and the runs; which are numeric shows in reading."""
-        return tuple(Heading(name, "") for name in self._arrays if name not in (self._clock, RUN))
+        return tuple(Heading(name, "") for name in self._arrays if name not in (self._clock, _RUN))
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the columns of `headings`, with how many samples there are."""
@@ -93,9 +93,9 @@ class ArrayLog:
 
     def runs(self) -> tuple[str, ...]:
         """Return the words of the column run in their order."""
-        if RUN not in self._arrays:
+        if _RUN not in self._arrays:
             return ()
-        return tuple(dict.fromkeys(str(word) for word in self._arrays[RUN].tolist()))
+        return tuple(dict.fromkeys(str(word) for word in self._arrays[_RUN].tolist()))
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return columns as channels.   run : one of `runs`; None where there are none, or one."""
@@ -105,12 +105,12 @@ class ArrayLog:
         columns = {name: self._column(name) for name in (clock, *names)}
         kept: NDArray[np.bool_] = np.ones(columns[clock].size, dtype=np.bool_)
         sizes = {name: column.size for name, column in columns.items()}
-        if RUN in self._arrays:
-            sizes[RUN] = self._arrays[RUN].size
+        if _RUN in self._arrays:
+            sizes[_RUN] = self._arrays[_RUN].size
         if len(set(sizes.values())) > 1:
             raise RecordingError(f"{self._name}: columns must have one length, they have {sizes}")
         if run is not None:
-            kept = np.array([str(word) == run for word in self._arrays[RUN].tolist()])
+            kept = np.array([str(word) == run for word in self._arrays[_RUN].tolist()])
         t, rows = columns[clock][kept], np.flatnonzero(kept)
         stamps = Stamps(t, ())
         if self._mend:

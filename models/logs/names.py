@@ -40,23 +40,23 @@ from models.logs.units import (
 )
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
-_STANDARD, KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
+_STANDARD, _KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
 HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
 _NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
 _FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
 STILL = 0.25  # of confidence that is left to a channel that never changes
-APART = 0.04  # of confidence: nearer ones are equal
+_APART = 0.04  # of confidence: nearer ones are equal
 HAND = "steering wheel"  # an angle that wants a ratio
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is given, "" SI.
-UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
+_UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
 _OBLIQUE = "its box is mounted obliquely: no axis of it is one of the car"
-SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
+_SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
-class Rule(NamedTuple):
+class _Rule(NamedTuple):
     """How a signal is called.
     known : whole names, words joined.   vague : names that may mean something else.
     never : words that mean something else.   words : sets of words that all occur; "a|b" is either.
@@ -68,8 +68,8 @@ class Rule(NamedTuple):
     words: tuple[str, ...]
 
 
-TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
-_WORDS = {name: some.replace("|", " ").split() for name, some in TABLES["words"].items()}
+_TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+_WORDS = {name: some.replace("|", " ").split() for name, some in _TABLES["words"].items()}
 
 
 def _spelled(text: str, apart: str = "|") -> str:
@@ -79,21 +79,22 @@ def _spelled(text: str, apart: str = "|") -> str:
     return text
 
 
-REFERENCE, CORNERS, SOURCES, FILTERED, SIGN = (
+_REFERENCE, _CORNERS, _SOURCES, _FILTERED, _SIGN = (
     frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
 )
 
 
-def _rule(one: Mapping[str, Any]) -> Rule:
+def _rule(one: Mapping[str, Any]) -> _Rule:
     known, vague, never = (
         frozenset(_spelled(one.get(key, ""), " ").split()) for key in ("known", "vague", "never")
     )
-    return Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
+    return _Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
 
 
-RULES: Mapping[str, Rule] = {name: _rule(one) for name, one in TABLES["signals"].items()}
-_PER_WHEEL, _HINTS = TABLES["per_wheel"], {k: tuple(v.split()) for k, v in TABLES["hints"].items()}
-SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in TABLES["sides"].items()}
+RULES: Mapping[str, _Rule] = {name: _rule(one) for name, one in _TABLES["signals"].items()}
+_PER_WHEEL = _TABLES["per_wheel"]
+_HINTS = {name: tuple(some.split()) for name, some in _TABLES["hints"].items()}
+_SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in _TABLES["sides"].items()}
 # German words are written together: "Querbeschl", "Lenkradwinkel", "Sollgierrate".
 _FIRST = "soll|ist|fahrzeug|fahr|quer|laengs|gier|vertikal|hoch|radlenk|lenkrad|lenk|schwimm|rad"
 _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
@@ -108,12 +109,12 @@ _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": 
                          "δ": "delta", "ω": "omega"})  # fmt: skip
 
 
-_WHEELS = TABLES["wheels"]
-PLACES = {
+_WHEELS = _TABLES["wheels"]
+_PLACES = {
     name: [frozenset(way.split()) for way in _WHEELS[name].split(",")] for name in WHEELS[:-1]
 }
-_ANYWHERE = frozenset(word for ways in PLACES.values() for way in ways for word in way)
-WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
+_ANYWHERE = frozenset(word for ways in _PLACES.values() for way in ways for word in way)
+_WHEEL, _TURNING, _SPEEDS, _BOTH, _ENCODER, _OTHERS = (
     frozenset(_WHEELS[name].split())
     for name in ("wheel", "turns", "speeds", "both", "encoder", "others")
 )
@@ -121,25 +122,25 @@ WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
 
 def _with_corner(word: str) -> tuple[str, ...]:
     for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
-        if corner in CORNERS and stem in _BOTH:
+        if corner in _CORNERS and stem in _BOTH:
             return stem, corner
     return (word,)
 
 
-def wheel_words(signal: str, words: Sequence[str]) -> bool:
+def _wheel_words(signal: str, words: Sequence[str]) -> bool:
     listed = frozenset(part for word in words for part in _with_corner(word))
-    if listed & OTHERS:
+    if listed & _OTHERS:
         return False
     if signal == WHEELS[-1]:
-        turns = listed & _ENCODER or (listed & WHEEL and listed & TURNING) or listed == {signal}
+        turns = listed & _ENCODER or (listed & _WHEEL and listed & _TURNING) or listed == {signal}
         return bool(turns and not listed & _ANYWHERE)
-    for place in PLACES[signal]:
+    for place in _PLACES[signal]:
         rest = listed - place
         if listed >= place and not rest & _ANYWHERE:
             return bool(
                 rest & _BOTH
-                or (rest & WHEEL and (rest & TURNING or rest <= WHEEL))
-                or (rest <= SPEEDS and rest)
+                or (rest & _WHEEL and (rest & _TURNING or rest <= _WHEEL))
+                or (rest <= _SPEEDS and rest)
             )
     return False
 
@@ -246,23 +247,23 @@ def name_confidence(signal: str, name: str) -> float:
         return _STANDARD
     listed = words_of(name)
     if signal in WHEELS:
-        return WORDS if wheel_words(signal, listed) else 0.0
+        return WORDS if _wheel_words(signal, listed) else 0.0
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = RULES[signal], _with_parts(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
-    while len(listed) > 1 and listed[-1] in SOURCES:
+    while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]
         ends += ["".join(listed[k:]) for k in range(len(listed))]
     if rule.known & {ends[0], "".join(listed)}:
-        return KNOWN
+        return _KNOWN
     if _with_parts(words_of(_field(name))).union(ends) & rule.never:
         return 0.0
     if (
         len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
     ):  # the R of "M_Mtr_D2_R" is a side, or anything
         ends = [end for end in ends if len(end) > 1]
-    loss = _FILTERED_LOSS if words & FILTERED else 0.0
+    loss = _FILTERED_LOSS if words & _FILTERED else 0.0
     if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
         return WORDS - loss
     return _VAGUE if rule.vague & set(ends) else 0.0
@@ -307,7 +308,7 @@ def propose(
         equal = [
             one
             for one in ranked
-            if one.confidence > ranked[0].confidence - APART
+            if one.confidence > ranked[0].confidence - _APART
             and _rank(one)[0] == _rank(ranked[0])[0]
         ]
         if len(equal) > 1:
@@ -319,10 +320,10 @@ def propose(
     return Proposal(guesses={**guesses, **posed}, rivals=rivals)
 
 
-_PLACE = re.compile(TABLES["pose"]["place"])
-_ANGLE = re.compile(TABLES["pose"]["angle"])
-_TURN = re.compile(TABLES["pose"]["turn"])
-_NO_POSE = set(TABLES["pose"]["never"].split())
+_PLACE = re.compile(_TABLES["pose"]["place"])
+_ANGLE = re.compile(_TABLES["pose"]["angle"])
+_TURN = re.compile(_TABLES["pose"]["turn"])
+_NO_POSE = set(_TABLES["pose"]["never"].split())
 
 
 def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
@@ -347,7 +348,7 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     if not measured:
         return {}
     some = whole[measured[0]]
-    sure = KNOWN if len(measured) == 1 else HINT
+    sure = _KNOWN if len(measured) == 1 else HINT
     why = "" if len(measured) == 1 else "there are several poses"
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
@@ -373,8 +374,8 @@ def _with_signs(
     signs: dict[frozenset[str], str] = {}
     for one in headings:
         words = frozenset(words_of(one.name))
-        if words & SIGN and not is_given(one.unit):
-            signs[words - SIGN] = one.name
+        if words & _SIGN and not is_given(one.unit):
+            signs[words - _SIGN] = one.name
 
     def completed(guess: Guess) -> Guess:
         sign = signs.get(frozenset(words_of(guess.channel[0])), "")
@@ -391,7 +392,7 @@ def _triads(headings: Sequence[Heading]) -> list[Triad]:
     named = map(_with_given_unit, headings)
     units = {one.name: possible.unit for one, possible in zip(headings, named, strict=True)}
     words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
-    bad = REFERENCE | CORNERS
+    bad = _REFERENCE | _CORNERS
     return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
 
 
@@ -425,7 +426,7 @@ def _along_axes(
         for name, some in candidates.items()
     }
     for one in found.axes:
-        near = KNOWN if is_given(units[one.name]) else KNOWN - _NO_UNIT_LOSS
+        near = _KNOWN if is_given(units[one.name]) else _KNOWN - _NO_UNIT_LOSS
         guess = Guess(
             channel=(one.name,),
             confidence=near,
@@ -464,7 +465,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     here, beside = (
         x * scale for x, scale in zip((first.values[good], beside), scales, strict=True)
     )
-    return _root_mean_square(here - beside) <= SAME * _root_mean_square(here)
+    return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
 
 
 def _rate(channel: Channel) -> float:
@@ -538,10 +539,10 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
 def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
     """Return the corner of the car that a name speaks of, and its other words."""
     rest = frozenset(words)
-    for pair, short in TABLES["corners"].items():
+    for pair, short in _TABLES["corners"].items():
         if rest >= set(pair.split()):
             return short, rest - set(pair.split())
-    corners = [word for word in words if word in CORNERS]
+    corners = [word for word in words if word in _CORNERS]
     return (corners[-1], rest - {corners[-1]}) if corners else None
 
 
@@ -552,11 +553,11 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
         found = _corner(words_of(one.name))
         quantity = QUANTITIES[signal]
         fits = not is_given(one.unit) or quantity in quantities(one.unit)
-        if found and fits and not found[1] & REFERENCE:
+        if found and fits and not found[1] & _REFERENCE:
             by_corner.setdefault(found, one)
     pairs = []
     for (corner, rest), left in by_corner.items():
-        for first, second in SIDES[signal]:
+        for first, second in _SIDES[signal]:
             right = by_corner.get((second, rest))
             named = any(_matches(group, rest) for group in _PER_WHEEL[signal])
             if corner == first and right is not None and named:
@@ -639,7 +640,7 @@ def _beside_turning(
         if (likely := [one for one in candidates[name] if one.confidence > STILL])
     }
     mended = dict(candidates)
-    for name in UNTOLD:
+    for name in _UNTOLD:
         mended[name] = [
             guess
             if _is_given(guess) or guess.confidence == 0.0
@@ -680,7 +681,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         }
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
-    choices = [(one.unit,) if _is_given(one) else UNTOLD[key] for key, one in there.items()]
+    choices = [(one.unit,) if _is_given(one) else _UNTOLD[key] for key, one in there.items()]
     nearest = min(itertools.product(*choices), key=far)
     unit = nearest[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess

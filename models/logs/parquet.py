@@ -17,15 +17,15 @@ from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog
 from models.schema import LONGEST_NAME, require_dense, require_few, require_file
 
-HEAD = 400  # rows that tell what columns are
-WHAT = "a Parquet file"  # that a file is read as
-BATCH = 1 << 16  # rows that are read at once
+_HEAD = 400  # rows that tell what columns are
+_WHAT = "a Parquet file"  # that a file is read as
+_BATCH = 1 << 16  # rows that are read at once
 
 
 def open_parquet(path: Path) -> TableLog:
     parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
-    with one_line(path, WHAT), parquet.ParquetFile(path) as file:
+    with one_line(path, _WHAT), parquet.ParquetFile(path) as file:
         about = file.metadata
         require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
         require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
@@ -68,16 +68,16 @@ class _ParquetTable:
         return tuple(_is_numeric(one.type) for one in self.schema)
 
     def first_rows(self, column: int) -> list[str]:
-        with one_line(self.path, WHAT):
+        with one_line(self.path, _WHAT):
             if column not in self._head:
-                return ["?"] * min(self.rows, HEAD)
+                return ["?"] * min(self.rows, _HEAD)
             return _as_text(self._head[column], self.schema.field(column).type)
 
     @cached_property
     def _head(self) -> dict[int, Any]:
         """The first rows of the columns that may be read, which all are looked at."""
         columns = [k for k, one in enumerate(self.schema) if _is_read(one.type)]
-        first = next(self._batches(columns, HEAD), [])
+        first = next(self._batches(columns, _HEAD), [])
         return dict(zip(columns, first, strict=False))
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
@@ -96,8 +96,8 @@ class _ParquetTable:
             raise RecordingError(f"{self.path}: has columns but no row of data")
         gathered = Gathered(self.path, wanted, self.names, "row", run)
         order = list(wanted)
-        with one_line(self.path, WHAT):
-            for batch in self._batches(order, BATCH):
+        with one_line(self.path, _WHAT):
+            for batch in self._batches(order, _BATCH):
                 rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
                 columns = {
                     column: self._column(column, wanted[column], cells, rows)

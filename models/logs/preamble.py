@@ -26,16 +26,16 @@ from models.logs.units import PER_SECOND, quantities, time_unit
 from models.schema import require_few
 
 HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
-ROWS = 400  # of data that tell what columns are
-TAIL = 40  # last lines of them that tell how cells are written
+_ROWS = 400  # of data that tell what columns are
+_TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
 _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
 _ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
-MANY = 300  # cells of a line that tell how all are written
-CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
+_MANY = 300  # cells of a line that tell how all are written
+_CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
 
 _DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
@@ -54,7 +54,7 @@ _GIVEN_STEP = re.compile(
     r"|delta[ _]?[xt]\b|\bd[tx]\b)"
     r"[^\d\n]{0,20}(\d*\.?\d+(?:e-?\d+)?)(?:\W{0,5}(ms|us|s|sec)\b)?"
 )
-RATES = (1.0, 1e5)  # [Hz]
+_RATES = (1.0, 1e5)  # [Hz]
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
@@ -132,7 +132,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     if section is not None:
         return _racelogic(path, lines, encoding, section)
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
-    way = _way(filled[-TAIL:])
+    way = _way(filled[-_TAIL:])
     if way is None:
         return _no_data(path, lines, encoding)
     require_few(RecordingError, str(path), way.width, "columns", "columns")
@@ -236,7 +236,7 @@ def _way(tail: list[str]) -> _Way | None:
         width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2:
             continue
-        cells = [cell for row in rows if len(row) == width for cell in row[:MANY] if cell]
+        cells = [cell for row in rows if len(row) == width for cell in row[:_MANY] if cell]
         for decimal, thousands in ((".", ""), (",", ""), (".", ","), (",", ".")):
             if thousands == delimiter and not any(thousands in cell for cell in cells):
                 continue
@@ -256,7 +256,7 @@ def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
 
 
 def _numbers_in(line: _Line, way: _Way) -> int:
-    cells = [cell for cell in line.cells[:MANY] if cell]
+    cells = [cell for cell in line.cells[:_MANY] if cell]
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
@@ -265,7 +265,7 @@ def _is_data(line: _Line, way: _Way) -> bool:
     if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
-    filled = [cell for cell in cells[:MANY] if cell]
+    filled = [cell for cell in cells[:_MANY] if cell]
     right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
     return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
 
@@ -304,7 +304,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     ]
     again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
     rows = (line.cells for line in lines[first:])
-    data = tuple(islice((row for row in rows if len(row) == len(names)), ROWS))
+    data = tuple(islice((row for row in rows if len(row) == len(names)), _ROWS))
     made_by = _maker(lines[:first])
     words = [
         _encoding_word(encoding),
@@ -344,7 +344,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
             rate = PER_SECOND[time_unit(found[2] or "s")] / step if step else 0.0
         else:
             continue
-        if RATES[0] <= rate <= RATES[1]:
+        if _RATES[0] <= rate <= _RATES[1]:
             return rate
     return 0.0
 
@@ -352,7 +352,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
-    full = sorted(_numbers_in(lines[k], way) for k in above[-TAIL:])[len(above[-TAIL:]) // 2]
+    full = sorted(_numbers_in(lines[k], way) for k in above[-_TAIL:])[len(above[-_TAIL:]) // 2]
     first = None
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
@@ -425,7 +425,7 @@ def _all_instants(cells: Sequence[str]) -> bool:
 
 
 def _sure(share: float) -> str:
-    return "sure" if share > CLEAR else "likely" if share > 0.6 else "a guess"
+    return "sure" if share > _CLEAR else "likely" if share > 0.6 else "a guess"
 
 
 def _encoding_word(encoding: str) -> str:
@@ -508,7 +508,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
     ]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
-    way = _way([line for line in lines[first:] if line.strip()][-TAIL:])
+    way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])
     decimal = "." if way is None else way.decimal
     return Layout(
         encoding=encoding,
@@ -520,7 +520,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         first=first + 1,
         again=(),
         numeric=(True,) * len(names),
-        rows=tuple(data[:ROWS]),
+        rows=tuple(data[:_ROWS]),
         words=(
             _encoding_word(encoding),
             "Racelogic VBOX sections (sure)",

@@ -130,8 +130,8 @@ class Signal:
         if self.table and self.ratio != 1.0:
             raise RecordingError("ratio and table say the same: give one of them")
         if self.table:
-            hand, road = np.array(self.table).T
-            if len(self.table) < 2 or not ((np.diff(hand) > 0.0) & (np.diff(road) > 0.0)).all():
+            rises = np.diff(self.table, axis=0) > 0.0
+            if len(self.table) < 2 or not (rises.all() and np.isfinite(self.table).all()):
                 raise RecordingError(
                     "table must hold at least two pairs [hand wheel, road wheel] in rad that rise, "
                     f"not {shown(str(self.table))}"

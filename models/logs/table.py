@@ -28,8 +28,8 @@ from models.logs.stamps import (
 )
 from models.schema import LONGEST_NAME, limits, require_few
 
-RUN = "run"
-LONG = 8  # columns at most of a table with a row for each value
+_RUN = "run"
+_LONG = 8  # columns at most of a table with a row for each value
 _MOST_WORDS = 10_000  # names of runs in one log
 
 
@@ -255,7 +255,7 @@ class TableLog:
     @property
     def may_be_long(self) -> bool:
         """Whether a row may be one value of a channel that it names."""
-        return len(self.names) <= LONG and not all(self.table.numeric) and RUN not in self.names
+        return len(self.names) <= _LONG and not all(self.table.numeric) and _RUN not in self.names
 
     @cached_property
     def start(self) -> float:
@@ -277,7 +277,7 @@ class TableLog:
 
     @cached_property
     def _run_column(self) -> int | None:
-        return self.names.index(RUN) if RUN in self.names else None
+        return self.names.index(_RUN) if _RUN in self.names else None
 
     @cached_property
     def _channels(self) -> tuple[int, ...]:

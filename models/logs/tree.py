@@ -18,15 +18,17 @@ from codegen.arrays import Array
 from models.logs.stamps import NAMES
 
 # Of a variable: a name that a clock has, and the unit that may follow it.
-CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
+_CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
 _OTHER_CLOCKS = ("tout", "timestep")
 HEAD = 200  # times by which a clock is known
-DATA = ("data", "values", "value", "samples", "raw")
-NAME = ("name", "label", "signalname", "blockname")
-UNIT = ("unit", "units")
-COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
-RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq")
-STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
+_DATA = ("data", "values", "value", "samples", "raw")
+_NAME = ("name", "label", "signalname", "blockname")
+_UNIT = ("unit", "units")
+_COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
+_RATES = (
+    "fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq",
+)  # fmt: skip
+_STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
 _LEAST_RATE, _MOST_RATE = 1.0, 1e5  # [Hz]
 _MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
@@ -79,7 +81,7 @@ class Signal(NamedTuple):
         return self.leaf.shape[self.along]
 
 
-class Found(NamedTuple):
+class _Found(NamedTuple):
     """What a tree holds: signals, names of vectors without clock, names of what is not read."""
 
     signals: tuple[Signal, ...]
@@ -88,7 +90,7 @@ class Found(NamedTuple):
     said: tuple[str, ...] = ()
 
 
-def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
+def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> _Found:
     """Return the channels of a tree, in its order; their names may repeat.
     rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
         the like of the tree, if there is one.
@@ -97,7 +99,7 @@ def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
     walk.struct(dict(tree), "", ())
     rate = rate or walk.rate
     if not rate or not walk.clockless:
-        return Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
+        return _Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
     sizes = Counter(max(leaf.shape) for _, _, leaf, _ in walk.clockless.values())
     samples = sizes.most_common(1)[0][0]
     clock = Clock(
@@ -107,7 +109,7 @@ def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
     for name, unit, leaf, columns in walk.clockless.values():
         rest.leaf(leaf, name, unit, (clock,), columns)
     said = (f"time is even at {rate:g} Hz of vectors without a time of their own",)
-    return Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
+    return _Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
 
 
 def _even(samples: int, rate: float) -> Array:
@@ -140,14 +142,14 @@ class _Walk:
         clocks = (*_clocks_of(node, path), *clocks)
         own = [clock.leaf for clock in clocks]
         columns = _columns(node)
-        data = _pick(node, DATA)
+        data = _pick(node, _DATA)
         if any(data is leaf for leaf in own):
             return
-        if isinstance(data, Leaf) and (clocks or _text(node, UNIT)) and not _several(node):
-            label = _text(node, NAME) or path
+        if isinstance(data, Leaf) and (clocks or _text(node, _UNIT)) and not _several(node):
+            label = _text(node, _NAME) or path
             self.leaf(data, label, _unit(node), clocks, columns)
             return
-        units = _pick(node, UNIT)
+        units = _pick(node, _UNIT)
         known = units if isinstance(units, dict) else {}
         for key, child in node.items():
             name = f"{path}.{key}" if path else key
@@ -204,9 +206,9 @@ class _Walk:
     def told(self, name: str, leaf: Leaf) -> None:
         """Take a single number for the rate of samples, or the time between them, by its name."""
         word = re.sub("[^a-z]", "", name.rpartition(".")[2].lower())
-        if word in RATES + STEPS and leaf.shape == (1, 1):
+        if word in _RATES + _STEPS and leaf.shape == (1, 1):
             value = float(leaf.load()[0, 0])
-            rate = value if word in RATES or not value else 1.0 / value
+            rate = value if word in _RATES or not value else 1.0 / value
             self.rate = rate if _LEAST_RATE <= rate <= _MOST_RATE else self.rate
 
 
@@ -247,24 +249,24 @@ def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
         unit = _unit_of_clock(key)
         name = f"{path}.{key}" if path else key
         if unit is not None and isinstance(child, dict):
-            inner = _pick(child, DATA)
+            inner = _pick(child, _DATA)
             unit, child = _unit(child) or unit, inner if inner is not None else child
         if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
-            units = _pick(node, UNIT)
+            units = _pick(node, _UNIT)
             if isinstance(units, dict) and isinstance(told := units.get(key), str):
                 unit = told
             if max(child.shape) > 1:
                 yield Clock(name, child, None, unit)
     x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)
     if isinstance(x, dict) and isinstance(y, dict | list):
-        data = _pick(x, DATA)
+        data = _pick(x, _DATA)
         if isinstance(data, Leaf) and 1 in data.shape:
             yield Clock(f"{path}.X" if path else "X", data, None, "")
 
 
 def _unit_of_clock(name: str) -> str | None:
     """Return the unit that the name of a clock tells, "" for none; None where it names no clock."""
-    found = CLOCK.fullmatch(name.strip().lower())
+    found = _CLOCK.fullmatch(name.strip().lower())
     if found is None:
         return None
     word = re.sub("[^a-z]", "", found[1])
@@ -298,7 +300,7 @@ def _several(node: dict[str, Tree]) -> bool:
         for key, child in node.items()
         if isinstance(child, Leaf)
         and max(child.shape) > 1
-        and key.lower() not in DATA
+        and key.lower() not in _DATA
         and _unit_of_clock(key) is None
         and key.lower() not in ("dimensions", "x", "quality")
     ]
@@ -313,7 +315,7 @@ def _text(node: dict[str, Tree], names: Sequence[str]) -> str:
 def _unit(node: dict[str, Tree]) -> str:
     """Return the unit of a struct that is a signal; a timeseries has it in DataInfo."""
     about = _pick(node, ("datainfo",))
-    return _text(node, UNIT) or (_text(about, UNIT) if isinstance(about, dict) else "")
+    return _text(node, _UNIT) or (_text(about, _UNIT) if isinstance(about, dict) else "")
 
 
 def _columns(node: dict[str, Tree]) -> tuple[list[str], list[str]] | None:
@@ -325,5 +327,5 @@ def _columns(node: dict[str, Tree]) -> tuple[list[str], list[str]] | None:
             return []
         return [str(one).strip() for one in found]
 
-    names = words(COLUMNS)
-    return (names, words(UNIT)) if names else None
+    names = words(_COLUMNS)
+    return (names, words(_UNIT)) if names else None

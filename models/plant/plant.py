@@ -110,7 +110,7 @@ class PlantError(TireidError, ArithmeticError):
 
 # -O1 builds a car a third sooner than -O2, whose steps are faster by so little that it is ahead
 # after minutes of driving. The bits are the same.
-FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
+_FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
 
 
 class _CompiledLoop(NamedTuple):
@@ -130,11 +130,11 @@ def _compiled_loop(
     car, constants = lifted(dynamics(vehicle, tires, driver))
     step = runge_kutta(car, dt)
     over = ("command", "v_ref", "mu", "aside")
-    return _CompiledLoop(Scan(step, carry=("x",), over=over, flags=FLAGS), constants)
+    return _CompiledLoop(Scan(step, carry=("x",), over=over, flags=_FLAGS), constants)
 
 
-LEAST, MOST = 0.5, 500.0  # stiffness over load [1/rad or -]: about 20 of real tires
-LEAST_GRIP, MOST_GRIP = 0.05, 10.0  # largest side force over load: about 1
+_LEAST, _MOST = 0.5, 500.0  # stiffness over load [1/rad or -]: about 20 of real tires
+_LEAST_GRIP, _MOST_GRIP = 0.05, 10.0  # largest side force over load: about 1
 _GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 
@@ -151,9 +151,9 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
         F_z = ca.DM(0.5 * load)
         grip = ca.mmax(tire.forces(ca.DM(_GRIP_SLIPS), 0.0, 0.0, F_z).F_y)
         for what, force, least, most in (
-            ("cornering stiffness", tire.cornering_stiffness(F_z), LEAST, MOST),
-            ("slip stiffness", tire.slip_stiffness(F_z), LEAST, MOST),
-            ("largest side force", grip, LEAST_GRIP, MOST_GRIP),
+            ("cornering stiffness", tire.cornering_stiffness(F_z), _LEAST, _MOST),
+            ("slip stiffness", tire.slip_stiffness(F_z), _LEAST, _MOST),
+            ("largest side force", grip, _LEAST_GRIP, _MOST_GRIP),
         ):
             if not least <= (ratio := float(force / F_z) + 0.0) <= most:
                 raise TirError(

@@ -37,7 +37,7 @@ _INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the m
 _OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
 
 
-class Reading(NamedTuple):
+class _Reading(NamedTuple):
     """How the signals of a log are read, and what of it nobody told."""
 
     signals: dict[str, Signal]
@@ -51,26 +51,26 @@ def column_of(name: str) -> str:
 
 def chosen_signals(
     log: LogFile, headings: Sequence[Heading], log_map: LogMap, run: str | None
-) -> Reading:
+) -> _Reading:
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
     lost = _lost_text(log_map.signals, by_map)
     if log_map.is_complete:
-        return Reading(by_map, lost)
+        return _Reading(by_map, lost)
     given = _beside(standard_signals(log, names), by_map)
     given = _without_wheels(given, by_map)
     missing = missing_signals(given)
     if has_v_y(given) and not missing:
-        return Reading(given, lost)
+        return _Reading(given, lost)
     _refuse_words(log, missing if has_v_y(given) else ["v_y", *missing], run)
     proposal = propose(log, headings, run)
     found = _without_wheels(likely_signals(given, proposal), by_map)
     if missing := missing_signals(found):
-        raise RecordingError(missing_text(log, missing, proposal, names))
+        raise RecordingError(_missing_text(log, missing, proposal, names))
     notes = [_taken_text(name, found[name]) for name in found if name not in given]
     if aside := aside_text(found, proposal):
         notes.append(aside)
-    return Reading(found, (*lost, *notes))
+    return _Reading(found, (*lost, *notes))
 
 
 def as_listed(
@@ -94,7 +94,7 @@ def as_listed(
             if len(likely) != 1:
                 raise RecordingError(
                     f"{log.path}: there is no column {shown(channel)} to read as "
-                    f"{column_of(name)}; {listing(likely or names)}"
+                    f"{column_of(name)}; {_listing(likely or names)}"
                 )
             channels += likely
         else:
@@ -206,7 +206,7 @@ def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     return [name for name in NEEDED if name not in there]
 
 
-def listing(names: Sequence[str]) -> str:
+def _listing(names: Sequence[str]) -> str:
     """Return what channels there are, the first of many."""
     return f"columns found: '{some(names)}'" if names else "there is none but the time"
 
@@ -259,7 +259,7 @@ def stand_ins(name: str, proposal: Proposal) -> list[str]:
     return best + ["a_y"] * (there.get("a_y", 0.0) > STILL)
 
 
-def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
+def _missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
     """Return the error of a log in which not every signal is found: what may be it, what to do."""
     likely = [one for name in missing for one in stand_ins(name, proposal)]
     parts = [likely_text(one, proposal) for one in likely]
@@ -272,7 +272,7 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
         said += f"did you mean {', '.join(parts)}? declare it by --columns {' '.join(words)}; "
     else:
         said += f"tireid channels {log.path} lists what is there; "
-    return said + listing(names)
+    return said + _listing(names)
 
 
 def likely_text(name: str, proposal: Proposal) -> str:

@@ -18,19 +18,19 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
 
 _NO_NAMES: Mapping[str, str] = {}
-DT = 0.01  # [s], the sample time of every method
-GivenMap = LogMap | str | PathLike[str] | None
+_DT = 0.01  # [s], the sample time of every method
+_GivenMap = LogMap | str | PathLike[str] | None
 
 
 def read_recording(
     source: Any,
     run: str | None = None,
-    dt: float = DT,
+    dt: float = _DT,
     *,
     name: str = "",
     check: bool = True,
     columns: Mapping[str, str] = _NO_NAMES,
-    log_map: GivenMap = None,
+    log_map: _GivenMap = None,
 ) -> Recording:
     """Read one run of a log, a file or arrays in memory, and bring it to a uniform sample time.
 
@@ -88,11 +88,11 @@ def read_repaired(
     path: str | Path,
     vehicle: Vehicle,
     run: str | None = None,
-    dt: float = DT,
+    dt: float = _DT,
     *,
     check: bool = True,
     columns: Mapping[str, str] = _NO_NAMES,
-    log_map: GivenMap = None,
+    log_map: _GivenMap = None,
 ) -> tuple[Recording, Vehicle]:
     """Read one run of a log and take out what the map's repair says, of the log and of the car.
 
@@ -131,7 +131,7 @@ def repair_text(repair: Repair) -> str:
     return ", ".join(words)
 
 
-def map_of(given: GivenMap) -> LogMap:
+def map_of(given: _GivenMap) -> LogMap:
     """Return a map that may be given as a path; an empty one where there is none.
     given : a map, the path of a log.toml, or None.
     """

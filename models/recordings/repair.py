@@ -17,11 +17,11 @@ from codegen.arrays import Array, blocks, filled, large
 from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
-from models.schema import Table
+from models.schema import Table, changed
 from models.smoothing import without_low_pass
 from models.vehicle import AREAS, BICYCLE, Vehicle
 
-SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
+_SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,18 +48,18 @@ class Repair:
         zero, a lag that is not positive, or a number of a car that is not, its downforce aside.
     """
 
-    factor: Mapping[str, float] = field(default_factory=dict)
-    offset: Mapping[str, float] = field(default_factory=dict)
-    delay: Mapping[str, float] = field(default_factory=dict)
-    lag: Mapping[str, float] = field(default_factory=dict)
     velocity_sensor_x: float = 0.0
     velocity_sensor_angle: float = 0.0
     acceleration_sensor_x: float = 0.0
     sideslip: bool = False
+    factor: Mapping[str, float] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
+    delay: Mapping[str, float] = field(default_factory=dict)
+    lag: Mapping[str, float] = field(default_factory=dict)
     vehicle: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in TABLES:
+        for name in _TABLES:
             known = (*BICYCLE, *AREAS) if name == "vehicle" else CHANNELS
             for key, value in getattr(self, name).items():
                 if key not in known:
@@ -71,7 +71,7 @@ class Repair:
                     raise RecordingError(f"repair: factor.{key} must not be 0")
                 if name in ("lag", "vehicle") and key not in AREAS and not value > 0.0:
                     raise RecordingError(f"repair: {name}.{key} must be positive, it is {value}")
-        for name in SCALARS:
+        for name in _SCALARS:
             _require_finite(name, getattr(self, name))
 
     def __bool__(self) -> bool:
@@ -87,7 +87,7 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
-        declared = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
+        declared = {name for name in _TABLES if name != "vehicle" for name in getattr(self, name)}
         if self.acceleration_sensor_x:
             declared.add("a_y")
         turned = self.velocity_sensor_angle or self.velocity_sensor_x
@@ -111,7 +111,7 @@ class Repair:
         for name, delay in self.delay.items():
             late = signals[name]
             signals[name] = _by_segments(recording, partial(_earlier, t, late, delay))
-        width = round(SMOOTHED * vehicle.froude_time / recording.dt)
+        width = round(_SMOOTHED * vehicle.froude_time / recording.dt)
         for name, lag in self.lag.items():
             low = signals[name]
             signals[name] = large((n,))
@@ -182,7 +182,7 @@ class Repair:
         factor = dict(self.factor)
         for key, value in other.factor.items():
             factor[key] = factor.get(key, 1.0) * value
-        places = {name: getattr(self, name) + getattr(other, name) for name in SCALARS}
+        places = {name: getattr(self, name) + getattr(other, name) for name in _SCALARS}
         return Repair(
             factor=factor,
             sideslip=self.sideslip or other.sideslip,
@@ -234,33 +234,16 @@ class Repair:
 
     def tables(self) -> dict[str, Any]:
         """Return it as a document holds it: only what repairs something, tables after numbers."""
-        numbers = {name: value for name in SCALARS if (value := getattr(self, name))}
-        tables = {name: dict(value) for name in TABLES if (value := getattr(self, name))}
-        return {**numbers, **({"sideslip": True} if self.sideslip else {}), **tables}
+        return {k: dict(v) if isinstance(v, Mapping) else v for k, v in changed(self).items()}
 
     @classmethod
     def of_table(cls, table: Table) -> "Repair":
-        """Return it as a document says it.
-
-        Parameters
-        ----------
-        table : as `tables` returns it; what is missing repairs nothing.
-        """
-        table.only(*SCALARS, "sideslip", *TABLES)
-        given: dict[str, Any] = {name: table.number(name) for name in SCALARS if name in table}
-        if "sideslip" in table:
-            given["sideslip"] = table.value("sideslip")
-            if not isinstance(given["sideslip"], bool):
-                table.refuse("sideslip", "must be true or false")
-        for name in TABLES:
-            if name in table:
-                inner = table.table(name)
-                given[name] = {key: inner.number(key) for key in inner.data}
-        return cls(**given)
+        """Return it as a document says it.   table : as `tables` returns it."""
+        return cls(**table.record(cls))
 
 
-TABLES = ("factor", "offset", "delay", "lag", "vehicle")
-SCALARS = tuple(one.name for one in fields(Repair) if one.name not in (*TABLES, "sideslip"))
+_TABLES = ("factor", "offset", "delay", "lag", "vehicle")
+_SCALARS = tuple(one.name for one in fields(Repair) if one.name not in (*_TABLES, "sideslip"))
 
 
 def _require_finite(name: str, value: float) -> None:

@@ -26,7 +26,7 @@ from models.recordings.wheels import DRIVEN, Wheels
 
 SLIP, NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
 ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
-WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
+_WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
 MEMORY = 0.15  # [s], over which that of the car is
 BRAKED, ROLLS_OUT = -1.0, -0.3  # [m/s²]: below the first wheels are braked, above the other driven
 UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
@@ -54,7 +54,7 @@ def rolled(
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
     n, v_x = r.size, large((r.size,))
-    span = max(1, round(WINDOW / dt))
+    span = max(1, round(_WINDOW / dt))
     free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
     rule = np.array([dt, most, most + NOISE / (span * dt)])
     scan, constants = trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
@@ -81,7 +81,7 @@ def rolled(
     return _Rolled(v_x, gated, held)
 
 
-class Trust(NamedTuple):
+class _Trust(NamedTuple):
     """What is carried from sample to sample: the speed, its change, and since when none is known.
 
     v [m/s]; a [m/s²]; held: time since a wheel was trusted [s]; known: the speed then [m/s].
@@ -93,7 +93,7 @@ class Trust(NamedTuple):
     known: ca.SX
 
 
-class Rule(NamedTuple):
+class _Rule(NamedTuple):
     """What holds for all samples.
 
     dt [s]; most: acceleration of a car, steady: of a wheel that may be trusted [m/s²]; free: of
@@ -106,7 +106,7 @@ class Rule(NamedTuple):
     free: ca.SX
 
 
-def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
+def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     """Return the speed at the next sample.
     c : speed of the center of gravity by each wheel [m/s], (k,).
     rates : by which each changed lately [m/s²], (k,).
@@ -147,7 +147,7 @@ def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
     slope = ca.if_else(since > MEMORY, _mean(rates, kept), (now - known) / passed)
     slope = ca.fmin(ca.fmax(slope, -most), most)
     a_now = a + (1.0 - ca.exp(-passed / MEMORY)) * (slope - a)
-    return Trust(
+    return _Trust(
         ca.if_else(some, now, v_held),
         ca.if_else(some, a_now, a_held),
         ca.if_else(some, 0.0, passed),
@@ -204,8 +204,8 @@ def trust_scan(k: int) -> Scan:
     """Return the compiled loop over samples."""
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
     rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)
-    after = trusted(
-        Trust(*(trust[i] for i in range(4))), row, rates, Rule(rule[0], rule[1], rule[2], free)
+    after = _trusted(
+        _Trust(*(trust[i] for i in range(4))), row, rates, _Rule(rule[0], rule[1], rule[2], free)
     )
     step = ca.Function(
         f"rolled_{k}",

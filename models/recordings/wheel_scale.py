@@ -14,14 +14,14 @@ from models.logs.signals import QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.units import SPEED, is_given
 from models.recordings.wheels import RADII, Wheels
 
-STRAIGHT = 0.05  # [rad/s], largest yaw rate
-EVEN = 0.5  # [m/s²], largest acceleration
-FAST = 0.3  # of the speed that 5 % of the samples exceed: slower ones do not count
+_STRAIGHT = 0.05  # [rad/s], largest yaw rate
+_EVEN = 0.5  # [m/s²], largest acceleration
+_FAST = 0.3  # of the speed that 5 % of the samples exceed: slower ones do not count
 _LONG_ENOUGH = 2.0  # [s] of such driving, at least
 _AGREES = 0.02  # of the median: farther off, a wheel slips
-SPREAD = 0.05  # between quartiles, as a share of the median, beyond which nothing is learnt
-SPEEDS = (0.8, 1.25)  # speed over ground per speed of a wheel, of one that shows a speed
-MOST = 200_000  # samples that are looked at
+_SPREAD = 0.05  # between quartiles, as a share of the median, beyond which nothing is learnt
+_SPEEDS = (0.8, 1.25)  # speed over ground per speed of a wheel, of one that shows a speed
+_MOST = 200_000  # samples that are looked at
 
 
 class Scale(NamedTuple):
@@ -59,7 +59,7 @@ def identified_scales(
     parts : by signal its channels in SI; v_x, wheels, and r where it is there.
     """
     t = parts["v_x"][0].t
-    t = t[:: -(-t.size // MOST)]
+    t = t[:: -(-t.size // _MOST)]
 
     def at(name: str) -> Array:
         one_clock = [np.interp(t, one.t, one.values) for one in parts[name]]
@@ -74,7 +74,7 @@ def identified_scales(
         if given is None:
             continue
         value, seconds = given
-        unit, (low, high) = units[name], SPEEDS
+        unit, (low, high) = units[name], _SPEEDS
         speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
         turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
         if speed or (turns and RADII[0] <= value <= RADII[1]):
@@ -93,14 +93,14 @@ def identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[floa
     half = max(1, round(0.25 / step))
     k = np.arange(t.size)
     low, high = np.maximum(k - half, 0), np.minimum(k + half, t.size - 1)
-    even: NDArray[np.bool_] = np.abs(v_x[high] - v_x[low]) <= EVEN * (t[high] - t[low])
-    fast = np.abs(v_x) > FAST * float(np.percentile(np.abs(v_x), 95))
-    kept = even & fast & (np.abs(r) <= STRAIGHT) & np.isfinite(wheel) & (wheel != 0.0)
+    even: NDArray[np.bool_] = np.abs(v_x[high] - v_x[low]) <= _EVEN * (t[high] - t[low])
+    fast = np.abs(v_x) > _FAST * float(np.percentile(np.abs(v_x), 95))
+    kept = even & fast & (np.abs(r) <= _STRAIGHT) & np.isfinite(wheel) & (wheel != 0.0)
     if np.count_nonzero(kept) * step < _LONG_ENOUGH:
         return None
     v, w = v_x[kept], wheel[kept]
     quarter, middle, other = np.percentile(v / w, [25, 50, 75])
-    if abs(other - quarter) > SPREAD * abs(middle):
+    if abs(other - quarter) > _SPREAD * abs(middle):
         return None
     rolls = np.abs(v / w - middle) <= _AGREES * abs(middle)
     v, w = v[rolls], w[rolls]

@@ -1,13 +1,13 @@
 """What wheels are, by which speed is made of theirs: radii, tracks, and which are driven."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from models.logs.log import RecordingError
 from models.logs.signals import AXLES, WHEELS
 from models.rules import require_within
-from models.schema import Table
+from models.schema import Table, changed
 from models.vehicle import Vehicle
 
 RADII = (0.01, 2.0)  # of a wheel [m], of model cars to dump trucks
@@ -88,34 +88,12 @@ class Wheels:
 
     def table(self) -> dict[str, Any]:
         """Return it as a document holds it: what differs from the defaults."""
-        declared = {one.name: getattr(self, one.name) for one in fields(self)}
-        plain = {one.name: one.default for one in fields(self)}
-        changed = {name: value for name, value in declared.items() if value != plain[name]}
         return {
             name: value[0] if isinstance(value, tuple) and len(value) == 1 else value
-            for name, value in changed.items()
+            for name, value in changed(self).items()
         }
 
     @classmethod
     def of_table(cls, table: Table) -> "Wheels":
-        """Return it as a document says it.
-
-        Parameters
-        ----------
-        table : as `table` returns it.
-        """
-        table.only(*(one.name for one in fields(cls)))
-        given: dict[str, Any] = {}
-        for name in ("radius", "track"):
-            if name in table:
-                several = table.array(name) if isinstance(table.value(name), list) else None
-                if several is not None and several.ndim != 1:
-                    table.refuse(name, "must be a number or a list of numbers")
-                one = (table.number(name),) if several is None else tuple(map(float, several))
-                given[name] = one
-        for name in ("wheelbase", "acceleration"):
-            if name in table:
-                given[name] = table.number(name)
-        if "driven" in table:
-            given["driven"] = table.text("driven")
-        return cls(**given)
+        """Return it as a document says it.   table : as `table` returns it."""
+        return cls(**table.record(cls, alone=("radius", "track")))
