@@ -9,7 +9,7 @@ from typing import Any
 from codegen.escape import shown
 from models.logs.door import ENDINGS, open_log
 from models.logs.log import LogFile, RecordingError
-from models.logs.memory import ArrayLog
+from models.logs.memory import open_arrays
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.map import MEND, LogMap, given_channel, given_signals
@@ -70,7 +70,7 @@ def read_recording(
     given = with_columns(map_of(log_map), columns)
     if not isinstance(source, str | PathLike):
         name = name or "recording"
-        arrays = ArrayLog(
+        arrays = open_arrays(
             name,
             source,
             given.clock,

@@ -128,7 +128,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
         ("[signals.delta_f]\nchannel = 'a'\nratio = -14\n", "ratio must be hand wheel over road"),
         ("[signals.delta_f]\nchannel = 'a'\nratio = 2\ntable = [[0, 0], [1, 1]]\n", "give one of"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [[0, 0], [1, -1]]\n", "that rise"),
-        ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "delta_f.table must be a list, it is 1"),
+        ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "table must be a list, it is 1"),
         ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),

@@ -13,7 +13,7 @@ import pytest
 
 from models.logs.door import open_log
 from models.logs.log import RecordingError
-from models.logs.memory import ArrayLog
+from models.logs.memory import open_arrays
 from tests.models.logs.conftest import assert_equal
 from tests.models.logs.drive_in_every_format import FORMATS, UNITS, write
 
@@ -120,7 +120,7 @@ def test_a_missing_library_is_named_with_the_pip_line(format, tmp_path, drive, m
 
 def test_a_column_or_run_that_arrays_do_not_have_is_refused():
     t = np.arange(20) / 100
-    log = ArrayLog("drive", {"t": t, "vx": t, "run": np.repeat(["a", "b"], 10)})
+    log = open_arrays("drive", {"t": t, "vx": t, "run": np.repeat(["a", "b"], 10)})
     with pytest.raises(RecordingError, match="there is no channel 'v_x'; did you mean 'vx'"):
         log.read(["v_x"], "a")
     with pytest.raises(RecordingError, match="drive: there is no run 'c', the runs are: a, b"):
@@ -129,12 +129,12 @@ def test_a_column_or_run_that_arrays_do_not_have_is_refused():
         log.read(["vx"])
     assert np.array_equal(log.read(["vx"], "b")[0].values, t[10:])
     with pytest.raises(RecordingError, match="drive: holds one run without a name, so no run 'a'"):
-        ArrayLog("drive", {"t": t, "vx": t}).read(["vx"], "a")
+        open_arrays("drive", {"t": t, "vx": t}).read(["vx"], "a")
 
 
 def test_names_of_runs_break_no_line():
     t = np.arange(20) / 100
-    log = ArrayLog("drive", {"t": t, "vx": t, "run": np.repeat(["lap\n1", "lap\n2"], 10)})
+    log = open_arrays("drive", {"t": t, "vx": t, "run": np.repeat(["lap\n1", "lap\n2"], 10)})
     with pytest.raises(RecordingError, match=r"one of its runs: lap\\n1, lap\\n2$"):
         log.read(["vx"])
 

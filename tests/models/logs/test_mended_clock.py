@@ -7,7 +7,7 @@ import pytest
 
 from models.logs.door import open_log
 from models.logs.log import RecordingError
-from models.logs.memory import ArrayLog
+from models.logs.memory import open_arrays
 from models.logs.stamps import PAUSE
 from tests.models.logs.drive_in_every_format import write
 
@@ -33,7 +33,7 @@ WRITTEN = {
 
 def as_arrays(t, columns, rows, **told):
     data = {"t": t[rows], **{name: values[rows] for name, values in columns.items()}}
-    return ArrayLog("log", data, **told)
+    return open_arrays("log", data, **told)
 
 
 @pytest.mark.parametrize("kind", WRITTEN)
