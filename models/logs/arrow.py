@@ -68,7 +68,8 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
         table = pyarrow.csv.read_csv(
             pyarrow.BufferReader(_of_arrow(block)),
             pyarrow.csv.ReadOptions(
-                column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
+                column_names=[str(k) for k in range(len(layout.columns.names))],
+                block_size=len(block) + 1,
             ),
             pyarrow.csv.ParseOptions(
                 delimiter=layout.delimiter, newlines_in_values=b'"' in block, double_quote=True

@@ -6,6 +6,7 @@ counts from the first message that is read of any topic.
 """
 
 import struct
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -45,40 +46,9 @@ _TOGETHER, _BYTES = 2048, 1 << 24  # messages that are read at a time, and of ho
 _STAMPS = ("header.stamp.", "stamp.")
 _TIME = ("sec", "nanosec")
 
-# Messages that cars tell their motion by and that are in no distribution of ROS.
-_DRIVE = "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n" + (
-    "float32 acceleration\nfloat32 jerk"
-)
-_STEERING = "builtin_interfaces/Time stamp\nfloat32 steering_tire_angle"
-_VELOCITY = "std_msgs/Header header\nfloat32 longitudinal_velocity\nfloat32 lateral_velocity\n" + (
-    "float32 heading_rate"
-)
-KNOWN = {
-    "ackermann_msgs/msg/AckermannDrive": _DRIVE,
-    "ackermann_msgs/msg/AckermannDriveStamped": (
-        "std_msgs/Header header\nackermann_msgs/AckermannDrive drive"
-    ),
-    "autoware_vehicle_msgs/msg/SteeringReport": _STEERING,
-    "autoware_vehicle_msgs/msg/VelocityReport": _VELOCITY,
-    "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
-    "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
-}
-# By package-free type and field: the unit of it and of all in it.
-_UNITS = {
-    ("Twist", "linear"): "m/s", ("Twist", "angular"): "rad/s", ("Accel", "linear"): "m/s^2",
-    ("Accel", "angular"): "rad/s^2", ("Pose", "position"): "m",
-    ("Imu", "angular_velocity"): "rad/s", ("Imu", "linear_acceleration"): "m/s^2",
-    ("AckermannDrive", "steering_angle"): "rad",
-    ("AckermannDrive", "steering_angle_velocity"): "rad/s", ("AckermannDrive", "speed"): "m/s",
-    ("AckermannDrive", "acceleration"): "m/s^2", ("AckermannDrive", "jerk"): "m/s^3",
-    ("SteeringReport", "steering_tire_angle"): "rad",
-    ("VelocityReport", "longitudinal_velocity"): "m/s",
-    ("VelocityReport", "lateral_velocity"): "m/s", ("VelocityReport", "heading_rate"): "rad/s",
-}  # fmt: skip
-_PACKAGES = (
-    "geometry_msgs", "sensor_msgs", "ackermann_msgs", "autoware_vehicle_msgs",
-    "autoware_auto_vehicle_msgs",
-)  # fmt: skip
+_TABLES = tomllib.loads(Path(__file__).with_name("ros.toml").read_text(encoding="utf-8"))
+KNOWN: Mapping[str, str] = _TABLES["known"]  # definitions by type
+_PACKAGES = tuple(_TABLES["packages"]["known"].split())  # whose types have units
 
 
 class _Topic(NamedTuple):
@@ -444,7 +414,7 @@ def _unit(field: Field) -> str:
     """Return the unit that the type of a known message gives."""
     for kind, name in reversed(field.owners):
         package, _, word = kind.partition("/")
-        unit = _UNITS.get((word.rpartition("/")[2], name))
+        unit = _TABLES["units"].get(f"{word.rpartition('/')[2]}.{name}")
         if unit and package in _PACKAGES:
             return unit
     return ""

@@ -71,21 +71,22 @@ def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
 
 def long_log(table: Table) -> GroupedLog[Any] | None:
     """Return the log in a table with a row for each value: time, name, value; None of any other."""
-    bare = ["".join(filter(str.isalpha, one.lower())) for one in table.names]
+    names, units, numeric, *_ = table.columns
+    bare = ["".join(filter(str.isalpha, one.lower())) for one in names]
     name = next((bare.index(one) for one in _NAMES if one in bare), None)
     value = next((bare.index(one) for one in _VALUES if one in bare), None)
-    if name is None or value is None or table.numeric[name] or not table.numeric[value]:
+    if name is None or value is None or numeric[name] or not numeric[value]:
         return None
     words = [one for one in table.first_rows(name) if one]
     clock = find_clock(
-        [one if k not in (name, value) else "" for k, one in enumerate(table.names)],
-        table.units,
+        [one if k not in (name, value) else "" for k, one in enumerate(names)],
+        units,
         table.first_rows,
     )
     if clock is None or clock.column in (name, value) or len(set(words)) == len(words):
         return None
     given = table.first_rows(bare.index("unit")) if "unit" in bare else []
-    units = dict(zip(table.first_rows(name), given, strict=False))
+    unit_of = dict(zip(table.first_rows(name), given, strict=False))
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
     cells = table.cells(kinds)
     require_few(RecordingError, str(table.path), len(cells.words[name].names), "columns", "names")
@@ -98,9 +99,9 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     for k, word in enumerate(cells.words[name].names):
         rows = order[edges[k] : edges[k + 1]]
         rate = typical_rate(t[rows])
-        listed = Listed(name=word, unit=units.get(word, ""), samples=rows.size, rate=rate)
+        listed = Listed(name=word, unit=unit_of.get(word, ""), samples=rows.size, rate=rate)
         found.append(("", listed, rows))
-    said = (f"a row for each value: {table.names[name]} names it; time is {clock.words}",)
+    said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
     read = partial(_of_rows, t, cells.columns[value])
     return GroupedLog.of(
         table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.logs.log import RecordingError, some
 from models.logs.spelling import without_unit
-from models.logs.table import Cells, Gathered, Kind, TableLog, Words
+from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
 from models.logs.units import TIME, to_si
 
 _TIMES = ("t", "time", "timestamp")  # what the clock is called
@@ -85,12 +85,12 @@ def _in_seconds(durations: NDArray[Any]) -> Array:
 class _ArrayTable:
     """Columns in memory."""
 
-    format, place, words, rate = "arrays", "index", (), 0.0
+    format, place = "arrays", "index"
 
     def __init__(self, name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        self.path, self.names, self._columns = Path(name), tuple(arrays), list(arrays.values())
-        self.units = ("",) * len(self.names)
-        self.numeric = tuple(self._is_numeric(k) for k in range(len(self.names)))
+        self.path, self._names, self._arrays = Path(name), tuple(arrays), list(arrays.values())
+        numeric = tuple(self._is_numeric(k) for k in range(len(arrays)))
+        self.columns = Columns(self._names, ("",) * len(arrays), numeric)
 
     def _is_numeric(self, column: int) -> bool:
         try:
@@ -100,30 +100,30 @@ class _ArrayTable:
         return True
 
     def first_rows(self, column: int) -> list[str]:
-        head = np.ravel(self._columns[column])[:_HEAD]
+        head = np.ravel(self._arrays[column])[:_HEAD]
         return ["" if cell is None or cell != cell else str(cell) for cell in head]  # as NaN is
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns, of the rows of a run where one is named."""
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         found = {column: self._read(column, kind) for column, kind in wanted.items()}
-        sizes = {self.names[column]: self._columns[column].size for column in wanted}
+        sizes = {self._names[column]: self._arrays[column].size for column in wanted}
         if len(set(sizes.values())) > 1:
             raise RecordingError(f"{self.path}: columns must have one length, they have {sizes}")
-        gathered = Gathered(self.path, wanted, self.names, "index", run)
-        size = next(iter(sizes.values()), self._columns[0].size)
+        gathered = Gathered(self.path, wanted, self._names, "index", run)
+        size = next(iter(sizes.values()), self._arrays[0].size)
         gathered.extend(np.arange(size, dtype=np.int64), found)
         return gathered.finished()
 
     def _read(self, column: int, kind: Kind) -> Any:
         if kind is Kind.WORD:
-            return Words.of([str(word) for word in np.ravel(self._columns[column]).tolist()])
+            return Words.of([str(word) for word in np.ravel(self._arrays[column]).tolist()])
         if kind is Kind.INSTANT:
-            return self._columns[column].astype("datetime64[ns]").astype(np.int64)
+            return self._arrays[column].astype("datetime64[ns]").astype(np.int64)
         return self._number(column, slice(None))
 
     def _number(self, column: int, part: slice) -> Array:
-        value, where = self._columns[column], f"{self.path}: {self.names[column]}"
+        value, where = self._arrays[column], f"{self.path}: {self._names[column]}"
         if value.ndim != 1:
             raise RecordingError(f"{where} must have one axis, its shape is {value.shape}")
         try:

@@ -14,7 +14,7 @@ from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
-from models.logs.table import Cells, Gathered, Kind, TableLog
+from models.logs.table import Cells, Columns, Gathered, Kind, TableLog
 from models.schema import LONGEST_NAME, require_dense, require_few, require_file
 
 _HEAD = 400  # rows that tell what columns are
@@ -44,28 +44,18 @@ def open_parquet(path: Path) -> TableLog:
 class _ParquetTable:
     """A table in a Parquet file."""
 
-    words = ()
-
     path: Path
     schema: Any
     rows: int
 
     format = "Parquet"
     place = "row"
-    rate = 0.0
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.schema.names)
-
-    @cached_property
-    def units(self) -> tuple[str, ...]:
-        """Units of the columns: as their metadata say, or as in the names."""
-        return tuple(_unit(one) for one in self.schema)
-
-    @cached_property
-    def numeric(self) -> tuple[bool, ...]:
-        return tuple(_is_numeric(one.type) for one in self.schema)
+    def columns(self) -> Columns:
+        """The columns; their units as metadata say, or as in the names."""
+        units, numeric = map(_unit, self.schema), (_is_numeric(one.type) for one in self.schema)
+        return Columns(tuple(self.schema.names), tuple(units), tuple(numeric))
 
     def first_rows(self, column: int) -> list[str]:
         with one_line(self.path, _WHAT):
@@ -87,14 +77,14 @@ class _ParquetTable:
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         for column, kind in wanted.items():
-            name, found = self.names[column], self.schema.field(column).type
-            if self.names.count(name) > 1:
+            name, found = self.columns.names[column], self.schema.field(column).type
+            if self.columns.names.count(name) > 1:
                 raise RecordingError(f"{self.path}: column {name} appears more than once")
             if kind is Kind.NUMBER and not _is_numeric(found):
                 raise RecordingError(f"{self.path}: {name} must be numeric, its type is {found}")
         if self.rows == 0:
             raise RecordingError(f"{self.path}: has columns but no row of data")
-        gathered = Gathered(self.path, wanted, self.names, "row", run)
+        gathered = Gathered(self.path, wanted, self.columns.names, "row", run)
         order = list(wanted)
         with one_line(self.path, _WHAT):
             for batch in self._batches(order, _BATCH):
@@ -108,7 +98,7 @@ class _ParquetTable:
 
     def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""
-        names = list(dict.fromkeys(self.names[k] for k in columns))
+        names = list(dict.fromkeys(self.columns.names[k] for k in columns))
         parquet = need(self.path, "pyarrow.parquet", "Parquet", "parquet")
         texts = [one.name for one in self.schema if _is_text(one.type)]  # each is kept once
         with parquet.ParquetFile(self.path, read_dictionary=texts) as file:
@@ -116,14 +106,14 @@ class _ParquetTable:
                 places: dict[str, list[int]] = {}
                 for place, name in enumerate(batch.schema.names):
                     places.setdefault(name, []).append(place)
-                yield [batch.column(places[self.names[k]][self._which[k]]) for k in columns]
+                yield [batch.column(places[self.columns.names[k]][self._which[k]]) for k in columns]
 
     @cached_property
     def _which(self) -> tuple[int, ...]:
         """How many columns of the same name stand before each."""
         seen: dict[str, int] = {}
         result = []
-        for name in self.names:
+        for name in self.columns.names:
             result.append(seen.get(name, 0))
             seen[name] = result[-1] + 1
         return tuple(result)
@@ -141,7 +131,7 @@ class _ParquetTable:
                 return whole_numbers(cells, MISSING)
             except pyarrow.ArrowInvalid:
                 raise RecordingError(
-                    f"{self.path}: {self.names[column]} must be of the years 1678 to 2262, "
+                    f"{self.path}: {self.columns.names[column]} must be of the years 1678 to 2262, "
                     f"rows from {rows[0]} on are not"
                 ) from None
         names, codes = words(cells)
@@ -149,7 +139,7 @@ class _ParquetTable:
         if None in instants:
             k = instants.index(None)  # the first: words stand in the order of the rows
             raise RecordingError(
-                f"{self.path}: {self.names[column]} must be a time, row "
+                f"{self.path}: {self.columns.names[column]} must be a time, row "
                 f"{rows[np.argmax(codes == k)]} has {shown(names[k][:LONGEST_NAME])}"
             )
         return np.array(instants, dtype=np.int64)[codes]

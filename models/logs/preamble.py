@@ -22,6 +22,7 @@ from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
+from models.logs.table import Columns
 from models.logs.units import PER_SECOND, quantities, time_unit
 from models.schema import require_few
 
@@ -69,26 +70,21 @@ class Layout:
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
     delimiter : one character, " " for any number of blanks and tabs.   decimal : "." or ",".
     thousands : what sets thousands apart in some cell, "" where nothing does.
-    units : of the columns, "" where none is given.
     first : line of the first row of data, from 1; one beyond the header where there is none.
     again : lines of header and units, which may come again further down and are no data then.
+    rows : cells of the first rows of data.
     made_by : the logger or program whose format it is, "" where nothing tells.
-    rate : of samples, that the preamble tells [Hz]; 0 where it tells none.
     """
 
     encoding: str
     delimiter: str
-    decimal: str
-    thousands: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    columns: Columns
     first: int
-    again: tuple[str, ...]
-    numeric: tuple[bool, ...]
-    rows: tuple[tuple[str, ...], ...]
-    words: tuple[str, ...]
-    made_by: str
-    rate: float = 0.0
+    decimal: str = "."
+    thousands: str = ""
+    again: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    made_by: str = ""
 
 
 class _Line(NamedTuple):
@@ -316,20 +312,18 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     words += [f"names in line {names_line.number}"]
     words += [f"units in line {units_line.number}"] if units_line is not None else []
     words += [] if units_line is not None or not any(units) else ["units in the names"]
+    rate = _given_rate([line.text for line in lines[: lines.index(names_line)]])
+    numeric = _numeric(data, names, way)
     return Layout(
         encoding=encoding,
         delimiter=way.delimiter,
+        columns=Columns(tuple(names), tuple(units), numeric, tuple(words), rate),
+        first=lines[first].number,
         decimal=way.decimal,
         thousands=way.thousands,
-        names=tuple(names),
-        units=tuple(units),
-        first=lines[first].number,
         again=again,
-        numeric=_numeric(data, names, way),
         rows=data,
-        words=tuple(words),
         made_by=made_by,
-        rate=_given_rate([line.text for line in lines[: lines.index(names_line)]]),
     )
 
 
@@ -455,19 +449,12 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
     require_few(RecordingError, str(path), len(names), "columns", "columns")
     after = cells_of(lines[number], delimiter) if number < len(lines) else ()
     under = len(after) == len(names) and is_units_row(after)
+    words = (_encoding_word(encoding), f"names in line {number}")
+    units = tuple(unit_in_name(name) for name in names)
+    columns = Columns(names, units, (True,) * len(names), words)
+    first = number + 1 + under
     return Layout(
-        encoding=encoding,
-        delimiter=delimiter,
-        decimal=".",
-        thousands="",
-        names=names,
-        units=tuple(unit_in_name(name) for name in names),
-        first=number + 1 + under,
-        again=(text,),
-        numeric=(True,) * len(names),
-        rows=(),
-        words=(_encoding_word(encoding), f"names in line {number}"),
-        made_by="",
+        encoding=encoding, delimiter=delimiter, columns=columns, first=first, again=(text,)
     )
 
 
@@ -510,22 +497,18 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])
     decimal = "." if way is None else way.decimal
+    words = (
+        _encoding_word(encoding),
+        "Racelogic VBOX sections (sure)",
+        "decimal comma" if decimal == "," else "decimal point",
+    )
     return Layout(
         encoding=encoding,
         delimiter=BLANKS,
-        decimal=decimal,
-        thousands="",
-        names=names,
-        units=tuple(units),
+        columns=Columns(names, tuple(units), (True,) * len(names), words),
         first=first + 1,
-        again=(),
-        numeric=(True,) * len(names),
+        decimal=decimal,
         rows=tuple(data[:_ROWS]),
-        words=(
-            _encoding_word(encoding),
-            "Racelogic VBOX sections (sure)",
-            "decimal comma" if decimal == "," else "decimal point",
-        ),
         made_by="Racelogic VBOX",
     )
 

@@ -18,7 +18,6 @@ from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
 from models.schema import Table, changed
-from models.smoothing import without_low_pass
 from models.vehicle import AREAS, BICYCLE, Vehicle
 
 _SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
@@ -30,22 +29,16 @@ class Repair:
 
     Parameters
     ----------
+    velocity_sensor_x : how far ahead of the center of gravity v_y is measured [m].
+    velocity_sensor_angle : by which that sensor is turned to the left [rad].
+    acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
+    sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
     factor : by channel, what the logged value is multiplied by [-].
     offset : by channel, what is then taken off, in its unit.
     delay : by channel, how late it is against the others [s]; negative where it is early. The
         repaired recording ends, or begins, where a channel has no sample any more.
     lag : by channel, time constant of a low pass of first order that it is behind [s].
-    velocity_sensor_x : how far ahead of the center of gravity v_y is measured [m].
-    velocity_sensor_angle : by which that sensor is turned to the left [rad].
-    acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
-    sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
     vehicle : numbers of the car in place of the declared ones, by their names in `Vehicle`.
-
-    Raises
-    ------
-    RecordingError
-        For an unknown channel or number of a car, for a value that is not finite, for a factor of
-        zero, a lag that is not positive, or a number of a car that is not, its downforce aside.
     """
 
     velocity_sensor_x: float = 0.0
@@ -116,7 +109,7 @@ class Repair:
             low = signals[name]
             signals[name] = large((n,))
             for piece in recording.segments:
-                signals[name][piece] = without_low_pass(low[piece], lag, recording.dt, width)
+                signals[name][piece] = _without_low_pass(low[piece], lag, recording.dt, width)
         r = signals["r"]
         if turned:
             c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
@@ -265,6 +258,19 @@ def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array])
             values[part] = compute(whole, part)
     values.setflags(write=False)
     return values
+
+
+def _without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:
+    """Return what went into a low pass, u = y + T ẏ, of y under a Hann window without phase (n,).
+    signal : y, what came out (n,).   lag : time constant T of the low pass [s].
+    half : samples on each side of the window, which takes noise off first; 0 for none.
+    """
+    if half > 0:
+        bell = np.hanning(2 * half + 3)[1:-1]
+        padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
+        signal = np.convolve(padded, bell / bell.sum(), "valid")
+    source: Array = signal + lag * np.gradient(signal, dt)
+    return source
 
 
 def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:
