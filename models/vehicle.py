@@ -229,12 +229,6 @@ class Vehicle:
     chassis : what the double-track plant needs, or None.
     estimated : names of the values that nobody measured, but that follow from the others by a
         rule; two cars that differ in it alone are equal.
-
-    Raises
-    ------
-    VehicleError
-        For a value that is not positive and finite, for an inertia, a stiffness, a downforce or a
-        drag that no car of that mass has, or for springs too soft to carry the body.
     """
 
     name: str = "car"
@@ -436,12 +430,6 @@ class Vehicle:
         Parameters
         ----------
         path : the TOML file; a relative `tire` in [chassis] starts from its folder.
-
-        Raises
-        ------
-        VehicleError
-            One line with file, key and rule: no such file, key unknown or missing, type or value
-            wrong.
         """
         file = Path(path)
         if not file.exists():

@@ -41,7 +41,6 @@ def is_used(path: Path) -> bool:
 
 def _of_arrow(block: bytes) -> Any:
     """Return bytes in memory of pyarrow's own.
-
     Its threads may drop them last, while Python ends: of what is Python's that aborts the program.
     """
     import pyarrow

@@ -52,7 +52,6 @@ class _Axis(NamedTuple):
 
 class _Found(NamedTuple):
     """What numbers tell: channels whose letters mislead, and what they are where that is known.
-
     oblique: of a box that lies so that no axis is one of the car's.
     """
 

@@ -5,20 +5,22 @@ its header, and where there is none (or it is not set) the time at which the bag
 counts from the first message that is read of any topic.
 """
 
+import re
 import struct
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.bounded import bounded
+from models.limits import limits
 from models.logs.cdr import (
     ORDERS,
     PREFIX,
@@ -35,9 +37,9 @@ from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError
-from models.logs.magic import MCAP, ROS1, SQLITE
+from models.logs.magic import BAG_METADATA, MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
-from models.schema import require_few
+from models.schema import CHUNK, most_unpacked, read_text, require_dense, require_few
 
 _NS = 1e9  # in a second
 _OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
@@ -53,7 +55,6 @@ _PACKAGES = tuple(_TABLES["packages"]["known"].split())  # whose types have unit
 
 class _Topic(NamedTuple):
     """Messages of one name and type.
-
     stamp: begins the paths of its clock, None where that is the bag's; zero: of its clock [ns].
     """
 
@@ -154,7 +155,6 @@ def _moving(path: Path, bag: Any) -> list[_Moving]:
 
 def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
     """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
-
     It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
     """
     order, place = ORDERS.get(bytes(raw[:2])), PREFIX
@@ -199,7 +199,7 @@ def _opened(path: Path) -> Iterator[Any]:
     """Open a bag; what is compressed in it unpacks to no more than is allowed."""
     plugin = _plugin(path)
     reader = need(path, "rosbags.rosbag2.reader", "ROS 2 bags", "ros")
-    with bounded(path):
+    with _bounded(path):
         storage = reader.Reader.STORAGE_PLUGINS[plugin]
         bag = storage(path)
         storage.open(bag)
@@ -295,7 +295,6 @@ def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
 
 def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None, float]:
     """Return when the first message was received, its stamp if it has one [ns], and the rate [Hz].
-
     The rate is that of the first messages: a topic may be silent for most of a bag.
     """
     received: list[int] = []
@@ -426,3 +425,84 @@ def _said(topics: Sequence[_Topic], skipped: Mapping[str, str]) -> tuple[str, ..
         *noted("no stamp in the message, its clock is when the bag received it", received),
         *noted("not read", [f"{name} ({why})" for name, why in skipped.items()]),
     )
+
+
+# Limits on what rosbags does with a bag, whatever the bag says of itself.
+#
+# Its compressed parts unpack to no more than is allowed. Its metadata, which are YAML, may not be
+# deep: the parser takes the square of it; what they say of the quality of service is not parsed.
+
+_Unpack = Callable[[bytes, int], bytes]
+_DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
+
+
+@contextmanager
+def _bounded(path: Path) -> Iterator[None]:
+    """Let rosbags read with limits."""
+    reader, mcap, sqlite = (
+        need(path, f"rosbags.rosbag2.{name}", "ROS 2 bags", "ros")
+        for name in ("reader", "storage_mcap", "storage_sqlite3")
+    )
+    lz4 = need(path, "lz4.frame", "ROS 2 bags", "ros")
+    zstd = mcap.zstd
+    if path.is_dir():
+        _require_shallow(path / BAG_METADATA)
+        for one in sorted(path.glob("*.zstd")):
+            _require_small(one, zstd)
+
+    def of_zstd(data: bytes, size: int) -> bytes:
+        _require_allowed(path, size, len(data))
+        return bytes(zstd.ZstdDecompressor().decompress(data, max_length=size + 1))
+
+    def of_lz4(data: bytes, size: int) -> bytes:
+        _require_allowed(path, size, len(data))
+        return bytes(lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
+
+    def of_message(data: bytes) -> bytes:
+        most = most_unpacked(len(data))
+        message = bytes(zstd.ZstdDecompressor().decompress(data, max_length=most + 1))
+        _require_allowed(path, len(message), len(data))
+        return message
+
+    table: dict[str, _Unpack] = mcap.DECOMPRESSORS
+    before = dict(table)
+    table.update(zstd=of_zstd, lz4=of_lz4)
+    reader.zstd = SimpleNamespace(open=zstd.open, decompress=of_message)
+    parse = reader.parse_qos
+    for module in (reader, mcap, sqlite):
+        module.parse_qos = lambda _: []
+    try:
+        yield
+    finally:
+        table.update(before)
+        reader.zstd = zstd
+        for module in (reader, mcap, sqlite):
+            module.parse_qos = parse
+
+
+def _require_shallow(path: Path) -> None:
+    """Refuse metadata of more levels than is allowed."""
+    text = read_text(path, RecordingError)
+    depth = deepest = 0
+    for mark in re.findall(r"[\[\]{}]", text):
+        depth += 1 if mark in "[{" else -1
+        deepest = max(deepest, depth)
+    indent = max((len(line) - len(line.lstrip()) for line in text.splitlines()), default=0) // 2
+    require_few(RecordingError, str(path), max(deepest, indent), "depth", "levels of metadata")
+    if _DEEP.search(text):
+        raise RecordingError(f"{path}: must not hold lists in lists")
+
+
+def _require_allowed(path: Path, size: int, packed: int) -> None:
+    require_few(RecordingError, str(path), size / 1e6, "block", "megabytes of a chunk")
+    require_dense(RecordingError, str(path), size, packed, "chunks")
+
+
+def _require_small(path: Path, zstd: Any) -> None:
+    """Refuse a file that unpacks to more than is allowed."""
+    size, most = 0, 1e6 * limits().megabytes
+    with zstd.open(path, "rb") as file:
+        while size <= most and (part := file.read(CHUNK)):
+            size += len(part)
+            require_dense(RecordingError, str(path), size, path.stat().st_size, "zstd data")
+    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes unpacked")

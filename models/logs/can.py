@@ -59,7 +59,6 @@ class _Group:
 
 class _Place(NamedTuple):
     """Where a channel is: with which others it is sent, and the signal of the DBC.
-
     fault: why it cannot be read as the DBC tells it, "" where it can.
     """
 
@@ -70,7 +69,6 @@ class _Place(NamedTuple):
 
 class _Dbc(NamedTuple):
     """What a DBC tells: messages by identifier, with `EXTENDED`; what is wrong, by their signals.
-
     faults: by names of frame and signal, a line each.
     """
 

@@ -36,7 +36,6 @@ class CdrError(TireidError, ValueError):
 
 class Field(NamedTuple):
     """A number of a message.
-
     path: its name, with those of the messages that it lies in; owners: types and fields of these,
     the outermost first; kind: as numpy calls it.
     """
@@ -48,7 +47,6 @@ class Field(NamedTuple):
 
 class Layout(NamedTuple):
     """Where numbers lie in messages of the same lengths.
-
     size: bytes of the message; lengths: place and value of each length; places: of the fields.
     """
 

@@ -42,7 +42,6 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
 @contextmanager
 def one_line(path: Path, format: str) -> Iterator[None]:
     """Let a library read a file: what it raises is a refusal, what it warns of is not said.
-
     What is no fault of the file is not reported as one: a full disk is one, and MemoryError
     stays what it is.
     """

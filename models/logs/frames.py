@@ -26,7 +26,7 @@ from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
-from models.logs.mdf_blocks import is_bus, opened
+from models.logs.mdf import is_bus, opened
 from models.logs.stamps import CALENDAR, nanoseconds, since
 from models.schema import require_few
 
@@ -70,7 +70,6 @@ class Known:
 
 class Frames(NamedTuple):
     """Frames of one identifier on one bus.
-
     t: (n,) [s]; data: (n, bytes).
     """
 

@@ -26,7 +26,6 @@ _P = TypeVar("_P")
 
 class Samples(NamedTuple):
     """What was asked for on one clock.
-
     clock: its name, for messages; t: times as in the file [s], (n,); values: by name as listed,
     (n,).
     """

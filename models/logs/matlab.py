@@ -24,7 +24,6 @@ _REMEDY = (
 
 class _Time(NamedTuple):
     """How a clock is read.
-
     per_second: of its unit; rate: typical [Hz].
     """
 

@@ -180,7 +180,6 @@ def own_clocks(
     names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]], first: Clock
 ) -> dict[int, Clock]:
     """Return by column the clock of those that stand behind a time of their own; else nothing.
-
     So tables are written whose channels were sampled at rates of their own: "time_1, v_x, time_2,
     v_y". It is such a table where it begins with a time, a channel stands between any two, and one
     of the others, called alike or of another rate, rises without a rest from about the same instant
@@ -605,7 +604,6 @@ def _even_clock(t: Array) -> _Even | None:
 
 def _unjittered(t: Array) -> _Even | None:
     """Return the even clock of stamps that jitter so far that some are there twice; or None.
-
     They must wander about it by less than a step, and not drift by half of one: then none is lost.
     """
     usual = float(np.median(np.diff(t)))

@@ -43,7 +43,6 @@ class Kind(Enum):
 
 class Words(NamedTuple):
     """A column of words: the distinct ones in their order, and which of them each row has.
-
     names: of the words; codes: (n,) places among them.
     """
 
@@ -59,7 +58,6 @@ class Words(NamedTuple):
 
 class Cells(NamedTuple):
     """Columns of a table.
-
     columns: column from 0 -> (n,) float64, or int64 of nanoseconds; words: column -> its words;
     rows: (n,) lines of a text or rows from 1, for messages.
     """
@@ -71,7 +69,6 @@ class Cells(NamedTuple):
 
 class Columns(NamedTuple):
     """What a file tells of its columns, before its cells are read.
-
     names: as in the file, which may repeat; units: "" where none is given; numeric: whether they
     hold numbers; words: how the file is written, for people; rate: samples per second that the file
     tells of all rows [Hz], 0 where it tells none.

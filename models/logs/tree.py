@@ -53,7 +53,6 @@ Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
 
 class Clock(NamedTuple):
     """Times of samples.
-
     leaf, column: where they are; unit: that is given of it, "" for none.
     """
 
@@ -65,7 +64,6 @@ class Clock(NamedTuple):
 
 class Signal(NamedTuple):
     """A channel of a tree.
-
     place: which column, or row where `along` is 1, of the leaf.
     """
 

@@ -198,7 +198,6 @@ class Plant:
         name: str | None = None,
     ) -> PlantRun:
         """Drive a maneuver from straight ahead, with classical Runge-Kutta steps.
-
         speed : wanted speed [m/s], a number or a function of the times (n,) [s].
         friction : of the road; None is what the tire was measured on.
         bank : slope of the road across the car [rad], positive where it falls to the left; wheel
@@ -301,7 +300,6 @@ class StepwisePlant:
     @cached_property
     def _steppers(self) -> tuple[Stepper, Stepper]:
         """Of the first instant, and of a period with the first step of the next one.
-
         That step is there for its outputs: they are those of the period's end.
         """
         scan, constants = self.plant.loop(self.dt)

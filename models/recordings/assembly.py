@@ -92,10 +92,16 @@ def recording_of(
             learnt = _scale_note(log, signals, log_map, run)
         signals = _without_wheels(signals)
     spared = ""
+
+    def on_one_clock(
+        chosen: Mapping[str, Signal],
+    ) -> tuple[dict[str, Signal], dict[str, list[Raw]], tuple[str, ...], _Segments]:
+        channels = _channels(log, label, chosen, log_map, run)
+        named, raws, said = with_pose(label, chosen, channels)
+        return named, raws, said, _segments(label, named, raws, log_map, dt)
+
     try:
-        parts = _channels(log, label, signals, log_map, run)
-        signals, parts, posed = with_pose(label, signals, parts)
-        segments = _segments(label, signals, parts, log_map, dt)
+        signals, parts, posed, segments = on_one_clock(signals)
     except RecordingError as error:
         needed = {
             key: one
@@ -105,10 +111,8 @@ def recording_of(
         if len(needed) == len(signals) or missing_signals(needed):
             raise
         left = ", ".join(column_of(key) for key in signals if key not in needed)
-        signals, spared = needed, f"{left} is left aside: {error}"
-        parts = _channels(log, label, signals, log_map, run)
-        signals, parts, posed = with_pose(label, signals, parts)
-        segments = _segments(label, signals, parts, log_map, dt)
+        spared = f"{left} is left aside: {error}"
+        signals, parts, posed, segments = on_one_clock(needed)
     rolls = ""
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, segments.kept, log_map, dt)
@@ -144,10 +148,7 @@ def _channels(
 
     Turns of wheels become speeds, where there is no v_x that tells their radius.
     """
-    asked = [
-        (*signal.channel, *([signal.sign] if signal.sign else [])) for signal in signals.values()
-    ]
-    names = list(dict.fromkeys(one for some in asked for one in some))
+    names = list(dict.fromkeys(one for signal in signals.values() for one in signal.asked))
     by_name = dict(zip(names, log.read(names, run), strict=True))
     found: dict[str, list[Raw]] = {}
     for ours, signal in signals.items():

@@ -153,7 +153,6 @@ def world_axes(recording: Recording) -> str | None:
 
 def _check_turns(w: Means) -> str | None:
     """Answer with the one of r, steering and a_y that turns the other way than both others.
-
     Of two alone nobody can tell which is wrong: they are named both.
     """
     turn, felt = w.v_x_r, w.a_y
@@ -211,7 +210,6 @@ def _check_two(r_delta: Pair) -> str | None:
 
 def _check_lateral_acceleration(w: Means) -> str | None:
     """Answer with a_y that is not v̇_y + v_x r in size.
-
     Regressors: v_x r, v̇_y where v_y was measured, ṙ (a sensor off the center of gravity) and,
     where v_x r varies by half its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady
     turn of 1.5 m/s^2, three times a usual bias; or as much of an a_y that goes with v_x r. A slope

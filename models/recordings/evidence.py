@@ -80,7 +80,6 @@ class Steering(NamedTuple):
 
 class Pair(NamedTuple):
     """How two channels that follow the same bends go together.
-
     correlation : from -1 to 1.   sign : 1 or -1 where that is beyond chance, else 0.   seconds : of
     windows that turn.
     """

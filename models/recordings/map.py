@@ -140,13 +140,7 @@ class LogMap:
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> "LogMap":
-        """Read a log.toml.
-
-        Raises
-        ------
-        RecordingError
-            One line that names the file, the key, the rule and the value.
-        """
+        """Read a log.toml."""
         data = read_toml(Path(path), RecordingError)
         try:
             declared = cls._of_table(Table(data, "", RecordingError))

@@ -20,7 +20,6 @@ _HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a 
 
 class Portion(NamedTuple):
     """Segments of a recording, joined.
-
     recording : of them; at the end of each segment the car stands, so that a signal that is moved
     in time leaves the next alone.   samples : which samples of the whole they are (k,).
     """

@@ -101,11 +101,6 @@ def read_repaired(
     run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
     columns, log_map : as of `read_recording`.
-
-    Raises
-    ------
-    RecordingError
-        One line: file and run, column, rule, value, remedy.
     """
     given = with_columns(map_of(log_map), columns)
     given = replace(given, wheels=given.wheels.completed(given.repair.on(vehicle)))

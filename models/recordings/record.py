@@ -243,11 +243,6 @@ class Recording:
         ----------
         t0 : first time [s], on the recording's own clock.
         t1 : last time [s], included (to a millionth of a step).
-
-        Raises
-        ------
-        RecordingError
-            If fewer than 10 samples are left.
         """
         slack = 1e-6 * self.dt
         first = int(np.searchsorted(self.t, t0 - slack, side="left"))

@@ -34,11 +34,6 @@ class Wheels:
     wheelbase : L [m]; None where it is not known: then front wheels are taken to roll without slip.
     driven : "front", "rear", "all" or "none"; empty where it is not known.
     acceleration : the largest along the car, either way [m/s²].
-
-    Raises
-    ------
-    RecordingError
-        For a number that no wheel, axle or car has, or another word.
     """
 
     radius: tuple[float, ...] = ()
