@@ -9,6 +9,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,8 +42,11 @@ class _DamagedError(TireidError, ValueError):
 
 
 class _Element(NamedTuple):
+    """A part of a variable; end: where the next one begins."""
+
     kind: int
     data: memoryview
+    end: int
 
 
 class _Beginning(NamedTuple):
@@ -146,23 +150,19 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
     while place + 8 <= len(data):
         kind, length = struct.unpack(order + "II", data[place : place + 8])
         if kind >> 16:  # small: size and type share a word, the data are in the other
-            yield _Element(kind & 0xFFFF, data[place + 4 : place + 4 + min(kind >> 16, 4)])
+            some = data[place + 4 : place + 4 + min(kind >> 16, 4)]
             place += 8
+            yield _Element(kind & 0xFFFF, some, place)
             continue
-        yield _Element(kind, data[place + 8 : place + 8 + length])
+        some = data[place + 8 : place + 8 + length]
         place += 8 + length + (-length % 8)
+        yield _Element(kind, some, place)
 
 
 def _beginning(data: memoryview, order: str) -> _Beginning:
     if not data:
         return _Beginning(6, False, (0, 0), 2, "", data)
-    place, parts = 0, []
-    for element in _elements(data, order):
-        parts.append(element)
-        if len(parts) == 1 and len(element.data) < 8:
-            break
-        if len(parts) == 3:
-            break
+    parts = list(islice(_elements(data, order), 3))
     if len(parts) < 2 or len(parts[0].data) < 8:
         raise _DamagedError("a variable has no flags")
     flags = struct.unpack(order + "I", parts[0].data[:4])[0]
@@ -179,24 +179,14 @@ def _beginning(data: memoryview, order: str) -> _Beginning:
     shape = dimensions[0], math.prod(dimensions[1:])
     if math.prod(shape) > _LARGEST_DIMENSION:
         raise _DamagedError("a variable is too large")
-    place = _after(data, order, 3)
     return _Beginning(
         kind,
         bool(flags & _COMPLEX),
         shape,
         len(dimensions),
         bytes(parts[2].data).decode("latin-1"),
-        data[place:],
+        data[parts[2].end :],
     )
-
-
-def _after(data: memoryview, order: str, count: int) -> int:
-    """Return where the elements after the first few begin."""
-    place = 0
-    for _ in range(count):
-        kind, length = struct.unpack(order + "II", data[place : place + 8])
-        place += 8 if kind >> 16 else 8 + length + (-length % 8)
-    return place
 
 
 def _load(path: Path, begin: _Beginning, order: str) -> Array:

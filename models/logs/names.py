@@ -408,11 +408,9 @@ def _along_axes(
     within = {name for box in boxes for name in box.names.values()}
 
     def best(name: str) -> str:
-        free = [one for one in candidates[name] if not within & set(one.channel)]
-        likely = max(free, key=lambda one: one.confidence, default=None)
-        return likely.channel[0] if likely and likely.confidence > STILL else ""
+        return _likeliest([one for one in candidates[name] if not within & set(one.channel)])
 
-    speed = best("v_x") or _of_a_triad(candidates["v_x"])
+    speed = best("v_x") or _likeliest(candidates["v_x"])
     found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
     units = {one.name: _with_given_unit(one).unit.strip() for one in headings}
     mended = {
@@ -438,8 +436,8 @@ def _along_axes(
     return mended
 
 
-def _of_a_triad(found: Sequence[Guess]) -> str:
-    """Return the channel that is the speed by its letter; "" where there is none."""
+def _likeliest(found: Sequence[Guess]) -> str:
+    """Return the channel of the surest guess; "" where there is none."""
     likely = max(found, key=lambda one: one.confidence, default=None)
     return likely.channel[0] if likely and likely.confidence > STILL else ""
 

@@ -490,9 +490,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         units = _with_channel_units(lines, at, names, units)
     known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
     units = [unit or known.get(name.lower(), "") for name, unit in zip(names, units, strict=True)]
-    units = [
-        "hhmmss" if name.lower() == "time" else u for name, u in zip(names, units, strict=True)
-    ]
+    units = [known["time"] if a.lower() == "time" else u for a, u in zip(names, units, strict=True)]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])

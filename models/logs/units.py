@@ -45,9 +45,7 @@ _FARTHEST = {
     HAND_WHEEL: (3.0 * math.pi, "deg"),
     RATE: (2.0 * math.pi, "deg/s"),
 }
-_SMALLEST_ACCELERATION = (
-    2.5  # [m/s²]: a drive that does not reach it teaches no tire, so it is in g
-)
+_SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire: it is in g
 
 
 def _plain(unit: str) -> str:

@@ -12,7 +12,7 @@ went. The step from sample to sample is compiled.
 """
 
 from collections.abc import Mapping, Sequence
-from functools import cache, reduce
+from functools import cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -113,34 +113,31 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     """
     v, a, since, known = trust
     dt, most, limit, free = rule
-    wheels = range(c.numel())
     ahead, passed = v + a * dt, since + dt
     near, alike = (NOISE + share * ca.fabs(ahead) for share in (SLIP, ALIKE))
 
-    steady = [ca.fabs(rates[k]) <= limit for k in wheels]
-    agree = ca.logic_and(_most(c, wheels) - _least(c, wheels) <= near, _every(steady))
+    steady = ca.fabs(rates) <= limit
+    agree = ca.logic_and(ca.mmax(c) - ca.mmin(c) <= near, ca.logic_all(steady))
     doubt = UNSURE * most * since
     doubt = ca.if_else(agree, doubt * (1.0 + since / PATIENCE), doubt)
-    slow = ca.fmax(ca.fabs(ahead), _most(ca.fabs(c), wheels)) < SLOW
+    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < SLOW
     doubt = ca.if_else(slow, SLOW, doubt)
-    reached = [ca.fabs(c[k] - ahead) <= near + doubt for k in wheels]
-    likely = [ca.logic_and(ca.logic_or(slow, steady[k]), reached[k]) for k in wheels]
-    some = _any(likely)
+    likely = ca.logic_and(ca.logic_or(slow, steady), ca.fabs(c - ahead) <= near + doubt)
+    some = ca.logic_any(likely)
 
     # Nobody is trusted: it goes on as it went, unless that leads away from all wheels.
-    astray = _every([(c[k] - ahead) * a < 0.0 for k in wheels])
+    astray = ca.logic_all((c - ahead) * a < 0.0)
     v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
 
     # Driven wheels run ahead of the car, however little.
-    likely = _rather(likely, ca.vertsplit(free), ca.logic_not(a > BRAKED))
-    as_before = [ca.fabs(rates[k] - a) <= UNSURE * most for k in wheels]
-    likely = _rather(likely, as_before, ca.SX(0.0))
+    likely = _rather(likely, free, ca.logic_not(a > BRAKED))
+    likely = _rather(likely, ca.fabs(rates - a) <= UNSURE * most, ca.SX(0.0))
     best = ca.if_else(
         a > ROLLS_OUT,
         _lowest(c, likely),
         ca.if_else(a < BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
     )
-    kept = [ca.logic_and(likely[k], ca.fabs(c[k] - best) <= alike) for k in wheels]
+    kept = ca.logic_and(likely, ca.fabs(c - best) <= alike)
     reach = most * dt + doubt
     now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
     # After a while, what was trusted before says little of how it goes on.
@@ -155,48 +152,31 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     )
 
 
-def _most(c: ca.SX, wheels: Sequence[int]) -> ca.SX:
-    return -_least(-c, wheels)
+def _rather(likely: ca.SX, those: ca.SX, unless: ca.SX) -> ca.SX:
+    """Return those of the likely wheels (k,), where there are any of them, or else all."""
+    both = ca.logic_and(likely, those)
+    none = ca.logic_or(unless, ca.logic_not(ca.logic_any(both)))
+    return ca.logic_or(both, ca.logic_and(none, likely))
 
 
-def _least(c: ca.SX, wheels: Sequence[int]) -> ca.SX:
-    return _lowest(c, [ca.SX(1.0) for _ in wheels])
-
-
-def _every(conditions: Sequence[ca.SX]) -> ca.SX:
-    return reduce(ca.logic_and, conditions)
-
-
-def _any(conditions: Sequence[ca.SX]) -> ca.SX:
-    return reduce(ca.logic_or, conditions)
-
-
-def _rather(likely: Sequence[ca.SX], those: Sequence[ca.SX], unless: ca.SX) -> list[ca.SX]:
-    """Return those of the likely wheels, where there are any of them, or else all."""
-    both = [ca.logic_and(one, those[k]) for k, one in enumerate(likely)]
-    none = ca.logic_or(unless, ca.logic_not(_any(both)))
-    return [ca.logic_or(both[k], ca.logic_and(none, one)) for k, one in enumerate(likely)]
-
-
-def _lowest(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
+def _lowest(c: ca.SX, among: ca.SX) -> ca.SX:
     """Return the lowest number of some, infinite where there is none."""
-    return reduce(ca.fmin, (ca.if_else(one, c[k], ca.inf) for k, one in enumerate(among)))
+    return ca.mmin(ca.if_else(among, c, ca.inf))
 
 
-def _nearest(c: ca.SX, among: Sequence[ca.SX], to: ca.SX) -> ca.SX:
+def _nearest(c: ca.SX, among: ca.SX, to: ca.SX) -> ca.SX:
     """Return the number of some that is nearest to another, of several the first."""
     best, distance = ca.SX(0.0), ca.SX(ca.inf)
-    for k, one in enumerate(among):
+    for k in range(c.numel()):
         away = ca.fabs(c[k] - to)
-        nearer = ca.logic_and(one, away < distance)
+        nearer = ca.logic_and(among[k], away < distance)
         best, distance = ca.if_else(nearer, c[k], best), ca.if_else(nearer, away, distance)
     return best
 
 
-def _mean(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
+def _mean(c: ca.SX, among: ca.SX) -> ca.SX:
     """Return the mean of some, not a number where there is none."""
-    total = sum((ca.if_else(one, c[k], 0.0) for k, one in enumerate(among)), start=ca.SX(0.0))
-    return total / sum(among, start=ca.SX(0.0))
+    return ca.sum1(ca.if_else(among, c, 0.0)) / ca.sum1(among)
 
 
 @cache
