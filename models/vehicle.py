@@ -154,7 +154,7 @@ AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
 # What a car may tell of braking and driving: height of its center of gravity over the wheelbase,
 # shares of the front axle, and drag area, ½ ρ A v_x² against the motion.
 
-OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # told there as well
+OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # declared there as well
 LENGTHWISE = (*OF_CHASSIS, "drag_area")  # of a `Vehicle`
 _MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
 _DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none

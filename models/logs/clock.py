@@ -49,7 +49,7 @@ class Raw(NamedTuple):
 
 
 def holes(channel: Channel) -> NDArray[np.intp]:
-    """Return which samples of a channel are empty cells where its sensor should have told one.
+    """Return which samples of a channel are empty cells where its sensor should have given one.
 
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
     """

@@ -39,7 +39,7 @@ from models.logs.units import (
     unit_of_range,
 )
 
-SURE = 0.8  # confidence from which a proposal is used without being told to
+SURE = 0.8  # confidence from which a proposal is used without being declared
 _STANDARD, _KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
 HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
 _NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit

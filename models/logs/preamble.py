@@ -389,7 +389,7 @@ def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
     """Return the lines of names and of units, of those above the data, the nearest first."""
     fitting = [line for line in zone[:6] if way.width - 1 <= len(_uncommented(line, way))]
     if not fitting:
-        return zone[0], None  # of another width, which the first row of data will be told
+        return zone[0], None  # of another width: the first row of data is refused
     units = next((line for line in fitting[:3] if is_units_row(_uncommented(line, way))), None)
     if units is None or len(fitting) == 1:
         return fitting[0], None

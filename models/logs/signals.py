@@ -28,7 +28,7 @@ QUANTITIES: Mapping[str, str] = {name: one["quantity"] for name, one in _TABLE.i
 # What a column is called where it differs.
 COLUMNS: Mapping[str, str] = {n: one["column"] for n, one in _TABLE.items() if "column" in one}
 MEANINGS: Mapping[str, str] = {name: one["meaning"] for name, one in _TABLE.items()}
-SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
+SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody declared it, it is left out
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 

@@ -239,7 +239,7 @@ class TableLog:
         if not self.clock_name:
             return find_clock(self.names, self._columns.units, table.first_rows)
         name = self.clock_name
-        if name not in self._places:  # it may stand with its unit in the file, or the unit be told
+        if name not in self._places:  # it may stand with its unit in the file, or the unit be given
             bare = [one for one in self.names if without_unit(one) == without_unit(name)]
             name = bare[0] if len(bare) == 1 else name
         (column,) = chosen(self.path, [name], self._places)
@@ -268,7 +268,7 @@ class TableLog:
 
     @cached_property
     def _even(self) -> float:
-        """The rate of samples [Hz], told or, without a time, of the preamble; 0 where none is."""
+        """The rate of samples [Hz], given or, without a time, of the preamble; 0 where none is."""
         return self.rate or (self._columns.rate if self.clock is None else 0.0)
 
     @cached_property

@@ -181,7 +181,7 @@ class _Walk:
     ) -> None:
         rows, width = leaf.shape
         if rows * width < 2:
-            self.told(name, leaf)
+            self.given_rate(name, leaf)
             return
         for clock in clocks:
             samples = _samples(clock)
@@ -201,7 +201,7 @@ class _Walk:
         else:
             self.clockless[name] = (name, unit, leaf, columns)
 
-    def told(self, name: str, leaf: Leaf) -> None:
+    def given_rate(self, name: str, leaf: Leaf) -> None:
         """Take a single number for the rate of samples, or the time between them, by its name."""
         word = re.sub("[^a-z]", "", name.rpartition(".")[2].lower())
         if word in _RATES + _STEPS and leaf.shape == (1, 1):
@@ -251,8 +251,8 @@ def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
             unit, child = _unit(child) or unit, inner if inner is not None else child
         if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
             units = _pick(node, _UNIT)
-            if isinstance(units, dict) and isinstance(told := units.get(key), str):
-                unit = told
+            if isinstance(units, dict) and isinstance(given := units.get(key), str):
+                unit = given
             if max(child.shape) > 1:
                 yield Clock(name, child, None, unit)
     x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)

@@ -1,4 +1,4 @@
-"""Which channels of a log become which signals: told, by standard names, or beyond doubt.
+"""Which channels of a log become which signals: declared, by standard names, or beyond doubt.
 
 What is given by a map holds; then the standard names; then what the names of the channels propose,
 where every signal that is needed is sure. What was proposed is said in the recording's notes; where
@@ -38,7 +38,7 @@ _OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
 
 
 class _Reading(NamedTuple):
-    """How the signals of a log are read, and what of it nobody told."""
+    """How the signals of a log are read, and what of it nobody declared."""
 
     signals: dict[str, Signal]
     notes: tuple[str, ...]
@@ -78,7 +78,7 @@ def as_listed(
 ) -> dict[str, Signal]:
     """Return signals with the names of their channels as the log lists them.
 
-    A channel that is listed with its unit, "Vel Lat [km/h]", may be told without. A v_x that is
+    A channel that is listed with its unit, "Vel Lat [km/h]", may be declared without. A v_x that is
     not there is left out where wheels are given.
     """
     bare: dict[str, list[str]] = {}
@@ -136,7 +136,7 @@ def has_wheels(signals: Iterable[str]) -> bool:
 
 
 def _without_wheels(found: Mapping[str, Signal], by_map: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Return signals without wheels that v_x has no need of and nobody told to learn of."""
+    """Return signals without wheels that v_x has no need of and nobody asked to identify."""
     if "v_x" not in found:
         return dict(found)
     return {name: one for name, one in found.items() if name not in WHEELS or name in by_map}

@@ -250,7 +250,7 @@ def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, fl
 
 def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
     """Return values of samples that are computed of their segment alone, block by block (n,).
-    compute : returns the values of a part (k,) of a segment, told both.
+    compute : returns the values of a part (k,) of a segment, given both.
     """
     values = large((len(recording),))
     for whole in recording.segments:

@@ -109,7 +109,7 @@ def identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[floa
 
 
 def scale_text(scales: Mapping[str, Scale]) -> str:
-    """Return in words what v_x told of wheels; empty where it told nothing."""
+    """Return in words what v_x says of wheels; empty where it says nothing."""
     if not scales:
         return ""
     given = ", ".join(
