@@ -254,7 +254,8 @@ def _topics(
             continue
         try:
             fields = tuple(fields_of(definitions, kind))
-            stamp = next((one for one in _STAMPS if _has_time(fields, one)), None)
+            paths = {field.path for field in fields}
+            stamp = next((s for s in _STAMPS if {s + one for one in _TIME} <= paths), None)
             kept = tuple(one for one in fields if stamp is None or not one.path.startswith(stamp))
             if not kept:
                 continue
@@ -267,10 +268,6 @@ def _topics(
             topic = topic._replace(stamp=None)
         found.append((topic._replace(zero=first if stamped is None else stamped), first))
     return _with_zero(found), rates, skipped
-
-
-def _has_time(fields: Sequence[Field], stamp: str) -> bool:
-    return {stamp + one for one in _TIME} <= {field.path for field in fields}
 
 
 def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:

@@ -243,15 +243,11 @@ def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """
     raw = raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
-    states = [
-        value for value, name in (signal.choices or {}).items() if _NO_NUMBER.search(_words(name))
-    ]
-    values[np.isin(raw, states)] = np.nan
+    named = {value: str(name).replace("_", " ") for value, name in (signal.choices or {}).items()}
+    values[np.isin(raw, [value for value, name in named.items() if _NO_NUMBER.search(name)])] = (
+        np.nan
+    )
     return values
-
-
-def _words(name: Any) -> str:
-    return str(name).replace("_", " ")
 
 
 def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:

@@ -308,8 +308,10 @@ def _of_mdf(path: Path, known: Known) -> _Log:
             require_few(RecordingError, str(path), samples, "samples", "frames")
             if not is_bus(group):
                 continue
-            if not _has_data(group):
-                others[_what(group)] += samples
+            names = _names(group)
+            if not {f"{_FRAME}.ID", f"{_FRAME}.DataBytes"} <= names:  # no data frames of a CAN bus
+                known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
+                others["error and remote" if known_others else "other"] += samples
                 continue
             for first in range(0, samples, TOGETHER):
                 part = _of_group(file, number, first, min(TOGETHER, samples - first))
@@ -319,16 +321,6 @@ def _of_mdf(path: Path, known: Known) -> _Log:
 
 def _names(group: Any) -> set[str]:
     return {channel.name for channel in group.channels}
-
-
-def _has_data(group: Any) -> bool:
-    """Whether a group holds data frames of a CAN bus."""
-    return {f"{_FRAME}.ID", f"{_FRAME}.DataBytes"} <= _names(group)
-
-
-def _what(group: Any) -> str:
-    kinds = {name.partition(".")[0] for name in _names(group)}
-    return "error and remote" if kinds & set(_NO_DATA) else "other"
 
 
 class _Part(NamedTuple):

@@ -33,7 +33,8 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
             f"{path}: is a folder of logs with the same channels, drives and no messages of one; "
             f"name them: {some([one.name for one in logs])}"
         )
-    starts = {file: _start(log) for file, log in logs.items()}
+    # When the times of each count from [s]: those of the calendar from their first.
+    starts = {f: log.start if isinstance(log, TableLog) else 0.0 for f, log in logs.items()}
     zero = min(starts.values(), default=0.0)
     found = [
         (file.stem, one, (log, one.name, starts[file] - zero))
@@ -45,11 +46,6 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     return GroupedLog.of(
         path, "a log a message", "a log", "row", found, said, _of_files, missing="channel"
     )
-
-
-def _start(log: LogFile) -> float:
-    """Return when the times of a log count from [s]: those of the calendar from their first."""
-    return log.start if isinstance(log, TableLog) else 0.0
 
 
 def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:

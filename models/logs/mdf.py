@@ -119,7 +119,10 @@ class _Found:
         if is_4 and is_bus(group):
             self.others["frames"].append(name)
             return
-        clock = master is not None and _tells_time(group.channels[master], is_4)
+        # Other masters are angles, distances or counts.
+        clock = master is not None and (
+            not is_4 or int(group.channels[master].sync_type) in (0, _TIME)
+        )
         rate = float("nan")
         if clock and samples:
             probed = min(samples, _PROBED)
@@ -165,11 +168,6 @@ def _group_name(group: Any, number: int) -> str:
     return f"group {number + 1}"
 
 
-def _tells_time(master: Any, is_4: bool) -> bool:
-    """Whether a master channel is a time; others are angles, distances or counts."""
-    return not is_4 or int(master.sync_type) in (0, _TIME)
-
-
 def _kind(group: Any, index: int, is_4: bool) -> str:
     """Return what a channel holds: "number", "word", "formula" that is none, or "array"."""
     channel = group.channels[index]
@@ -187,7 +185,9 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
         return "number"
     kind = int(conversion.conversion_type)
     if kind == (_FORMULA_4 if is_4 else _FORMULA_3):
-        return "number" if _FORMULA.fullmatch(_text(conversion.formula)) else "formula"
+        raw = conversion.formula
+        text = raw.decode("latin-1").strip(" \0") if isinstance(raw, bytes) else str(raw)
+        return "number" if _FORMULA.fullmatch(text) else "formula"
     if kind not in (_WORDS_4 if is_4 else _WORDS_3):
         return "number"
     # Words: all of its values are, or some beside a default that is a conversion of its own.
@@ -201,10 +201,6 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
         return "formula" if "formula" in kinds else "word"
     default = inner.get("default_addr")
     return "word" if default is None or isinstance(default, str | bytes) else "number"
-
-
-def _text(formula: Any) -> str:
-    return formula.decode("latin-1").strip(" \0") if isinstance(formula, bytes) else str(formula)
 
 
 def _numbers(path: Path, name: str, samples: Any) -> Array:

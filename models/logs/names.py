@@ -646,17 +646,14 @@ def _beside_turning(
             for guess in candidates[name]
         ]
     for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
-        first = next((one for one in mended[like] if one.channel == _channel_of(best, like)), None)
+        likely = best[like].channel if like in best else ()
+        first = next((one for one in mended[like] if one.channel == likely), None)
         if first is not None and first.unit and not _is_given(best[like]):
             mended[name] = [
                 guess if _is_given(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
                 for guess in candidates[name]
             ]
     return mended
-
-
-def _channel_of(there: Mapping[str, Guess], name: str) -> tuple[str, ...]:
-    return there[name].channel if name in there else ()
 
 
 def _is_given(guess: Guess) -> bool:

@@ -244,7 +244,7 @@ class _Python:
                 f"{self._path}: line {row.line} has {len(cells)} cells, the header has "
                 f"{self._width}; was the file cut off?"
             )
-        return _stripped(cells) not in self._again
+        return [cell.strip() for cell in cells] not in self._again
 
     def _column(
         self, column: int, kind: Kind, cells: list[str], lines: Sequence[int], marked: bool
@@ -287,10 +287,6 @@ class _Python:
                 + (" where others have decimal commas" if comma else "")
             )
         return np.array(values, dtype=dtype)
-
-
-def _stripped(cells: Sequence[str]) -> list[str]:
-    return [cell.strip() for cell in cells]
 
 
 def _float(cell: str, decimal: str, thousands: str) -> float | None:

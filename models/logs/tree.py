@@ -100,18 +100,13 @@ def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> _Found:
         return _Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
     sizes = Counter(max(leaf.shape) for _, _, leaf, _ in walk.clockless.values())
     samples = sizes.most_common(1)[0][0]
-    clock = Clock(
-        f"even {rate:g} Hz", Leaf(shape=(samples, 1), load=lambda: _even(samples, rate)), None, "s"
-    )
+    even = Leaf(shape=(samples, 1), load=lambda: (np.arange(samples) / rate).reshape(-1, 1))
+    clock = Clock(f"even {rate:g} Hz", even, None, "s")
     rest = _Walk()
     for name, unit, leaf, columns in walk.clockless.values():
         rest.leaf(leaf, name, unit, (clock,), columns)
     said = (f"time is even at {rate:g} Hz of vectors without a time of their own",)
     return _Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
-
-
-def _even(samples: int, rate: float) -> Array:
-    return (np.arange(samples) / rate).reshape(-1, 1)
 
 
 def times_of(clock: Clock) -> Array:
@@ -184,7 +179,7 @@ class _Walk:
             self.given_rate(name, leaf)
             return
         for clock in clocks:
-            samples = _samples(clock)
+            samples = max(clock.leaf.shape)
             if samples not in leaf.shape:
                 continue
             along = 0 if rows == samples else 1
@@ -279,10 +274,6 @@ def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     steps = np.diff(times_of(clock))
     counts = bool(np.all(steps == 1.0))  # rows, not seconds
     return clock if bool(np.all(steps > 0.0)) and not counts else None
-
-
-def _samples(clock: Clock) -> int:
-    return max(clock.leaf.shape)
 
 
 def _pick(node: dict[str, Tree], names: Sequence[str]) -> Tree | None:

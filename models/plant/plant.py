@@ -216,7 +216,9 @@ class Plant:
         t = dt * np.arange(n, dtype=np.float64)
         middle = t + 0.5 * dt  # inputs are held over a step: at its middle they are not late
         command = maneuver.steering(middle)
-        v_ref, slope, push = (_over_time(one, middle) for one in (speed, bank, wind))
+        v_ref, slope, push = (
+            one(middle) if callable(one) else np.full(n, float(one)) for one in (speed, bank, wind)
+        )
         inputs = {"steering": command, "speed": v_ref, "bank": slope, "wind": push}
         for label, given in inputs.items():
             shape = (n, 2) if label == "steering" else (n,)
@@ -242,10 +244,6 @@ class Plant:
     def loop(self, dt: float) -> _CompiledLoop:
         """Return the compiled loop over time.   dt : step of the integration [s]."""
         return _compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
-
-
-def _over_time(given: _OverTime, t: Array) -> Array:
-    return given(t) if callable(given) else np.full(t.size, float(given))
 
 
 # The plant one control period at a time: for a driver or a controller that looks before it steers.

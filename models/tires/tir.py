@@ -291,7 +291,8 @@ def _require_mf52(tir: TirFile) -> None:
         )
     found = {key: value for key in _MARKS_OF_OTHERS if (value := tir.number(key))}
     if "PHY3" in tir and (model or fittyp is not None):
-        found = {key: value for key, value in found.items() if not _changes_nothing(key, value)}
+        same = {*_PRESSURES_OF_OTHERS, *(["PKY4"] if found.get("PKY4") == _PKY4_OF_52 else [])}
+        found = {key: value for key, value in found.items() if key not in same}
     if marks := [f"{key} = {value:g}" for key, value in found.items()]:
         label = f"it calls itself {model}" if model else "it has no PROPERTY_FILE_FORMAT"
         label += "" if fittyp is None else f", FITTYP {fittyp:g}"
@@ -299,11 +300,6 @@ def _require_mf52(tir: TirFile) -> None:
             f"{', '.join(marks)} belong to Magic Formula 6.x or MF-MCTyre, whose equations differ, "
             f"although {label}; only MF 5.2 and PAC2002 are read"
         )
-
-
-def _changes_nothing(key: str, value: float) -> bool:
-    """Whether a coefficient of 6.x leaves the equations of 5.2 as they are."""
-    return key in _PRESSURES_OF_OTHERS or (key == "PKY4" and value == _PKY4_OF_52)
 
 
 def _coefficients(tir: TirFile) -> Coefficients:
