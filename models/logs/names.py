@@ -646,8 +646,8 @@ def _beside_turning(
             for guess in candidates[name]
         ]
     for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
-        likely = best[like].channel if like in best else ()
-        first = next((one for one in mended[like] if one.channel == likely), None)
+        channel = best[like].channel if like in best else ()
+        first = next((one for one in mended[like] if one.channel == channel), None)
         if first is not None and first.unit and not _is_given(best[like]):
             mended[name] = [
                 guess if _is_given(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)

@@ -121,11 +121,6 @@ def test_parquet_gives_the_same_as_csv(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "rule"),
     [
-        ("a.csv", b"", "is empty"),
-        ("a.csv", b"\n \n", "is empty"),
-        ("a.csv", b"t,vx,vy,r,delta_f\n", "no row of data"),
-        ("a.csv", b"\x89PNG\r\n\x1a\n\xff\xfe", "not a text file"),
-        ("a.csv", b"t,vx\0", "binary"),
         ("a.csv.gz", gzip.compress(b"t,vx\n" * 9, mtime=0)[:-9], "damaged or cut off"),
         (
             "a.csv.gz",

@@ -239,12 +239,9 @@ class Written(NamedTuple):
 
 
 # By format: how a drive is written, into a folder. All of them hold the same doubles.
-def _same(columns: Columns) -> dict[str, str]:
-    return {name: name for name in columns}
-
-
-def _bus(columns: Columns) -> dict[str, str]:
-    return {name: f"Frame_{name}.{name}" for name in columns}
+def _named(path: Path, columns: Columns, pattern: str = "{}", dbc: bool = False) -> Written:
+    names = {name: pattern.format(name) for name in columns}
+    return Written(path, path.with_suffix(".dbc") if dbc else None, names)
 
 
 def _csv(folder: Path, t: np.ndarray, columns: Columns) -> Written:
@@ -253,7 +250,7 @@ def _csv(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     text += "".join(",".join(map(repr, row)) + "\n" for row in rows)
     path = folder / "drive.csv"
     path.write_text(text)
-    return Written(path, None, _same(columns))
+    return _named(path, columns)
 
 
 def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
@@ -267,70 +264,36 @@ def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     ]
     table = pyarrow.table([t, *columns.values()], schema=pyarrow.schema(fields))
     pyarrow.parquet.write_table(table, path)
-    return Written(path, None, _same(columns))
+    return _named(path, columns)
 
 
-def _mat5(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mat5(folder / "drive.mat", t, columns), None, _same(columns))
-
-
-def _mat73(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    tree = {"log": {"t": t, **columns, "units": UNITS}}
-    names = {name: f"log.{name}" for name in columns}
-    return Written(write_mat73(folder / "drive.mat", tree), None, names)
-
-
-def _mdf4(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mdf(folder / "drive.mf4", t, columns), None, _same(columns))
-
-
-def _mdf3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mdf(folder / "drive.mdf", t, columns, "3.30"), None, _same(columns))
-
-
-def _bag(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "drive", t, columns)
-    return Written(path, None, {name: IN_BAG[name] for name in columns})
-
-
-def _db3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "drive", t, columns) / "drive.db3"
-    return Written(path, None, {name: IN_BAG[name] for name in columns})
-
-
-def _mcap(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "drive", t, columns, "mcap") / "drive.mcap"
+def _in_bag(path: Path, columns: Columns) -> Written:
     return Written(path, None, {name: IN_BAG[name] for name in columns})
 
 
 def _frames(ending: str) -> Callable[[Path, np.ndarray, Columns], Written]:
-    def write(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-        path = write_can(folder / f"drive.{ending}", t, columns)
-        return Written(path, path.with_suffix(".dbc"), _bus(columns))
-
-    return write
-
-
-def _mdf_bus(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_mdf_bus(folder / "drive.mf4", t, columns)
-    return Written(path, path.with_suffix(".dbc"), _bus(columns))
+    return lambda f, t, c: _named(write_can(f / f"drive.{ending}", t, c), c, "Frame_{0}.{0}", True)
 
 
 FORMATS: dict[str, Callable[[Path, np.ndarray, Columns], Written]] = {
     "CSV": _csv,
     "Parquet": _parquet,
-    "MATLAB": _mat5,
-    "MATLAB 7.3": _mat73,
-    "MDF4": _mdf4,
-    "MDF3": _mdf3,
-    "ROS 2 bag": _bag,
-    "db3": _db3,
-    "MCAP": _mcap,
+    "MATLAB": lambda f, t, c: _named(write_mat5(f / "drive.mat", t, c), c),
+    "MATLAB 7.3": lambda f, t, c: _named(
+        write_mat73(f / "drive.mat", {"log": {"t": t, **c, "units": UNITS}}), c, "log.{}"
+    ),
+    "MDF4": lambda f, t, c: _named(write_mdf(f / "drive.mf4", t, c), c),
+    "MDF3": lambda f, t, c: _named(write_mdf(f / "drive.mdf", t, c, "3.30"), c),
+    "ROS 2 bag": lambda f, t, c: _in_bag(write_bag(f / "drive", t, c), c),
+    "db3": lambda f, t, c: _in_bag(write_bag(f / "drive", t, c) / "drive.db3", c),
+    "MCAP": lambda f, t, c: _in_bag(write_bag(f / "drive", t, c, "mcap") / "drive.mcap", c),
     "CAN ASC": _frames("asc"),
     "CAN BLF": _frames("blf"),
     "CAN candump": _frames("log"),
     "CAN TRC": _frames("trc"),
-    "CAN MDF4": _mdf_bus,
+    "CAN MDF4": lambda f, t, c: _named(
+        write_mdf_bus(f / "drive.mf4", t, c), c, "Frame_{0}.{0}", True
+    ),
 }
 
 
