@@ -31,7 +31,7 @@ from models.limits import limits as limits
 from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time
-SWELLS, SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
+_SWELLS, _SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
 LONGEST_NAME = 200  # characters
 
 
@@ -51,12 +51,12 @@ def swells(size: float, packed: float) -> bool:
     """Return whether data unpack to what no log packs to.
     size : unpacked, as memory holds it [bytes].   packed : as the file holds them [bytes].
     """
-    return size > SWOLLEN_FROM and size > SWELLS * packed
+    return size > _SWOLLEN_FROM and size > _SWELLS * packed
 
 
 def most_unpacked(packed: float) -> int:
     """Return how many bytes a part of a log that is unpacked whole may have at most."""
-    return int(min(1e6 * limits().block, max(SWOLLEN_FROM, SWELLS * packed)))
+    return int(min(1e6 * limits().block, max(_SWOLLEN_FROM, _SWELLS * packed)))
 
 
 def require_dense(
@@ -66,7 +66,7 @@ def require_dense(
     if swells(size, packed):
         raise refusal(
             f"{where}: {what} must be a log, they swell to {size / max(packed, 1):.0f} times their "
-            f"size, above {SWELLS}; unpack the file first if it is one"
+            f"size, above {_SWELLS}; unpack the file first if it is one"
         )
 
 

@@ -154,8 +154,8 @@ AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
 # What a car may tell of braking and driving: height of its center of gravity over the wheelbase,
 # shares of the front axle, and drag area, ½ ρ A v_x² against the motion.
 
-OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # declared there as well
-LENGTHWISE = (*OF_CHASSIS, "drag_area")  # of a `Vehicle`
+_OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # declared there as well
+LENGTHWISE = (*_OF_CHASSIS, "drag_area")  # of a `Vehicle`
 _MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
 _DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
 _MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
@@ -301,7 +301,7 @@ class Vehicle:
             require_within(VehicleError, 0.0, highest.get(name, 1.0), **{name: value})
 
     def lengthwise(self, name: str) -> float | None:
-        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, or None."""
+        """Return a number of `_OF_CHASSIS` as the car or else its chassis tells it, or None."""
         given: float | None = getattr(self, name)
         if given is None and self.chassis is not None:
             given = getattr(self.chassis, name)
@@ -312,8 +312,8 @@ class Vehicle:
         return self.bicycle == other.bicycle and self.downforce == other.downforce
 
     def without_chassis(self) -> "Vehicle":
-        """Return the car alone, with the numbers of `OF_CHASSIS` that its chassis tells."""
-        given: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}
+        """Return the car alone, with the numbers of `_OF_CHASSIS` that its chassis tells."""
+        given: dict[str, Any] = {name: self.lengthwise(name) for name in _OF_CHASSIS}
         return replace(self, chassis=None, **given)
 
     @property

@@ -23,7 +23,7 @@ _MOST = 20_000  # instants
 _SLOW = 3.0  # [m/s]: slower samples tell nothing
 _CLEAR = 3.0  # times that the speed is larger than what is measured across it
 _SURE, _LIKELY = 0.7, 0.4  # correlations
-GRAVITY = FACTORS[ACCELERATION]["g"]
+_GRAVITY = FACTORS[ACCELERATION]["g"]
 _NEAR = 0.25  # share of gravity by which a mean of it may be off
 _TILT = 0.4  # share of it along another axis from which a box lies oblique
 _STEMS = {  # what stands before a letter in one word, or beside it, by quantity
@@ -225,7 +225,7 @@ def _up(means: Mapping[str, float]) -> tuple[str, float]:
     "" where gravity is not in it, "?" where the box lies oblique.
     """
     size = math.sqrt(sum(one * one for one in means.values()))
-    if not any(abs(size / one - 1.0) < _NEAR for one in (1.0, GRAVITY)):
+    if not any(abs(size / one - 1.0) < _NEAR for one in (1.0, _GRAVITY)):
         return "", 0.0
     best = max(means, key=lambda letter: abs(means[letter]))
     rest = math.sqrt(max(size * size - means[best] ** 2, 0.0))

@@ -49,7 +49,7 @@ _STAMPS = ("header.stamp.", "stamp.")
 _TIME = ("sec", "nanosec")
 
 _TABLES = tomllib.loads(Path(__file__).with_name("ros.toml").read_text(encoding="utf-8"))
-KNOWN: Mapping[str, str] = _TABLES["known"]  # definitions by type
+_KNOWN: Mapping[str, str] = _TABLES["known"]  # definitions by type
 _PACKAGES = tuple(_TABLES["packages"]["known"].split())  # whose types have units
 
 
@@ -213,7 +213,7 @@ def _definitions(path: Path, bag: Any) -> tuple[Definitions, dict[str, str]]:
     """Return the definitions of types, the bag's own first, and why a topic has none."""
     typesys = need(path, "rosbags.typesys", "ROS 2 bags", "ros")
     result = dict(typesys.get_typestore(typesys.Stores.LATEST).fielddefs)
-    for kind, text in KNOWN.items():
+    for kind, text in _KNOWN.items():
         result.update(typesys.get_types_from_msg(text, kind))
     bad: dict[str, str] = {}
     for connection in bag.connections:

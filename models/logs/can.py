@@ -53,7 +53,7 @@ class _Group:
         """Return a signal in its unit, (n,)."""
         data, sent = self.data, self.sent
         return filled(
-            self.t.size, lambda part: values_of(data[part if sent is None else sent[part]], signal)
+            self.t.size, lambda part: _values_of(data[part if sent is None else sent[part]], signal)
         )
 
 
@@ -233,15 +233,15 @@ def _sent(frames: Frames, selectors: _Selectors) -> NDArray[np.intp] | None:
     sent = np.ones(frames.t.size, dtype=bool)
     for selector, ids in selectors:
         for part in blocks(sent.size):
-            sent[part] &= np.isin(raw_values(frames.data[part], selector), ids)
+            sent[part] &= np.isin(_raw_values(frames.data[part], selector), ids)
     return np.flatnonzero(sent)
 
 
-def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
+def _values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """Return a signal in its unit, (n,), NaN where the DBC says that a value is no number.
     data : of the frames, (n, bytes).
     """
-    raw = raw_values(data, signal)
+    raw = _raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
     named = {value: str(name).replace("_", " ") for value, name in (signal.choices or {}).items()}
     values[np.isin(raw, [value for value, name in named.items() if _NO_NUMBER.search(name)])] = (
@@ -250,7 +250,7 @@ def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     return values
 
 
-def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
+def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     """Return the integers, or floats, of a signal as they are in frames, (n,).
     data : of the frames, (n, bytes).
     """

@@ -32,7 +32,7 @@ from models.schema import require_few
 
 _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
-TOGETHER = 1 << 16  # frames that are stored at a time
+_TOGETHER = 1 << 16  # frames that are stored at a time
 _SHORT = 0x7FF  # largest identifier of 11 bits
 EXTENDED = 1 << 31  # marks an identifier of 29 bits
 _IDENTIFIER = (1 << 29) - 1
@@ -89,7 +89,7 @@ class _Gathered:
     def add(self, time: float, data: bytes) -> None:
         self._times.append(time)
         self._bytes += data[: self.width]
-        if len(self._times) == TOGETHER:
+        if len(self._times) == _TOGETHER:
             self._store()
 
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
@@ -149,7 +149,7 @@ def gather(path: Path, kind: str, known: Known) -> _Log:
                 found[key] = _Gathered(width)
             found[key].add(message.timestamp, message.data)
             count += 1
-            if count % TOGETHER == 0:
+            if count % _TOGETHER == 0:
                 require_few(RecordingError, str(path), count, "samples", "frames")
     frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
@@ -313,8 +313,8 @@ def _of_mdf(path: Path, known: Known) -> _Log:
                 known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
                 others["error and remote" if known_others else "other"] += samples
                 continue
-            for first in range(0, samples, TOGETHER):
-                part = _of_group(file, number, first, min(TOGETHER, samples - first))
+            for first in range(0, samples, _TOGETHER):
+                part = _of_group(file, number, first, min(_TOGETHER, samples - first))
                 _sort(part, known, found, others)
     return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
 

@@ -40,7 +40,7 @@ _REASONS = {
     "clockless": "there is no time beside",
     "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
-TOGETHER = 1 << 23  # numbers that are read at a time
+_TOGETHER = 1 << 23  # numbers that are read at a time
 _PROBED = 200  # samples of a clock that its rate is taken from
 
 
@@ -62,7 +62,7 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
 
 def _of_group(path: Path, file: Any, mine: Sequence[_Asked]) -> Samples:
     """Read channels of one group, as many at a time as the memory takes."""
-    several = max(1, TOGETHER // max(mine[0][0].samples, 1))
+    several = max(1, _TOGETHER // max(mine[0][0].samples, 1))
     t: Array | None = None
     values: dict[str, Array] = {}
     for k in range(0, len(mine), several):

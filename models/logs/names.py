@@ -39,14 +39,14 @@ from models.logs.units import (
     unit_of_range,
 )
 
-SURE = 0.8  # confidence from which a proposal is used without being declared
+_SURE = 0.8  # confidence from which a proposal is used without being declared
 _STANDARD, _KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
 HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
 _NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
 _FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
 STILL = 0.25  # of confidence that is left to a channel that never changes
 _APART = 0.04  # of confidence: nearer ones are equal
-HAND = "steering wheel"  # an angle that wants a ratio
+_HAND = "steering wheel"  # an angle that wants a ratio
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
@@ -91,7 +91,7 @@ def _rule(one: Mapping[str, Any]) -> _Rule:
     return _Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
 
 
-RULES: Mapping[str, _Rule] = {name: _rule(one) for name, one in _TABLES["signals"].items()}
+_RULES: Mapping[str, _Rule] = {name: _rule(one) for name, one in _TABLES["signals"].items()}
 _PER_WHEEL = _TABLES["per_wheel"]
 _HINTS = {name: tuple(some.split()) for name, some in _TABLES["hints"].items()}
 _SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in _TABLES["sides"].items()}
@@ -178,7 +178,7 @@ class Proposal:
         return (
             guess is not None
             and name not in self.rivals
-            and guess.confidence >= SURE
+            and guess.confidence >= _SURE
             and not guess.hand
         )
 
@@ -206,7 +206,7 @@ class Proposal:
         }
 
 
-def words_of(name: str) -> tuple[str, ...]:
+def _words_of(name: str) -> tuple[str, ...]:
     """Return a name as small words: "Car.YawRate" is car, yaw, rate."""
     plain = unicodedata.normalize("NFC", name).translate(_UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
@@ -238,26 +238,26 @@ def _matches(group: str, words: frozenset[str]) -> bool:
     return all(words & set(part.split("|")) for part in group.split(";"))
 
 
-def name_confidence(signal: str, name: str) -> float:
+def _name_confidence(signal: str, name: str) -> float:
     """Return how sure a name alone says that a channel is a signal, 0 where it does not.
-    signal : one of `RULES`, or a wheel.
+    signal : one of `_RULES`, or a wheel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
         return _STANDARD
-    listed = words_of(name)
+    listed = _words_of(name)
     if signal in WHEELS:
         return WORDS if _wheel_words(signal, listed) else 0.0
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
-    rule, words = RULES[signal], _with_parts(listed)
+    rule, words = _RULES[signal], _with_parts(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
     while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]
         ends += ["".join(listed[k:]) for k in range(len(listed))]
     if rule.known & {ends[0], "".join(listed)}:
         return _KNOWN
-    if _with_parts(words_of(_field(name))).union(ends) & rule.never:
+    if _with_parts(_words_of(_field(name))).union(ends) & rule.never:
         return 0.0
     if (
         len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
@@ -271,11 +271,11 @@ def name_confidence(signal: str, name: str) -> float:
 
 def _is_hint(signal: str, one: Heading) -> bool:
     """Return whether a word of a name and its unit let a channel be what no rule knows."""
-    words = _with_parts(words_of(_field(one.name)))
+    words = _with_parts(_words_of(_field(one.name)))
     starts = _HINTS.get(signal, ())
     fits = is_given(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
-    return fits and named and not words & RULES[signal].never
+    return fits and named and not words & _RULES[signal].never
 
 
 def propose(
@@ -330,7 +330,7 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
     groups: dict[str, dict[str, Heading]] = {}
     for one in map(_with_given_unit, headings):
-        words = "_".join(words_of(without_ending(one.name, one.unit)))
+        words = "_".join(_words_of(without_ending(one.name, one.unit)))
         possible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
@@ -373,12 +373,12 @@ def _with_signs(
     """Return the guesses; amounts with the channel of their sign, which is called as they are."""
     signs: dict[frozenset[str], str] = {}
     for one in headings:
-        words = frozenset(words_of(one.name))
+        words = frozenset(_words_of(one.name))
         if words & _SIGN and not is_given(one.unit):
             signs[words - _SIGN] = one.name
 
     def completed(guess: Guess) -> Guess:
-        sign = signs.get(frozenset(words_of(guess.channel[0])), "")
+        sign = signs.get(frozenset(_words_of(guess.channel[0])), "")
         values = seen[guess.channel[0]].values if sign and guess.channel[0] in seen else np.zeros(0)
         if not values.size or np.nanmin(values) < 0.0:
             return guess
@@ -391,7 +391,7 @@ def _triads(headings: Sequence[Heading]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z."""
     named = map(_with_given_unit, headings)
     units = {one.name: possible.unit for one, possible in zip(headings, named, strict=True)}
-    words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
+    words = {name: _words_of(without_ending(name, unit)) for name, unit in units.items()}
     bad = _REFERENCE | _CORNERS
     return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
 
@@ -451,7 +451,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
     if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
-    names = (words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
+    names = (_words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
     if len(set(names)) > 1:
         return False
     first, second = (seen[guess.channel[0]] for guess in (one, other))
@@ -493,8 +493,8 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     for one in listed:
         names = {without_ending(one.name, one.unit)}
         names |= {one.name} if one.name.lower().endswith("_g") else set()  # "lat_g" is in g, and g
-        by_name = max(name_confidence(signal, name) for name in names)
-        by_hand = max(name_confidence(HAND, name) for name in names) * (signal == "delta_f")
+        by_name = max(_name_confidence(signal, name) for name in names)
+        by_hand = max(_name_confidence(_HAND, name) for name in names) * (signal == "delta_f")
         best = max(by_name, by_hand)
         if best > 0.0:
             found.append(
@@ -548,7 +548,7 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     """Return pairs of channels of the left and the right wheel of an axle."""
     by_corner: dict[tuple[str, frozenset[str]], Heading] = {}
     for one in listed:
-        found = _corner(words_of(one.name))
+        found = _corner(_words_of(one.name))
         quantity = QUANTITIES[signal]
         fits = not is_given(one.unit) or quantity in quantities(one.unit)
         if found and fits and not found[1] & _REFERENCE:
@@ -610,7 +610,7 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     A name that may mean hand or road wheels, as "steer", means these where it stays as near.
     """
     quantity = QUANTITIES[signal]
-    vague = max(name_confidence(HAND, name) for name in guess.channel) <= _VAGUE
+    vague = max(_name_confidence(_HAND, name) for name in guess.channel) <= _VAGUE
     if guess.hand and vague and not unit_of_range(quantity, usual):
         return _said(replace(guess, hand=False), f"goes to {size:.3g}, as road wheels do in rad")
     if quantity == ACCELERATION:

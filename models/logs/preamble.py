@@ -30,10 +30,10 @@ HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
 _ROWS = 400  # of data that tell what columns are
 _TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
-DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
+_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
 _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
-_ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
+_ONES = "1" + " ".join(_DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
 _MANY = 300  # cells of a line that tell how all are written
 _CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
@@ -227,7 +227,7 @@ def _is_instant(cell: str) -> bool:
 def _way(tail: list[str]) -> _Way | None:
     """Return how cells are written; None where hardly any is a number in any way."""
     best: _Way | None = None
-    for delimiter in DELIMITERS:
+    for delimiter in _DELIMITERS:
         rows = [cells_of(line, delimiter) for line in tail]
         width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2:
@@ -304,7 +304,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     made_by = _maker(lines[:first])
     words = [
         _encoding_word(encoding),
-        f"cells apart by {DELIMITERS[way.delimiter]} ({_sure(way.share)})",
+        f"cells apart by {_DELIMITERS[way.delimiter]} ({_sure(way.share)})",
         "decimal comma" if way.decimal == "," else "decimal point",
     ]
     words += [f"thousands apart by {shown(way.thousands)}"] * bool(way.thousands)
@@ -444,7 +444,7 @@ def _maker(lines: Sequence[_Line]) -> str:
 
 def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
     number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
-    delimiter = max(DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
+    delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
     names = cells_of(text, delimiter)
     require_few(RecordingError, str(path), len(names), "columns", "columns")
     after = cells_of(lines[number], delimiter) if number < len(lines) else ()

@@ -40,7 +40,7 @@ _WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken
 _MOST_STEPS = 100_000  # samples that a rate is taken from
 _SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
 _JITTER, _WINDOW = 1.2, 50  # steps that stamps of an even clock may lie apart, samples of a mean
-PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
+_PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
 _BACK, _FEWEST = 1.0, 10  # [s], samples: what goes back so far, so long is no sample astray
 
 _REPEATED = 0.2  # share of stamps of a column that repeat, of which another may be finer
@@ -489,7 +489,7 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
         risen = piece[order]
         single = np.concatenate([[True], np.diff(risen) > 0.0])
         orders.append(first + order[single])
-        times.append(risen[single] + (times[-1][-1] + PAUSE - risen[0] if times else 0.0))
+        times.append(risen[single] + (times[-1][-1] + _PAUSE - risen[0] if times else 0.0))
     found = np.concatenate(times)
     twice = t.size - found.size
     if t.size >= _SHARED * found.size:
@@ -500,7 +500,7 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     if twice:
         notes.append(f"samples that share their stamp with one before are left out: {twice}")
     if len(begins) > 1:
-        back = f"times it goes back by {_BACK:g} s or more, and on {PAUSE:g} s later"
+        back = f"times it goes back by {_BACK:g} s or more, and on {_PAUSE:g} s later"
         notes.append(f"{back}: {len(begins) - 1}")
     return Stamps(found, tuple(notes), np.concatenate(orders))
 

@@ -66,7 +66,7 @@ def _mounted(tire: Tire, wheel: _Wheel) -> Tire:
     return tire
 
 
-def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
+def _relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
     """Return the derivative [1/s] of the lagged lateral slip tan(α').
 
     σ d(tan α')/dt + |V_cx| tan α' = -V_cy with the velocity V_c of the contact point in the frame
@@ -81,7 +81,7 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     return (-aside - ca.fmax(ca.fabs(along), _LEAST_SPEED) * slip) / length
 
 
-def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
+def _tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
     """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
     slip : lagged slip tan(α') [-].   camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
@@ -218,13 +218,13 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
         angle, axle = delta[wheel.axle], wheel.axle
         velocity = wheel.velocity(v_x, sway, r)
         length = (c.relaxation_length_front, c.relaxation_length_rear)[axle]
-        slip_dot.append(relax(slip[k], angle, velocity, length))
+        slip_dot.append(_relax(slip[k], angle, velocity, length))
         alpha.append(angle - ca.atan2(velocity[1], velocity[0]))
         here = X + wheel.x * ca.cos(psi) - wheel.y * ca.sin(psi)
         grip = mu + place_change(places, here)
         camber = (c.roll_camber_front, c.roll_camber_rear)[axle] * roll
         tire = _mounted(tires[axle], wheel)
-        of_tire = tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
+        of_tire = _tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
         F_x.append(of_tire[0])
         F_y.append(of_tire[1])
         forward, sideward = _rotate(of_tire[0], of_tire[1], angle)

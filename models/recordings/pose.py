@@ -45,7 +45,7 @@ def with_pose(
     pose = {name: parts[name][0] for name in POSE}
     if len(parts["heading"]) > 1:
         pose["heading"] = _of_quaternion(label, parts["heading"])
-    motion = motion_of(label, pose)
+    motion = _motion_of(label, pose)
     sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
     if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
         raise RecordingError(
@@ -59,7 +59,7 @@ def with_pose(
     of_pose |= {} if slow and gyro is not None else {"r": motion.r}
     what = "vx, vy and r" if "r" in of_pose else "vx and vy"
     said = [f"{what} are taken from the pose{motion.said}"]
-    late = None if gyro is None else lateness(gyro, motion.r)
+    late = None if gyro is None else _lateness(gyro, motion.r)
     if gyro is not None and late is not None and abs(late) > _LATE:
         box = [name for name in ("r", "a_y", "a_x") if name in found]
         for name in box:
@@ -113,7 +113,7 @@ class _Smooth(NamedTuple):
     noise: float
 
 
-def motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
+def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
     """Return how a car moves by its pose.
     parts : by name of `POSE` on one clock or several, SI.
     """
@@ -171,12 +171,12 @@ def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
     even = t[0] + step * np.arange(t.size)
     even = t if np.abs(even - t).max() < 1e-6 * step else even
     z = np.column_stack([np.interp(even, t, column) for column in z.T])
-    place, heading = smoothed(z[:, :2]), smoothed(z[:, 2:])
+    place, heading = _smoothed(z[:, :2]), _smoothed(z[:, 2:])
     rates = np.gradient(place.values, step, axis=0, edge_order=2)
     return _Piece(even, rows, step, rates, heading.values[:, 0], (place.noise, heading.noise))
 
 
-def smoothed(z: Array) -> _Smooth:
+def _smoothed(z: Array) -> _Smooth:
     """Return columns of one size, smoothed alike as strongly as they predict themselves best.
     z : (n, k), evenly sampled.
     """
@@ -233,7 +233,7 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     return [sign * unit * piece.heading + shift for piece in pieces], words
 
 
-def lateness(gyro: Raw, pose: Raw) -> float | None:
+def _lateness(gyro: Raw, pose: Raw) -> float | None:
     """Return by how much a gyro is late against the yaw rate of a pose [s]; None if not known."""
     dt = max(typical_step(gyro.t), typical_step(pose.t)) / 2.0
     begin, end = max(gyro.t[0], pose.t[0]) + _LATEST, min(gyro.t[-1], pose.t[-1]) - _LATEST

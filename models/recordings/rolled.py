@@ -24,14 +24,17 @@ from models.logs.log import RecordingError
 from models.logs.signals import AXLES, WHEELS
 from models.recordings.wheels import DRIVEN, Wheels
 
-SLIP, NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
-ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
+_SLIP, _NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
+_ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
 _WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
-MEMORY = 0.15  # [s], over which that of the car is
-BRAKED, ROLLS_OUT = -1.0, -0.3  # [m/s²]: below the first wheels are braked, above the other driven
-UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
-PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
-SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
+_MEMORY = 0.15  # [s], over which that of the car is
+_BRAKED, _ROLLS_OUT = (
+    -1.0,
+    -0.3,
+)  # [m/s²]: below the first wheels are braked, above the other driven
+_UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
+_PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
+_SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
 class _Rolled(NamedTuple):
@@ -56,8 +59,8 @@ def rolled(
     n, v_x = r.size, large((r.size,))
     span = max(1, round(_WINDOW / dt))
     free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
-    rule = np.array([dt, most, most + NOISE / (span * dt)])
-    scan, constants = trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
+    rule = np.array([dt, most, most + _NOISE / (span * dt)])
+    scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
     gated = held = 0
     trust: Array | None = None
     for part in blocks(n):
@@ -76,7 +79,7 @@ def rolled(
         trust = record["trust_final"]
         v_x[part] = record["v"].ravel()
         held += int(np.count_nonzero(record["held"] > 0.0))
-        agree = np.abs(rows - v_x[part, None]) <= NOISE + SLIP * np.abs(v_x[part, None])
+        agree = np.abs(rows - v_x[part, None]) <= _NOISE + _SLIP * np.abs(v_x[part, None])
         gated += int(np.count_nonzero(~agree.all(axis=1)))
     return _Rolled(v_x, gated, held)
 
@@ -114,14 +117,14 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     v, a, since, known = trust
     dt, most, limit, free = rule
     ahead, passed = v + a * dt, since + dt
-    near, alike = (NOISE + share * ca.fabs(ahead) for share in (SLIP, ALIKE))
+    near, alike = (_NOISE + share * ca.fabs(ahead) for share in (_SLIP, _ALIKE))
 
     steady = ca.fabs(rates) <= limit
     agree = ca.logic_and(ca.mmax(c) - ca.mmin(c) <= near, ca.logic_all(steady))
-    doubt = UNSURE * most * since
-    doubt = ca.if_else(agree, doubt * (1.0 + since / PATIENCE), doubt)
-    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < SLOW
-    doubt = ca.if_else(slow, SLOW, doubt)
+    doubt = _UNSURE * most * since
+    doubt = ca.if_else(agree, doubt * (1.0 + since / _PATIENCE), doubt)
+    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < _SLOW
+    doubt = ca.if_else(slow, _SLOW, doubt)
     likely = ca.logic_and(ca.logic_or(slow, steady), ca.fabs(c - ahead) <= near + doubt)
     some = ca.logic_any(likely)
 
@@ -130,20 +133,20 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
 
     # Driven wheels run ahead of the car, however little.
-    likely = _rather(likely, free, ca.logic_not(a > BRAKED))
-    likely = _rather(likely, ca.fabs(rates - a) <= UNSURE * most, ca.SX(0.0))
+    likely = _rather(likely, free, ca.logic_not(a > _BRAKED))
+    likely = _rather(likely, ca.fabs(rates - a) <= _UNSURE * most, ca.SX(0.0))
     best = ca.if_else(
-        a > ROLLS_OUT,
+        a > _ROLLS_OUT,
         _lowest(c, likely),
-        ca.if_else(a < BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
+        ca.if_else(a < _BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
     )
     kept = ca.logic_and(likely, ca.fabs(c - best) <= alike)
     reach = most * dt + doubt
     now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
     # After a while, what was trusted before says little of how it goes on.
-    slope = ca.if_else(since > MEMORY, _mean(rates, kept), (now - known) / passed)
+    slope = ca.if_else(since > _MEMORY, _mean(rates, kept), (now - known) / passed)
     slope = ca.fmin(ca.fmax(slope, -most), most)
-    a_now = a + (1.0 - ca.exp(-passed / MEMORY)) * (slope - a)
+    a_now = a + (1.0 - ca.exp(-passed / _MEMORY)) * (slope - a)
     return _Trust(
         ca.if_else(some, now, v_held),
         ca.if_else(some, a_now, a_held),
@@ -180,7 +183,7 @@ def _mean(c: ca.SX, among: ca.SX) -> ca.SX:
 
 
 @cache
-def trust_scan(k: int) -> Scan:
+def _trust_scan(k: int) -> Scan:
     """Return the compiled loop over samples."""
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
     rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)

@@ -70,7 +70,7 @@ def identified_scales(
     for name in WHEELS:
         if name not in parts:
             continue
-        given = identified_scale(t, v_x, r, at(name))
+        given = _identified_scale(t, v_x, r, at(name))
         if given is None:
             continue
         value, seconds = given
@@ -82,7 +82,7 @@ def identified_scales(
     return found
 
 
-def identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, float] | None:
+def _identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, float] | None:
     """Return the speed over ground per what a wheel shows, and the seconds that tell it.
 
     None where straight and even driving is too short, or does not agree on one number.

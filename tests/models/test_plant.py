@@ -15,7 +15,7 @@ import pytest
 from models.friction import Friction, FrictionChange, FrictionError, place_change
 from models.maneuvers import RandomSteer, Slalom, SlowlyIncreasingSteer, StepSteer
 from models.plant import Driver, Plant, PlantError, tire_of
-from models.plant.dynamics import relax, tire_force, wheel_loads
+from models.plant.dynamics import _relax, _tire_force, wheel_loads
 from models.sensors import Sensor, Sensors
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula, TirError
 from models.vehicle import GRAVITY, Vehicle, VehicleError, sedan
@@ -130,12 +130,12 @@ def test_the_steady_force_is_that_of_the_slip_angle():
     """Once the lag is over, a tire pulls with C alpha at any angle, though the lag is in tan."""
     stiffness, tire = 60e3, LinearTire(C_alpha=60e3, C_kappa=1e6)
     for delta, velocity in ((0.6, (20.0, 1.0)), (-0.3, (15.0, 9.0)), (0.1, (25.0, 0.0))):
-        at_zero, at_one = (float(relax(s, delta, velocity, 0.5)) for s in (0.0, 1.0))
+        at_zero, at_one = (float(_relax(s, delta, velocity, 0.5)) for s in (0.0, 1.0))
         steady = at_zero / (at_zero - at_one)  # the lag is linear in the slip
         expected = stiffness * (delta - math.atan2(velocity[1], velocity[0]))
-        F_y = float(tire_force(tire, steady, 0.0, 0.0, 4000.0, 1.0)[1])
+        F_y = float(_tire_force(tire, steady, 0.0, 0.0, 4000.0, 1.0)[1])
         assert F_y == pytest.approx(expected, rel=1e-12)
-        as_angle = float(tire_force(tire, math.tan(steady), 0.0, 0.0, 4000.0, 1.0)[1])
+        as_angle = float(_tire_force(tire, math.tan(steady), 0.0, 0.0, 4000.0, 1.0)[1])
         assert as_angle != pytest.approx(expected, rel=1e-5)
 
 

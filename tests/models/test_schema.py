@@ -86,7 +86,7 @@ def test_a_gzip_bomb_stops_at_the_limit(tmp_path, monkeypatch):
 
 
 def test_what_swells_as_no_log_does_is_refused_below_the_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr("models.schema.SWOLLEN_FROM", 3_000_000)
+    monkeypatch.setattr("models.schema._SWOLLEN_FROM", 3_000_000)
     path = tmp_path / "b.gz"
     path.write_bytes(gzip.compress(bytes(30_000_000)))
     with pytest.raises(RefusedError, match=r"they swell to \d+ times their size, above 200"):

@@ -5,7 +5,7 @@ import sqlite3
 import numpy as np
 import pytest
 
-from models.logs.bag import KNOWN
+from models.logs.bag import _KNOWN
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from tests.models.logs.drive_in_every_format import FIRST_NS, write_bag
@@ -19,7 +19,7 @@ STORAGES = {"sqlite3": rosbag2.StoragePlugin.SQLITE3, "mcap": rosbag2.StoragePlu
 def store_of(**types):
     """Types of a distribution, those that cars use, and more by their definitions."""
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    for kind, text in {**KNOWN, **types}.items():
+    for kind, text in {**_KNOWN, **types}.items():
         store.register(typesys.get_types_from_msg(text, kind))
     return store
 

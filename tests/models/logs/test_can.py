@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from models.logs.can import raw_values, values_of
+from models.logs.can import _raw_values, _values_of
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from tests.models.logs.drive_in_every_format import DBC, write_can, write_mdf_bus
@@ -79,13 +79,13 @@ def test_signals_of_any_place_and_kind_are_those_that_cantools_decodes():
     for message in base.messages:
         (signal,) = message.signals
         there = [message.decode(bytes(row), scaling=False)["S"] for row in data]
-        ours = raw_values(data, signal)
+        ours = _raw_values(data, signal)
         for one, other in zip(ours.tolist(), there, strict=True):
             assert one == other or (np.isnan(one) and np.isnan(other)), signal
         scaled = [float(message.decode(bytes(row))["S"]) for row in data]
         # Integers of 64 bits lose their last digits on the way to a double.
         with np.errstate(invalid="ignore"):  # floats of any bits
-            values = values_of(data, signal)
+            values = _values_of(data, signal)
         assert np.allclose(values, scaled, rtol=1e-14, atol=1e-14, equal_nan=True)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.logs.log import Channel, Listed
-from models.logs.names import HAND, RULES, SURE, Guess, name_confidence, propose, words_of
+from models.logs.names import _HAND, _RULES, _SURE, Guess, _name_confidence, _words_of, propose
 from models.logs.spelling import unit_in_name, without_ending
 
 CALLED = {
@@ -32,7 +32,7 @@ CALLED = {
     "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
                 "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel",
                 "roadwheelAngle", "Delta_Wheel"],
-    HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
+    _HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
            "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle",
            "handwheelAngle", "carState.steeringAngle", "/steering_angle/data", "Angle volant",
            "Angolo volante", "ángulo_volante", "delta_h", "Steering Pos", "Steer_SW",
@@ -66,22 +66,22 @@ NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target"
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
 def test_a_name_of_a_logger_is_that_signal_before_any_other(signal: str, name: str) -> None:
-    found = {one: name_confidence(one, name) for one in RULES}
-    assert found[signal] >= SURE
+    found = {one: _name_confidence(one, name) for one in _RULES}
+    assert found[signal] >= _SURE
     assert all(value < found[signal] for one, value in found.items() if one != signal)
 
 
 @pytest.mark.parametrize("name", NO_SIGNAL)
 def test_a_name_of_something_else_is_no_signal(name: str) -> None:
-    assert not any(name_confidence(one, name) for one in RULES)
+    assert not any(_name_confidence(one, name) for one in _RULES)
 
 
 def test_names_are_cut_into_words() -> None:
-    assert words_of("Car.YawRate") == ("car", "yaw", "rate")
-    assert words_of("IMU01_gyro_z [deg/s]") == ("imu", "01", "gyro", "z")
-    assert words_of("Längsgeschw.") == ("laengsgeschw",)
-    assert words_of("Accélération") == ("acceleration",)
-    assert words_of("LÄNGS") == words_of("LA\u0308NGS") == ("laengs",)
+    assert _words_of("Car.YawRate") == ("car", "yaw", "rate")
+    assert _words_of("IMU01_gyro_z [deg/s]") == ("imu", "01", "gyro", "z")
+    assert _words_of("Längsgeschw.") == ("laengsgeschw",)
+    assert _words_of("Accélération") == ("acceleration",)
+    assert _words_of("LÄNGS") == _words_of("LA\u0308NGS") == ("laengs",)
 
 
 class Log:
@@ -275,7 +275,7 @@ def test_without_a_unit_that_is_proposed_which_the_range_allows_and_none_is_sure
     signal: str, name: str, size: float, unit: str
 ) -> None:
     guess = proposed((name, "", size * WAVE)).guesses[signal]
-    assert guess.unit == unit and guess.confidence < SURE
+    assert guess.unit == unit and guess.confidence < _SURE
     assert "no unit in the file" in guess.why
     if unit and signal != "a_y":
         assert f"goes to {size:.3g}, " in guess.why
@@ -296,12 +296,12 @@ def test_r_and_a_y_without_units_have_those_in_which_a_y_is_v_x_r(rate: str, lat
     speed = ("Speed", "km/h", 72.0 + 0.1 * np.cos(np.arange(2000.0)))
     found = proposed(speed, ("YawRate", "", r), ("Lat_Acc", "", a_y)).guesses
     assert (found["r"].unit, found["a_y"].unit) == (rate, lateral)
-    assert found["r"].confidence < SURE and found["a_y"].confidence < SURE
+    assert found["r"].confidence < _SURE and found["a_y"].confidence < _SURE
 
 
 def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_allows() -> None:
     near = proposed(("log.steer", "", 0.107 * WAVE)).guesses["delta_f"]
-    assert not near.hand and near.confidence < SURE and "as road wheels do in rad" in near.why
+    assert not near.hand and near.confidence < _SURE and "as road wheels do in rad" in near.why
     far = proposed(("log.steer", "", 80.0 * WAVE)).guesses["delta_f"]
     assert far.hand and far.unit == "deg"
     named = proposed(("SteeringWheelAngle", "", 0.107 * WAVE)).guesses["delta_f"]
@@ -317,7 +317,7 @@ def test_a_road_wheel_without_a_unit_that_goes_too_far_is_a_hand_wheel_in_degree
 
 def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second() -> None:
     guess = proposed(("Yaw Rate", "deg", 20 * WAVE)).guesses["r"]
-    assert guess.unit == "deg/s" and guess.confidence < SURE
+    assert guess.unit == "deg/s" and guess.confidence < _SURE
 
 
 def test_a_filtered_duplicate_stands_back_for_what_was_filtered() -> None:
@@ -350,8 +350,8 @@ def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
 
 def test_a_side_and_the_number_of_an_axle_are_a_corner() -> None:
     """CarSim's R1 is the right wheel of the front axle, and none of the rear."""
-    assert words_of("Steer_R1") == ("steer", "fr") and words_of("Fy_L2") == ("fy", "rl")
-    assert words_of("IMU_L12") == words_of("IMU_l12") == ("imu", "l", "12")
+    assert _words_of("Steer_R1") == ("steer", "fr") and _words_of("Fy_L2") == ("fy", "rl")
+    assert _words_of("IMU_L12") == _words_of("IMU_l12") == ("imu", "l", "12")
     found = proposed(
         *((f"Steer_{place}", "deg", 5 * WAVE) for place in ("L1", "R1")),
         *((f"Fy_{place}", "N", 2e3 * WAVE) for place in ("L1", "R1", "L2", "R2")),
@@ -392,7 +392,7 @@ def test_a_speed_without_a_unit_is_told_by_how_the_car_turns() -> None:
 def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken() -> None:
     found = proposed(("Yaw", "deg/s", 20 * WAVE), ("SteerXyz", "deg", 90 * WAVE))
     assert found.guesses["r"].channel == ("Yaw",) and not found.is_sure("r")
-    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < SURE
+    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < _SURE
     assert "r" not in proposed(("Yaw", "deg", 20 * WAVE)).guesses
 
 
@@ -428,13 +428,13 @@ def test_names_of_public_logs_are_proposed(signal: str, name: str) -> None:
     found = proposed((name, unit, 20.0 * WAVE))
     assert found.guesses[signal].channel == (name,)
     assert found.is_sure(signal) or found.guesses[signal].hand
-    assert not any(found.is_sure(one) for one in RULES if one != signal)
+    assert not any(found.is_sure(one) for one in _RULES if one != signal)
 
 
 @pytest.mark.parametrize("name", ["EffMt_D2_R", "M_Mtr_D2_R", "Damper_R", "Batt_V", "p_Brk_R"])
 def test_a_letter_behind_a_name_is_a_side_and_no_signal(name: str) -> None:
-    assert not any(name_confidence(one, name) for one in RULES)
-    assert name_confidence("r", "log.r") > 0.0
+    assert not any(_name_confidence(one, name) for one in _RULES)
+    assert _name_confidence("r", "log.r") > 0.0
 
 
 def test_a_wheel_of_carsim_turns() -> None:

@@ -362,7 +362,7 @@ def test_a_line_is_data_or_not_whether_seen_at_once_or_cell_by_cell(monkeypatch)
     cases = [
         (preamble._Line(1, line, delimiter), way)
         for line in lines_at_random(3000)
-        for delimiter in preamble.DELIMITERS
+        for delimiter in preamble._DELIMITERS
         for way in (preamble._Way(delimiter, sign, "", 3, 1.0) for sign in ".,")
         if way.decimal != delimiter
     ]

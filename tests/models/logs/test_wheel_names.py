@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.logs.door import open_log
-from models.logs.names import RULES, SURE, name_confidence, propose
+from models.logs.names import _RULES, _SURE, _name_confidence, propose
 from models.logs.signals import QUANTITIES, WHEELS
 from models.logs.spelling import unit_in_name
 from tests.models.logs.test_names import WAVE, proposed
@@ -30,14 +30,14 @@ NO_WHEEL = ["Engine RPM", "Steering Wheel Speed", "Wheel Slip FL", "Brake Pressu
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
 def test_a_name_of_a_logger_is_that_wheel_and_nothing_else(signal: str, name: str) -> None:
-    found = {one: name_confidence(one, name) for one in (*WHEELS, *RULES)}
-    assert found[signal] >= SURE
+    found = {one: _name_confidence(one, name) for one in (*WHEELS, *_RULES)}
+    assert found[signal] >= _SURE
     assert not any(value for one, value in found.items() if one != signal)
 
 
 @pytest.mark.parametrize("name", NO_WHEEL)
 def test_a_name_of_something_else_is_no_wheel(name: str) -> None:
-    assert not any(name_confidence(one, name) for one in WHEELS)
+    assert not any(_name_confidence(one, name) for one in WHEELS)
 
 
 @pytest.mark.parametrize("unit", ["rad/s", "rpm", "1/min", "Hz", "deg/s", "m/s", "km/h", "mph"])

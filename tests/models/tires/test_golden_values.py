@@ -18,7 +18,7 @@ from typing import NamedTuple
 import pytest
 
 from models.tires import MagicFormula
-from models.tires.magic_formula import combined_lateral, pure_lateral
+from models.tires.magic_formula import _combined_lateral, _pure_lateral
 
 FILES = ("Sedan_Pac02Tire", "HMMWV_Pac02Tire", "MagicFormula52_Parameters")
 
@@ -62,7 +62,7 @@ def test_forces_agree_with_every_printed_digit(tire: MagicFormula, shared_data: 
     golden = rows(shared_data / "tires", tire)
     assert len(golden) == 120
     for row in golden:
-        pure = pure_lateral(tire.coefficients, row.alpha_iso, row.gamma, row.F_z, 1.0)
+        pure = _pure_lateral(tire.coefficients, row.alpha_iso, row.gamma, row.F_z, 1.0)
         combined = tire.forces(-row.alpha_iso, row.kappa, row.gamma, row.F_z).F_y
         for ours, theirs in ((pure, row.F_y0), (combined, row.F_y)):
             digit = 10.0 ** (int(log10(abs(float(theirs)))) - 9)
@@ -87,7 +87,7 @@ def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data
     for row in rows(shared_data / "tires", tire):
         S_Vyk = side_force_due_to_slip(tire, row)
         without = S_Vyk / (1.0 - c.PDY3 * row.gamma**2)
-        F_y = combined_lateral(c, row.alpha_iso, row.kappa, row.gamma, row.F_z, 1.0)
+        F_y = _combined_lateral(c, row.alpha_iso, row.kappa, row.gamma, row.F_z, 1.0)
         gaps.append(abs(F_y - S_Vyk + without - float(row.F_y)))
     assert 9.0 < max(gaps) < 9.2
 
