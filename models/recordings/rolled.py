@@ -28,10 +28,7 @@ _SLIP, _NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is n
 _ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
 _WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
 _MEMORY = 0.15  # [s], over which that of the car is
-_BRAKED, _ROLLS_OUT = (
-    -1.0,
-    -0.3,
-)  # [m/s²]: below the first wheels are braked, above the other driven
+_BRAKED, _ROLLS_OUT = -1.0, -0.3  # [m/s²]: wheels are braked below, driven above the second
 _UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
 _PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
 _SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
