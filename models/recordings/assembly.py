@@ -46,7 +46,7 @@ from models.recordings.record import (
     side_by_side,
 )
 from models.recordings.rolled import rolled
-from models.recordings.wheel_scale import Scale, identified_scales, scale_text, wheel_factor
+from models.recordings.wheels import Scale, identified_scales, scale_text, wheel_factor
 from models.schema import require_few
 
 _FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed

@@ -9,8 +9,7 @@ from models.logs.log import RecordingError
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings.rolled import rolled
-from models.recordings.wheel_scale import _identified_scale
-from models.recordings.wheels import Wheels
+from models.recordings.wheels import Wheels, _identified_scale
 from models.vehicle import sedan
 from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, rolling, shown, spin
 

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from models.logs.can import _raw_values, _values_of
+from models.logs.can import _group_of, _raw_values, _values_of
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from tests.models.logs.drive_in_every_format import DBC, write_can, write_mdf_bus
@@ -318,10 +318,8 @@ def test_frames_of_j1939_are_known_by_their_parameter_group(senders, told, tmp_p
 
 
 def test_a_parameter_group_with_a_receiver_is_known_whoever_receives():
-    from models.logs.frames import group_of
-
-    assert group_of(0x18EA0BFE) == group_of(0x0CEAFF21) == 0xEA00
-    assert group_of(0x18F0093E) == 0xF009 and group_of(0x19F0093E) == 0x1F009
+    assert _group_of(0x18EA0BFE) == _group_of(0x0CEAFF21) == 0xEA00
+    assert _group_of(0x18F0093E) == 0xF009 and _group_of(0x19F0093E) == 0x1F009
 
 
 def test_a_long_identifier_of_no_j1939_is_not_taken_for_another(tmp_path):
