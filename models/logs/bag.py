@@ -410,7 +410,7 @@ def _unit(field: Field) -> str:
     """Return the unit that the type of a known message gives."""
     for kind, name in reversed(field.owners):
         package, _, word = kind.partition("/")
-        unit = _TABLES["units"].get(f"{word.rpartition('/')[2]}.{name}")
+        unit: str = _TABLES["units"].get(f"{word.rpartition('/')[2]}.{name}", "")
         if unit and package in _PACKAGES:
             return unit
     return ""

@@ -53,7 +53,7 @@ def drive():
     return Plant(CAR, TIRE).simulate(STEER, speed=20.0).recording()
 
 
-def waves() -> Recording:
+def waves():
     """Signals with closed forms: another frequency in each channel."""
     wave = {name: 0.1 * np.sin((1.0 + 0.3 * k) * T) for k, name in enumerate(CHANNELS)}
     wave["v_x"] = 20.0 + wave["v_x"]

@@ -12,7 +12,7 @@ N = 20001
 T = 0.01 * np.arange(N)
 
 
-def exact(rear: float = 0.0) -> Recording:
+def exact(rear=0.0):
     wave = np.sin(2.0 * math.pi * 0.3 * T)
     return Recording(
         name="exact",

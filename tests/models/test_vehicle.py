@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ cornering_stiffness_rear = 110000.0
 NUMBERS = ("mass", "yaw_inertia", "l_f", "l_r", "cornering_stiffness_front")
 
 
-def written(tmp_path: Path, text: str) -> Path:
+def written(tmp_path, text):
     path = tmp_path / "car.toml"
     path.write_text(text, encoding="utf-8")
     return path

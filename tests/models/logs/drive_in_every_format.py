@@ -14,7 +14,7 @@ FIRST_NS = 1_700_000_000_000_000_000  # of a bag: ns since 1970
 MAT73_HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: then HDF5 schema 1.00 ."
 
 
-def write_mat5(path: Path, t: np.ndarray, columns: Columns) -> Path:
+def write_mat5(path, t, columns):
     """Vectors and their time, as `save` writes them."""
     import scipy.io
 
@@ -24,7 +24,7 @@ def write_mat5(path: Path, t: np.ndarray, columns: Columns) -> Path:
     return path
 
 
-def write_mat73(path: Path, tree: Mapping) -> Path:
+def write_mat73(path, tree):
     """Structs of vectors, as `save -v7.3` writes them: HDF5 behind a header of 512 bytes."""
     import h5py
 
@@ -35,7 +35,7 @@ def write_mat73(path: Path, tree: Mapping) -> Path:
     return path
 
 
-def _fill(group, tree: Mapping) -> None:
+def _fill(group, tree):
     for name, value in tree.items():
         if isinstance(value, Mapping):
             inner = group.create_group(name)
@@ -55,7 +55,7 @@ def _fill(group, tree: Mapping) -> None:
             )
 
 
-def _fill_cell(group, name: str, cells: list) -> None:
+def _fill_cell(group, name, cells):
     """A cell array: references to what lies in #refs#."""
     import h5py
 
@@ -69,7 +69,7 @@ def _fill_cell(group, name: str, cells: list) -> None:
     group[name].attrs["MATLAB_class"] = np.bytes_("cell")
 
 
-def write_mdf(path: Path, t: np.ndarray, columns: Columns, version: str = "4.10") -> Path:
+def write_mdf(path, t, columns, version="4.10"):
     """One group of channels."""
     from asammdf import MDF, Signal
 
@@ -83,7 +83,7 @@ def write_mdf(path: Path, t: np.ndarray, columns: Columns, version: str = "4.10"
     return path
 
 
-def write_bag(path: Path, t: np.ndarray, columns: Columns, storage: str = "sqlite3") -> Path:
+def write_bag(path, t, columns, storage="sqlite3"):
     """Odometry, an IMU and a steering angle; in a folder, by "sqlite3" or "mcap"."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
@@ -123,12 +123,12 @@ IN_BAG = {
 }
 
 
-def _header(store, ns: int, frame: str = "base_link"):
+def _header(store, ns, frame="base_link"):
     time = store.types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
     return store.types["std_msgs/msg/Header"](time, frame)
 
 
-def _vector(store, x: float = 0.0, y: float = 0.0, z: float = 0.0):
+def _vector(store, x=0.0, y=0.0, z=0.0):
     return store.types["geometry_msgs/msg/Vector3"](x, y, z)
 
 
@@ -164,7 +164,7 @@ DBC = 'VERSION ""\n\nBU_: Car\n' + "".join(
 DBC += "".join(f"\nSIG_VALTYPE_ {256 + k} {name} : 2;" for k, name in enumerate(UNITS)) + "\n"
 
 
-def write_can(path: Path, t: np.ndarray, columns: Columns) -> Path:
+def write_can(path, t, columns):
     """One frame a column and sample; ".asc", ".blf", ".log" (candump) or ".trc". The DBC: `DBC`."""
     import struct
 
@@ -186,7 +186,7 @@ def write_can(path: Path, t: np.ndarray, columns: Columns) -> Path:
     return path
 
 
-def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns, apart: bool = False) -> Path:
+def write_mdf_bus(path, t, columns, apart=False):
     """The same frames as MDF4 that logs a bus; apart: later ones first, and remote frames."""
     from asammdf import MDF, Source
 
@@ -219,7 +219,7 @@ def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns, apart: bool = Fal
     return path
 
 
-def _append(file, frames: np.ndarray, t: np.ndarray, name: str, bus) -> None:
+def _append(file, frames, t, name, bus):
     """One group of frames of a bus."""
     from asammdf import Signal
 
@@ -239,12 +239,12 @@ class Written(NamedTuple):
 
 
 # By format: how a drive is written, into a folder. All of them hold the same doubles.
-def _named(path: Path, columns: Columns, pattern: str = "{}", dbc: bool = False) -> Written:
+def _named(path, columns, pattern="{}", dbc=False):
     names = {name: pattern.format(name) for name in columns}
     return Written(path, path.with_suffix(".dbc") if dbc else None, names)
 
 
-def _csv(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+def _csv(folder, t, columns):
     rows = np.column_stack([t, *columns.values()]).tolist()
     text = ",".join(["t", *columns]) + "\n"
     text += "".join(",".join(map(repr, row)) + "\n" for row in rows)
@@ -253,7 +253,7 @@ def _csv(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     return _named(path, columns)
 
 
-def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+def _parquet(folder, t, columns):
     import pyarrow
     import pyarrow.parquet
 
@@ -267,11 +267,11 @@ def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     return _named(path, columns)
 
 
-def _in_bag(path: Path, columns: Columns) -> Written:
+def _in_bag(path, columns):
     return Written(path, None, {name: IN_BAG[name] for name in columns})
 
 
-def _frames(ending: str) -> Callable[[Path, np.ndarray, Columns], Written]:
+def _frames(ending):
     return lambda f, t, c: _named(write_can(f / f"drive.{ending}", t, c), c, "Frame_{0}.{0}", True)
 
 
@@ -297,7 +297,7 @@ FORMATS: dict[str, Callable[[Path, np.ndarray, Columns], Written]] = {
 }
 
 
-def write(format: str, folder: Path, t: np.ndarray, columns: Columns) -> Written:
+def write(format, folder, t, columns):
     """A drive in a format; what the libraries that write warn of is theirs."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

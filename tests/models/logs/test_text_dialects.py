@@ -338,7 +338,7 @@ def test_a_clock_that_a_map_names_knows_the_units_that_a_clock_of_the_file_knows
     np.testing.assert_allclose(read_recording(alone, check=False).t, named.t, rtol=0, atol=1e-9)
 
 
-def lines_at_random(count: int) -> list[str]:
+def lines_at_random(count):
     """Lines of few characters, so that numbers, quotes, ones and blanks meet often."""
     rng = np.random.default_rng(5)
     parts = ["1", "1", "0.5", "-2,5", "1.234,5", "e3", "m/s", "[s]", "nan", '"', " ", "\t", "#", ""]

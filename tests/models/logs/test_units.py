@@ -45,7 +45,7 @@ SPELLED = {  # spellings apart by semicolons
     ("unit", "quantity", "one"),
     [(unit, *meant) for meant, some in SPELLED.items() for unit in some.split(";")],
 )
-def test_a_spelling_is_understood(unit: str, quantity: str, one: float) -> None:
+def test_a_spelling_is_understood(unit, quantity, one):
     assert to_si(unit, quantity, "log: x") == pytest.approx(one, rel=1e-5)
 
 
@@ -61,7 +61,7 @@ def test_a_spelling_is_understood(unit: str, quantity: str, one: float) -> None:
         ("furlongs", SPEED, "'furlongs', which is not known; name one of a speed: m/s"),
     ],
 )
-def test_a_unit_of_something_else_is_refused(unit: str, quantity: str, rule: str) -> None:
+def test_a_unit_of_something_else_is_refused(unit, quantity, rule):
     with pytest.raises(RecordingError) as caught:
         to_si(unit, quantity, "a.csv: vy (channel 'Vel')")
     message = str(caught.value)
@@ -69,24 +69,24 @@ def test_a_unit_of_something_else_is_refused(unit: str, quantity: str, rule: str
     assert "\n" not in message
 
 
-def test_every_si_unit_is_one_of_its_quantity_and_of_no_other() -> None:
+def test_every_si_unit_is_one_of_its_quantity_and_of_no_other():
     for quantity, unit in SI.items():
         assert to_si(unit, quantity, "") == 1.0
         assert quantities(unit) == (quantity,)
 
 
-def test_spellings_that_are_written_in_the_table_are_found_as_they_stand() -> None:
+def test_spellings_that_are_written_in_the_table_are_found_as_they_stand():
     for quantity, factors in FACTORS.items():
         for unit, factor in factors.items():
             assert to_si(unit, quantity, "") == factor
 
 
-def test_a_sign_of_no_unit_tells_none() -> None:
+def test_a_sign_of_no_unit_tells_none():
     assert not any(map(is_given, ("", " ", "-", "[]", "none", "1")))
     assert all(map(is_given, ("m/s", "%", "1/s")))
 
 
-def test_a_number_that_no_car_reaches_in_si_is_in_another_unit() -> None:
+def test_a_number_that_no_car_reaches_in_si_is_in_another_unit():
     assert unit_of_range(RATE, 6.0) == unit_of_range(ANGLE, 0.7) == unit_of_range(SPEED, 110) == ""
     assert unit_of_range(RATE, 7.0) == "deg/s" and unit_of_range(SPEED, 130.0) == "km/h"
     assert unit_of_range(ANGLE, 5.0) == "deg" and unit_of_range(HAND_WHEEL, 5.0) == ""

@@ -12,7 +12,6 @@ the force by up to 9.1 N (MagicFormula52_Parameters) and 4.6 N (HMMWV).
 import csv
 from dataclasses import replace
 from math import degrees, log10, radians
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -32,11 +31,11 @@ class Row(NamedTuple):
     F_y: str
 
 
-def printed_like(value: float) -> str:
+def printed_like(value):
     return f"{value:.10g}"
 
 
-def rows(folder: Path, tire: MagicFormula) -> list[Row]:
+def rows(folder, tire):
     F_z0 = tire.coefficients.FNOMIN * tire.coefficients.LFZO
     with (folder / "golden_mf52.csv").open() as file:
         lines = [line for line in csv.DictReader(file) if line["tir"] == tire.name]
@@ -54,11 +53,11 @@ def rows(folder: Path, tire: MagicFormula) -> list[Row]:
 
 
 @pytest.fixture(scope="module", params=FILES)
-def tire(request: pytest.FixtureRequest, shared_data: Path) -> MagicFormula:
+def tire(request, shared_data):
     return MagicFormula.from_tir(shared_data / "tires" / f"{request.param}.tir")
 
 
-def test_forces_agree_with_every_printed_digit(tire: MagicFormula, shared_data: Path) -> None:
+def test_forces_agree_with_every_printed_digit(tire, shared_data):
     golden = rows(shared_data / "tires", tire)
     assert len(golden) == 120
     for row in golden:
@@ -70,7 +69,7 @@ def test_forces_agree_with_every_printed_digit(tire: MagicFormula, shared_data: 
             assert abs(float(printed_like(ours)) - float(theirs)) < 1e-6, row
 
 
-def test_the_wrong_sign_of_alpha_is_noticed(tire: MagicFormula, shared_data: Path) -> None:
+def test_the_wrong_sign_of_alpha_is_noticed(tire, shared_data):
     wrong = [
         abs(tire.forces(row.alpha_iso, row.kappa, row.gamma, row.F_z).F_y - float(row.F_y))
         for row in rows(shared_data / "tires", tire)
@@ -79,7 +78,7 @@ def test_the_wrong_sign_of_alpha_is_noticed(tire: MagicFormula, shared_data: Pat
     assert min(wrong) > 100.0
 
 
-def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data: Path) -> None:
+def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data):
     """Golden values tell the two readings apart: without the term they are missed by newtons."""
     tire = MagicFormula.from_tir(shared_data / "tires" / "MagicFormula52_Parameters.tir")
     c = tire.coefficients
@@ -92,7 +91,7 @@ def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data
     assert 9.0 < max(gaps) < 9.2
 
 
-def side_force_due_to_slip(tire: MagicFormula, row: Row) -> float:
+def side_force_due_to_slip(tire, row):
     """S_Vyk alone: nothing else is proportional to LVYKA."""
 
     off = replace(tire, coefficients=replace(tire.coefficients, LVYKA=0.0))
