@@ -133,12 +133,12 @@ GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 
 _MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
 _STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
-_RULES = {
-    "yaw_inertia": f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car",
-    "cornering_stiffness_front": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
-    "cornering_stiffness_rear": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
+_OF_LOAD = ("N/rad", f"{_STIFFNESS_SHARE:g} static axle loads per rad")
+_RULES = {  # unit and rule
+    "yaw_inertia": ("kg m2", f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car"),
+    "cornering_stiffness_front": _OF_LOAD,
+    "cornering_stiffness_rear": _OF_LOAD,
 }
-_UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 
 # Downforce of an axle grows with the square of speed, ½ ρ A v_x², and adds to its static load.
 #
@@ -411,10 +411,9 @@ class Vehicle:
     @property
     def estimates(self) -> str:
         """What of the car is estimated, with values and rules, in one line; empty if nothing is."""
-        units = dict(zip(_RULES, _UNITS, strict=True))
         found = [
-            f"{name} = {getattr(self, name):.4g} {units[name]} ({rule})"
-            for name, rule in _RULES.items()
+            f"{name} = {getattr(self, name):.4g} {unit} ({rule})"
+            for name, (unit, rule) in _RULES.items()
             if name in self.estimated
         ]
         return f"estimated, as the vehicle file leaves it out: {'; '.join(found)}" if found else ""

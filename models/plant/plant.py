@@ -255,20 +255,18 @@ class PlantState(NamedTuple):
     """The plant at one instant; nothing changes it, `StepwisePlant.step` returns the next.
 
     Forces and acceleration are those under the inputs of the period that ends here.
+    steps: of the integration since the start; x: state (18,) in the order of
+    `models.plant.dynamics`; axle_force: to the side, front and rear, frame of the body, (2,) [N];
+    acceleration: of the center of gravity along the axes of the body, (2,) [m/s^2]; alpha: slip
+    angles of the wheels FL, FR, RL, RR in the paper's sign, (4,) [rad]; F_z: their loads, (4,) [N].
     """
 
     steps: int
-    """Steps of the integration since the start."""
     x: Array
-    """State (18,) in the order of `models.plant.dynamics`."""
     axle_force: Array
-    """Side force of the front and the rear axle, frame of the body, (2,) [N]."""
     acceleration: Array
-    """Of the center of gravity along the axes of the body, (2,) [m/s^2]."""
     alpha: Array
-    """Slip angles of the wheels FL, FR, RL, RR in the paper's sign, (4,) [rad]."""
     F_z: Array
-    """Loads of the wheels, (4,) [N]."""
 
 
 class StepwisePlant:
