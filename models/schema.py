@@ -342,6 +342,12 @@ def toml_value(value: Any) -> str:
     return repr(float(value))  # the shortest text of the same bits
 
 
+def toml_table(name: str, values: Mapping[str, Any]) -> str:
+    """Return a table of a TOML document, empty where it holds nothing; "" is its top."""
+    lines = [f"[{name}]"] * bool(name) + [f"{k} = {toml_value(v)}" for k, v in values.items()]
+    return "".join(f"{line}\n" for line in lines) if values else ""
+
+
 def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
     """Refuse what cannot be the name of a car in files, figures and reports."""
     if not isinstance(name, str) or len(name) > LONGEST_NAME:

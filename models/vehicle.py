@@ -6,7 +6,7 @@ F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the 
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
 from models.rules import require_number, require_positive, require_within
-from models.schema import Table, read_toml, require_name, toml_value
+from models.schema import Table, read_toml, require_name, toml_table
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
 #
@@ -94,31 +94,14 @@ class Chassis:
         require_within(VehicleError, 0.0, self.cg_height, **values)
 
 
-# A dataclass of a vehicle as the text of a TOML file, with exact numbers.
-
-
-def _toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
-    """Return the TOML text of a dataclass and of the one dataclass inside it.
-    record : the dataclass to write; fields that are None are left out.
-    """
-    lines = [
-        f"{one.name} = {_value(getattr(record, one.name), folder)}"
-        for one in fields(record)
-        if one.name not in (table, *leave_out) and getattr(record, one.name) is not None
-    ]
-    inner = getattr(record, table, None)
-    if inner is not None:
-        lines += ["", f"[{table}]", _toml_text(inner, folder=folder, table="")]
-    return "\n".join(lines).rstrip("\n") + "\n"
-
-
-def _value(value: Any, folder: Path) -> str:
-    if isinstance(value, Path):
-        try:
-            value = Path(os.path.relpath(value, folder)).as_posix()
-        except ValueError:  # another drive
-            value = value.as_posix()
-    return toml_value(value)
+def _from_folder(value: Any, folder: Path) -> Any:
+    """Return a path as it is named in a file of a folder; another value itself."""
+    if not isinstance(value, Path):
+        return value
+    try:
+        return Path(os.path.relpath(value, folder)).as_posix()
+    except ValueError:  # another drive
+        return value.as_posix()
 
 
 GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
@@ -474,11 +457,22 @@ class Vehicle:
         """
         file = Path(path)
         without = (name for name in AREAS if getattr(self, name) == 0.0)
-        out = ("estimated", *self.estimated, *without)
-        content = _toml_text(self, folder=file.parent, table="chassis", leave_out=out)
+        out = {"chassis", "estimated", *self.estimated, *without}
+        tables = [
+            toml_table(
+                name,
+                {
+                    one.name: _from_folder(value, file.parent)
+                    for one in fields(record)
+                    if one.name not in out and (value := getattr(record, one.name)) is not None
+                },
+            )
+            for name, record in (("", self), ("chassis", self.chassis))
+            if record is not None
+        ]
         if not overwrite and file.exists():
             raise FileExistsError(f"{file} exists; overwrite=True replaces it")
-        write_atomically(file, content)
+        write_atomically(file, "\n".join(tables))
 
 
 def sedan() -> Vehicle:

@@ -36,14 +36,13 @@ class Heading(NamedTuple):
 
 class Clock(NamedTuple):
     """The column that is the time.
-    column: from 0; name: as in the file; unit: of `units.PER_SECOND`, "hhmmss" or "instant"; epoch:
-    whether it counts from 1970; words: for people.
+    column: from 0; name: as in the file; unit: of `units.PER_SECOND`, "hhmmss" or "instant"; words:
+    for people.
     """
 
     column: int
     name: str
     unit: str
-    epoch: bool
     words: str
 
 

@@ -259,14 +259,14 @@ def _clock(
     if not fits(np.diff(t)):
         return None
     if kind == "instant":
-        return Clock(column, name, kind, False, f"{name!r} as date or time of day, {words}")
+        return Clock(column, name, kind, f"{name!r} as date or time of day, {words}")
     if kind == "hhmmss":
-        return Clock(column, name, kind, False, f"{name!r} as hhmmss, {words}")
+        return Clock(column, name, kind, f"{name!r} as hhmmss, {words}")
     advice = time_unit(unit)
     found, epoch = _unit(t, advice)
     since = " since 1970" if epoch else ""
     guessed = "" if advice else ", a unit that its steps tell (likely)"
-    return Clock(column, name, found, epoch, f"{name!r} in {found}{since}, {words}{guessed}")
+    return Clock(column, name, found, f"{name!r} in {found}{since}, {words}{guessed}")
 
 
 def _is_any(_: Array) -> bool:
@@ -462,7 +462,7 @@ def risen(
     mend: bool = False,
     restarts: bool = True,
 ) -> Stamps:
-    clock = Clock(0, name, "s", False, "")
+    clock = Clock(0, name, "s", "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 
 

@@ -37,7 +37,7 @@ from models.logs.signals import (
 from models.logs.units import to_si
 from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
-from models.schema import Table, changed, read_toml, toml_value
+from models.schema import Table, changed, read_toml, toml_table
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
 _REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
@@ -182,21 +182,21 @@ class LogMap:
         if self.dbc and folder is not None:
             return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
         declared = changed(self)
-        blocks = [
-            _block(section, {key: declared[one] for key, one in keys.items() if one in declared})
+        tables: dict[str, dict[str, Any]] = {
+            section: {key: declared[one] for key, one in keys.items() if one in declared}
             for section, keys in _SECTIONS.items()
-        ]
+        }
         for name in QUANTITIES:
             if name in self.signals:
                 channel = self.signals[name].channel
                 first = {"channel": channel[0] if len(channel) == 1 else channel}
-                blocks.append(_block(f"signals.{name}", changed(self.signals[name]) | first))
-        blocks.append(_block("wheels", self.wheels.table()))
+                tables[f"signals.{name}"] = changed(self.signals[name]) | first
         repair = self.repair.tables()
         inner = {key: value for key, value in repair.items() if isinstance(value, dict)}
-        blocks.append(_block("repair", {k: v for k, v in repair.items() if k not in inner}))
-        blocks += [_block(f"repair.{key}", value) for key, value in inner.items()]
-        return "\n".join(block for block in blocks if block)
+        tables["wheels"] = self.wheels.table()
+        tables["repair"] = {key: value for key, value in repair.items() if key not in inner}
+        tables |= {f"repair.{key}": value for key, value in inner.items()}
+        return "\n".join(toml_table(name, values) for name, values in tables.items() if values)
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a log.toml; the file appears whole or not at all.
@@ -224,11 +224,6 @@ def _signal(table: Table, name: str) -> Signal:
         return Signal(**given)
     except RecordingError as error:
         raise RecordingError(f"signals.{name}: {error}") from None
-
-
-def _block(name: str, values: Mapping[str, Any]) -> str:
-    lines = [f"{key} = {toml_value(value)}" for key, value in values.items()]
-    return "".join(f"{line}\n" for line in (f"[{name}]", *lines)) if lines else ""
 
 
 # Signals as a command line tells them: NAME=CHANNEL [UNIT] /RATIO.
