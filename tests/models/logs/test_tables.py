@@ -202,9 +202,11 @@ def test_a_column_that_grows_goes_to_disk_and_comes_back(tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     parts = [np.arange(k, dtype=np.float64) for k in (3, 0, 5, 1000, 7)]
-    short, long = Growing(in_memory=10_000), Growing(in_memory=10)
+    short, long = Growing(), Growing()
     for part in parts:
         short.extend(part)
+    monkeypatch.setattr("models.logs.growing.LONGEST_IN_MEMORY", 10)
+    for part in parts:
         long.extend(part)
     assert len(long) == 1015
     a, b = short.finished(), long.finished()
