@@ -372,22 +372,16 @@ def _of_duration(found: re.Match[str]) -> int | None:
 
 def _of_day(text: str) -> int | None:
     """Return a time of day [ns], less its time zone."""
-    found = _TIME.fullmatch(text)
+    found = _TIME.fullmatch(text) or _SHORT.fullmatch(text)
     if found is None:
-        short = _SHORT.fullmatch(text)
-        if short is None:
+        return None
+    hours, minutes, whole, part, *more = found.groups()
+    half, sign, *away = more or (None, None)
+    if half:
+        if not hours or not 1 <= int(hours) <= 12:
             return None
-        hours, minutes, whole, part = short.groups()
-        zone = 0
-    else:
-        hours, minutes, whole, part = found[1], found[2], found[3], found[4]
-        if found[5]:
-            if not hours or not 1 <= int(hours) <= 12:
-                return None
-            hours = str(int(hours) % 12 + 12 * (found[5] in "pP"))
-        zone = 0
-        if found[6]:
-            zone = (int(found[7]) * 60 + int(found[8])) * (-1 if found[6] == "-" else 1)
+        hours = str(int(hours) % 12 + 12 * (half in "pP"))
+    zone = (int(away[0]) * 60 + int(away[1])) * (-1 if sign == "-" else 1) if sign else 0
     if len(hours or "") > 6 or int(minutes) > 59 or int(whole) > 60:
         return None
     seconds = int(hours or 0) * 3600 + (int(minutes) - zone) * 60 + int(whole)
