@@ -240,11 +240,6 @@ def test_wind_is_felt_by_the_accelerometer_and_the_car_drifts_downwind():
     assert run.Y[-1] > 1.0
 
 
-def test_a_bank_that_is_not_finite_is_refused_by_name():
-    with pytest.raises(ValueError, match="bank must be finite"):
-        Plant(CAR, TIRE).simulate(STEER, speed=20.0, bank=math.nan)
-
-
 def test_rear_wheels_may_have_tires_of_their_own():
     """Force over slip of each axle, at small slip, is the stiffness of its own two tires."""
     rear = DugoffTire(C_alpha=80e3, C_kappa=80e3, friction=1.0)

@@ -417,6 +417,7 @@ def test_what_does_not_fit_is_refused():
         ({"dt": -0.002, "sample_time": -0.01}, "multiple"),
         ({"speed": 0.0}, "positive at the start"),
         ({"speed": math.nan}, "finite"),
+        ({"bank": math.nan}, "bank must be finite"),
     ):
         with pytest.raises(ValueError, match=says):
             PLANT.simulate(step, **{"speed": 20.0, **given})

@@ -170,19 +170,21 @@ def test_frames_of_can_fd_are_read(tmp_path):
     assert np.array_equal(log.read(["Long.V"])[0].values, np.arange(20) / 3)
 
 
-def test_frames_of_a_bus_in_mdf_are_told_apart_from_channels(tmp_path, drive):
+def bus(folder, *drive, **more):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        path = write_mdf_bus(tmp_path / "log.mf4", *drive)
+        return write_mdf_bus(folder / "log.mf4", *drive, **more)
+
+
+def test_frames_of_a_bus_in_mdf_are_told_apart_from_channels(tmp_path, drive):
+    path = bus(tmp_path, *drive)
     assert 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"' in refusal(path)
     assert open_log(path, path.with_suffix(".dbc")).format == "CAN MDF4"
 
 
 def test_frames_of_several_groups_are_in_order_and_those_without_data_counted(tmp_path, drive):
     t, columns = drive
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        path = write_mdf_bus(tmp_path / "log.mf4", t, columns, apart=True)
+    path = bus(tmp_path, t, columns, apart=True)
     log = open_log(path, path.with_suffix(".dbc"))
     (r,) = log.read(["Frame_r.r"])
     assert np.array_equal(r.t, t) and np.array_equal(r.values, columns["r"])
@@ -193,9 +195,7 @@ def test_frames_of_several_groups_are_in_order_and_those_without_data_counted(tm
 
 
 def test_frames_of_a_bus_in_mdf_lie_on_disk_where_they_are_many(tmp_path, drive, monkeypatch):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        path = write_mdf_bus(tmp_path / "log.mf4", *drive)
+    path = bus(tmp_path, *drive)
     monkeypatch.setattr("models.logs.growing.LONGEST_IN_MEMORY", 200)
     log = open_log(path, path.with_suffix(".dbc"))
     for _, (group, _, _) in log.channels:
