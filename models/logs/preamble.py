@@ -68,9 +68,9 @@ _LONGEST_CELL = csv.field_size_limit()  # characters
 class Layout:
     """Where the table of a text file is, and how its cells are written.
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
-    delimiter : one character, " " for any number of blanks and tabs.   decimal : "." or ",".
-    thousands : what sets thousands apart in some cell, "" where nothing does.
+    delimiter : one character, " " for any number of blanks and tabs.
     first : line of the first row of data, from 1; one beyond the header where there is none.
+    decimal : "." or ",".   thousands : what sets thousands apart, "" where nothing does.
     again : lines of header and units, which may come again further down and are no data then.
     rows : cells of the first rows of data.
     made_by : the logger or program whose format it is, "" where nothing tells.
