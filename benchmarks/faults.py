@@ -20,11 +20,33 @@ from models.faults import FaultError, channel_of
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
 from models.rules import require_positive
-from models.smoothing import low_passed
 from models.vehicle import GRAVITY, Vehicle
 
 # How often a wrong unit fits into the right one: what is logged is the SI value times it.
 UNITS: Mapping[str, float] = {"deg": 180.0 / math.pi, "km/h": 3.6, "g": 1.0 / GRAVITY}
+
+
+_NEGLIGIBLE = 1e-20  # share of an earlier sample of a low pass
+
+
+def low_passed(signal: Array, lag: float, dt: float) -> Array:
+    """Return what comes out of a low pass of first order that began at rest on the first value.
+
+    It is exact for straight lines between samples.
+    signal : u, what goes in (n,).   lag : time constant T of the low pass [s].
+    dt : sampling interval [s].
+    """
+    keep = math.exp(-dt / lag)
+    ramp = (1.0 - keep) * lag / dt  # lag of a straight line, T u_dot
+    # y_k = keep y_(k-1) + (1 - keep) u_(k-1) + (1 - ramp) (u_k - u_(k-1)), from y_0 = u_0
+    y = np.array(signal, dtype=np.float64)
+    y[1:] = (ramp - keep) * signal[:-1] + (1.0 - ramp) * signal[1:]
+    # 1/(1 - q) = (1 + q)(1 + q²)(1 + q⁴)...: of a sum over all samples before, by whole arrays
+    behind = 1
+    while behind < y.size and keep > _NEGLIGIBLE:
+        y[behind:] += keep * y[:-behind]  # NumPy reads all of the right side first
+        keep, behind = keep * keep, 2 * behind
+    return y
 
 
 class Fault(Protocol):

@@ -16,7 +16,7 @@ import tomllib
 import types
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
@@ -31,7 +31,7 @@ from models.limits import limits as limits
 from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time
-SWELLS, SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
+_SWELLS, _SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
 LONGEST_NAME = 200  # characters
 
 
@@ -51,12 +51,12 @@ def swells(size: float, packed: float) -> bool:
     """Return whether data unpack to what no log packs to.
     size : unpacked, as memory holds it [bytes].   packed : as the file holds them [bytes].
     """
-    return size > SWOLLEN_FROM and size > SWELLS * packed
+    return size > _SWOLLEN_FROM and size > _SWELLS * packed
 
 
 def most_unpacked(packed: float) -> int:
     """Return how many bytes a part of a log that is unpacked whole may have at most."""
-    return int(min(1e6 * limits().block, max(SWOLLEN_FROM, SWELLS * packed)))
+    return int(min(1e6 * limits().block, max(_SWOLLEN_FROM, _SWELLS * packed)))
 
 
 def require_dense(
@@ -66,7 +66,7 @@ def require_dense(
     if swells(size, packed):
         raise refusal(
             f"{where}: {what} must be a log, they swell to {size / max(packed, 1):.0f} times their "
-            f"size, above {SWELLS}; unpack the file first if it is one"
+            f"size, above {_SWELLS}; unpack the file first if it is one"
         )
 
 
@@ -264,16 +264,26 @@ class Table:
         self.only(*known)
         return known
 
-    def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
+    def record(
+        self, cls: type, *, skip: tuple[str, ...] = (), alone: tuple[str, ...] = ()
+    ) -> dict[str, Any]:
         """Return the arguments of a dataclass, each of the type that its field declares.
         cls : the dataclass; its fields are the keys that may be there.
+        alone : tuples of which a single value may stand without a list.
         """
         known = self.only_fields(cls, skip=skip)
         for key, field in known.items():
-            if field.default is MISSING and field.default_factory is MISSING:
+            if _default(field) is MISSING:
                 self.value(key)
-        hints = get_type_hints(cls)
-        return {key: self._as(hints[key], key, self.data[key]) for key in known if key in self.data}
+        given = {key: self.data[key] for key in known if key in self.data}
+        given |= {key: [given[key]] for key in alone if not isinstance(given.get(key, []), list)}
+        return {key: self.typed(cls, key, value) for key, value in given.items()}
+
+    def typed(self, cls: type, name: str, value: Any, key: str = "") -> Any:
+        """Return a value as the type that a field of a dataclass declares.
+        name : of the field.   key : of the value in the table, where it is called otherwise.
+        """
+        return self._as(get_type_hints(cls)[name], key or name, value)
 
     def _as(self, kind: Any, key: str, value: Any) -> Any:
         """Return a value as the type that an annotation names: number, text, or a tuple of such."""
@@ -281,6 +291,13 @@ class Table:
             kind = next(one for one in get_args(kind) if one is not types.NoneType)
         if get_origin(kind) is tuple:
             return self._tuple(get_args(kind), key, value)
+        if get_origin(kind) is Mapping:
+            inner = self.table(key)
+            return {one: inner._as(get_args(kind)[1], one, inner.data[one]) for one in inner.data}
+        if kind is bool:
+            if not isinstance(value, bool):
+                self.refuse(key, "must be true or false")
+            return value
         if kind in (str, Path):
             if not isinstance(value, str):
                 self.refuse(key, f"must be a text, it is {shown(value)}")
@@ -301,6 +318,34 @@ class Table:
         if kinds[-1] is not Ellipsis and len(value) != len(kinds):
             self.refuse(key, f"must be a list of {len(kinds)}, it is {shown(value)}")
         return tuple(self._as(kinds[0], key, one) for one in value)
+
+
+def _default(field: "Field[Any]") -> Any:
+    """Return what a field of a dataclass is where nothing is given; MISSING where it is needed."""
+    return field.default if field.default_factory is MISSING else field.default_factory()
+
+
+def changed(record: Any) -> dict[str, Any]:
+    """Return what a dataclass holds beyond what it is where nothing is given, by field."""
+    values = {one.name: (getattr(record, one.name), _default(one)) for one in fields(record)}
+    return {name: value for name, (value, plain) in values.items() if value != plain}
+
+
+def toml_value(value: Any) -> str:
+    """Return a text, number, truth or tuple of such as TOML has it, which reads back the same."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    return repr(float(value))  # the shortest text of the same bits
+
+
+def toml_table(name: str, values: Mapping[str, Any]) -> str:
+    """Return a table of a TOML document, empty where it holds nothing; "" is its top."""
+    lines = [f"[{name}]"] * bool(name) + [f"{k} = {toml_value(v)}" for k, v in values.items()]
+    return "".join(f"{line}\n" for line in lines) if values else ""
 
 
 def require_name(refusal: type[ValueError], key: str, name: Any) -> None:

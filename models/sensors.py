@@ -102,7 +102,6 @@ _NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
 
 def white_noise(signal: Array) -> float:
     """Return the standard deviation of the white part of a signal, by its second differences.
-
     Their median is taken: steps and outliers are not noise.
     signal : samples (n,).
     """

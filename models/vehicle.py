@@ -4,10 +4,9 @@ SI units, ISO axes. The cornering stiffness is per axle (both tires), in the pap
 F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the ISO 8855 slip angle.
 """
 
-import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
 from models.rules import require_number, require_positive, require_within
-from models.schema import Table, read_toml, require_name
+from models.schema import Table, read_toml, require_name, toml_table
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
 #
@@ -95,33 +94,14 @@ class Chassis:
         require_within(VehicleError, 0.0, self.cg_height, **values)
 
 
-# A dataclass of a vehicle as the text of a TOML file, with exact numbers.
-
-
-def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
-    """Return the TOML text of a dataclass and of the one dataclass inside it.
-    record : the dataclass to write; fields that are None are left out.
-    """
-    lines = [
-        f"{one.name} = {_value(getattr(record, one.name), folder)}"
-        for one in fields(record)
-        if one.name not in (table, *leave_out) and getattr(record, one.name) is not None
-    ]
-    inner = getattr(record, table, None)
-    if inner is not None:
-        lines += ["", f"[{table}]", toml_text(inner, folder=folder, table="")]
-    return "\n".join(lines).rstrip("\n") + "\n"
-
-
-def _value(value: Any, folder: Path) -> str:
-    if isinstance(value, Path):
-        try:
-            value = Path(os.path.relpath(value, folder)).as_posix()
-        except ValueError:  # another drive
-            value = value.as_posix()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(float(value))  # the shortest text that reads back to the same bits
+def _from_folder(value: Any, folder: Path) -> Any:
+    """Return a path as it is named in a file of a folder; another value itself."""
+    if not isinstance(value, Path):
+        return value
+    try:
+        return Path(os.path.relpath(value, folder)).as_posix()
+    except ValueError:  # another drive
+        return value.as_posix()
 
 
 GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
@@ -136,12 +116,12 @@ GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 
 _MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
 _STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
-RULES = {
-    "yaw_inertia": f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car",
-    "cornering_stiffness_front": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
-    "cornering_stiffness_rear": f"{_STIFFNESS_SHARE:g} static axle loads per rad",
+_OF_LOAD = ("N/rad", f"{_STIFFNESS_SHARE:g} static axle loads per rad")
+_RULES = {  # unit and rule
+    "yaw_inertia": ("kg m2", f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car"),
+    "cornering_stiffness_front": _OF_LOAD,
+    "cornering_stiffness_rear": _OF_LOAD,
 }
-UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 
 # Downforce of an axle grows with the square of speed, ½ ρ A v_x², and adds to its static load.
 #
@@ -157,8 +137,8 @@ AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
 # What a car may tell of braking and driving: height of its center of gravity over the wheelbase,
 # shares of the front axle, and drag area, ½ ρ A v_x² against the motion.
 
-OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # told there as well
-LENGTHWISE = (*OF_CHASSIS, "drag_area")  # of a `Vehicle`
+_OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # declared there as well
+LENGTHWISE = (*_OF_CHASSIS, "drag_area")  # of a `Vehicle`
 _MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
 _DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
 _MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
@@ -182,7 +162,7 @@ __all__ = [
 
 
 def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
-    """Return yaw inertia and cornering stiffnesses of a car of that size, by `RULES`.
+    """Return yaw inertia and cornering stiffnesses of a car of that size, by `_RULES`.
     mass : total mass [kg].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     """
@@ -232,12 +212,6 @@ class Vehicle:
     chassis : what the double-track plant needs, or None.
     estimated : names of the values that nobody measured, but that follow from the others by a
         rule; two cars that differ in it alone are equal.
-
-    Raises
-    ------
-    VehicleError
-        For a value that is not positive and finite, for an inertia, a stiffness, a downforce or a
-        drag that no car of that mass has, or for springs too soft to carry the body.
     """
 
     name: str = "car"
@@ -259,8 +233,8 @@ class Vehicle:
     def __post_init__(self) -> None:
         require_name(VehicleError, "name", self.name)
         for name in self.estimated:
-            if name not in RULES:
-                raise VehicleError(f"estimated must be of {', '.join(RULES)}, not {shown(name)}")
+            if name not in _RULES:
+                raise VehicleError(f"estimated must be of {', '.join(_RULES)}, not {shown(name)}")
         require_positive(
             VehicleError, mass=self.mass, yaw_inertia=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
             cornering_stiffness_front=self.cornering_stiffness_front,
@@ -310,7 +284,7 @@ class Vehicle:
             require_within(VehicleError, 0.0, highest.get(name, 1.0), **{name: value})
 
     def lengthwise(self, name: str) -> float | None:
-        """Return a number of `OF_CHASSIS` as the car or else its chassis tells it, or None."""
+        """Return a number of `_OF_CHASSIS` as the car or else its chassis tells it, or None."""
         given: float | None = getattr(self, name)
         if given is None and self.chassis is not None:
             given = getattr(self.chassis, name)
@@ -321,8 +295,8 @@ class Vehicle:
         return self.bicycle == other.bicycle and self.downforce == other.downforce
 
     def without_chassis(self) -> "Vehicle":
-        """Return the car alone, with the numbers of `OF_CHASSIS` that its chassis tells."""
-        given: dict[str, Any] = {name: self.lengthwise(name) for name in OF_CHASSIS}
+        """Return the car alone, with the numbers of `_OF_CHASSIS` that its chassis tells."""
+        given: dict[str, Any] = {name: self.lengthwise(name) for name in _OF_CHASSIS}
         return replace(self, chassis=None, **given)
 
     @property
@@ -420,10 +394,9 @@ class Vehicle:
     @property
     def estimates(self) -> str:
         """What of the car is estimated, with values and rules, in one line; empty if nothing is."""
-        units = dict(zip(RULES, UNITS, strict=True))
         found = [
-            f"{name} = {getattr(self, name):.4g} {units[name]} ({rule})"
-            for name, rule in RULES.items()
+            f"{name} = {getattr(self, name):.4g} {unit} ({rule})"
+            for name, (unit, rule) in _RULES.items()
             if name in self.estimated
         ]
         return f"estimated, as the vehicle file leaves it out: {'; '.join(found)}" if found else ""
@@ -439,12 +412,6 @@ class Vehicle:
         Parameters
         ----------
         path : the TOML file; a relative `tire` in [chassis] starts from its folder.
-
-        Raises
-        ------
-        VehicleError
-            One line with file, key and rule: no such file, key unknown or missing, type or value
-            wrong.
         """
         file = Path(path)
         if not file.exists():
@@ -456,7 +423,7 @@ class Vehicle:
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")
         table.only_fields(cls, skip=outside)  # before what is missing
         size = [table.number(key) for key in ("mass", "l_f", "l_r")]
-        missing = tuple(key for key in RULES if key not in data)
+        missing = tuple(key for key in _RULES if key not in data)
         try:
             data |= {key: value for key, value in estimate(*size).items() if key in missing}
         except VehicleError as error:
@@ -490,11 +457,22 @@ class Vehicle:
         """
         file = Path(path)
         without = (name for name in AREAS if getattr(self, name) == 0.0)
-        out = ("estimated", *self.estimated, *without)
-        content = toml_text(self, folder=file.parent, table="chassis", leave_out=out)
+        out = {"chassis", "estimated", *self.estimated, *without}
+        tables = [
+            toml_table(
+                name,
+                {
+                    one.name: _from_folder(value, file.parent)
+                    for one in fields(record)
+                    if one.name not in out and (value := getattr(record, one.name)) is not None
+                },
+            )
+            for name, record in (("", self), ("chassis", self.chassis))
+            if record is not None
+        ]
         if not overwrite and file.exists():
             raise FileExistsError(f"{file} exists; overwrite=True replaces it")
-        write_atomically(file, content)
+        write_atomically(file, "\n".join(tables))
 
 
 def sedan() -> Vehicle:

@@ -19,7 +19,7 @@ from models.logs.preamble import Layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Kind, Words
 
-WORTH = 1 << 22  # bytes of a text from which on importing pyarrow takes less than it saves
+_WORTH = 1 << 22  # bytes of a text from which on importing pyarrow takes less than it saves
 ODD_NAN = re.compile(rb"(?i)nan\(")  # a number to pyarrow alone
 _NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]
 
@@ -36,12 +36,11 @@ def is_installed() -> bool:
 
 def is_used(path: Path) -> bool:
     """Whether pyarrow is imported already, or a text is long enough to import it."""
-    return "pyarrow" in sys.modules or path.stat().st_size > WORTH
+    return "pyarrow" in sys.modules or path.stat().st_size > _WORTH
 
 
 def _of_arrow(block: bytes) -> Any:
     """Return bytes in memory of pyarrow's own.
-
     Its threads may drop them last, while Python ends: of what is Python's that aborts the program.
     """
     import pyarrow
@@ -68,7 +67,8 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
         table = pyarrow.csv.read_csv(
             pyarrow.BufferReader(_of_arrow(block)),
             pyarrow.csv.ReadOptions(
-                column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
+                column_names=[str(k) for k in range(len(layout.columns.names))],
+                block_size=len(block) + 1,
             ),
             pyarrow.csv.ParseOptions(
                 delimiter=layout.delimiter, newlines_in_values=b'"' in block, double_quote=True

@@ -17,14 +17,14 @@ from codegen.arrays import Array
 from models.logs.log import Channel
 from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_given, quantities
 
-LETTERS = "xyz"
-STEP, WINDOW = 0.1, 0.3  # [s] between instants, and over which means are taken there
-MOST = 20_000  # instants
-SLOW = 3.0  # [m/s]: slower samples tell nothing
-CLEAR = 3.0  # times that the speed is larger than what is measured across it
-SURE, LIKELY = 0.7, 0.4  # correlations
-GRAVITY = FACTORS[ACCELERATION]["g"]
-NEAR = 0.25  # share of gravity by which a mean of it may be off
+_LETTERS = "xyz"
+_STEP, _WINDOW = 0.1, 0.3  # [s] between instants, and over which means are taken there
+_MOST = 20_000  # instants
+_SLOW = 3.0  # [m/s]: slower samples tell nothing
+_CLEAR = 3.0  # times that the speed is larger than what is measured across it
+_SURE, _LIKELY = 0.7, 0.4  # correlations
+_GRAVITY = FACTORS[ACCELERATION]["g"]
+_NEAR = 0.25  # share of gravity by which a mean of it may be off
 _TILT = 0.4  # share of it along another axis from which a box lies oblique
 _STEMS = {  # what stands before a letter in one word, or beside it, by quantity
     SPEED: "v vel velocity speed",
@@ -41,7 +41,7 @@ class Triad(NamedTuple):
     words: tuple[str, ...]
 
 
-class Axis(NamedTuple):
+class _Axis(NamedTuple):
     """What a channel is: of which signal, with which sign, and why."""
 
     name: str
@@ -50,14 +50,13 @@ class Axis(NamedTuple):
     why: str
 
 
-class Found(NamedTuple):
+class _Found(NamedTuple):
     """What numbers tell: channels whose letters mislead, and what they are where that is known.
-
     oblique: of a box that lies so that no axis is one of the car's.
     """
 
     misled: frozenset[str]
-    axes: tuple[Axis, ...]
+    axes: tuple[_Axis, ...]
     oblique: frozenset[str] = frozenset()
 
 
@@ -83,7 +82,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
     return [
         Triad(names, quantity_of[rest], rest)
         for rest, names in found.items()
-        if len(names) == len(LETTERS)
+        if len(names) == len(_LETTERS)
     ]
 
 
@@ -92,7 +91,7 @@ def _letter(listed: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     stems = {word for some in _STEMS.values() for word in some.split()}
     for k in range(len(listed) - 1, -1, -1):
         word = listed[k]
-        if word in LETTERS or (word[-1] in LETTERS and word[:-1] in stems):
+        if word in _LETTERS or (word[-1] in _LETTERS and word[:-1] in stems):
             stem = (word[:-1], "?") if word[:-1] else ("?",)
             return word[-1], (*listed[:k], *stem, *listed[k + 1 :])
     return None
@@ -105,12 +104,12 @@ class _Grid:
         there = [seen[name].t for name in names if name in seen and seen[name].t.size > 1]
         begin = max((float(t[0]) for t in there), default=0.0)
         end = min((float(t[-1]) for t in there), default=0.0)
-        count = int(max(min((end - begin) / STEP, MOST), 0.0))
-        self.t = begin + STEP * np.arange(count)
+        count = int(max(min((end - begin) / _STEP, _MOST), 0.0))
+        self.t = begin + _STEP * np.arange(count)
         self._seen, self._means = seen, dict[str, Array]()
 
     def __getitem__(self, name: str) -> Array:
-        """Return a channel at the instants, (n,); means over `WINDOW`."""
+        """Return a channel at the instants, (n,); means over `_WINDOW`."""
         if name not in self._means:
             self._means[name] = self._mean(name)
         return self._means[name]
@@ -123,7 +122,7 @@ class _Grid:
             return np.full(self.t.size, np.nan)
         steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
         total = np.concatenate([[0.0], np.cumsum(steps)])
-        ends = (np.clip(self.t + side * WINDOW / 2.0, t[0], t[-1]) for side in (-1.0, 1.0))
+        ends = (np.clip(self.t + side * _WINDOW / 2.0, t[0], t[-1]) for side in (-1.0, 1.0))
         low, high = ends
         mean = np.interp(high, t, total) - np.interp(low, t, total)
         return np.asarray(mean / np.maximum(high - low, 1e-9))
@@ -144,7 +143,7 @@ def along_axes(
     yaw_rate: str,
     lateral: str,
     steering: str,
-) -> Found:
+) -> _Found:
     """Return what the channels of triads are by their numbers, where their letters mislead.
     speed, yaw_rate, lateral, steering : channels of the forward speed, r, a_y and δ by their names;
         but for the speed in no triad; "" where there is none.
@@ -155,22 +154,22 @@ def along_axes(
     named = [one for one in (speed, yaw_rate, lateral, steering) if one]
     grid = _Grid(seen, [*asked, *named])
     if grid.t.size < 50:
-        return Found(frozenset(), ())
+        return _Found(frozenset(), ())
     misled: set[str] = set()
     oblique: set[str] = set()
-    axes: list[Axis] = []
+    axes: list[_Axis] = []
     across: list[str] = []
     v = np.abs(grid[speed]) if speed and speed not in asked else None
     for one in usable:
         if one.quantity == SPEED and (forward := _forward(grid, one, v)):
             misled |= set(one.names.values())
             letter, sign = forward
-            axes.append(Axis(one.names[letter], "v_x", sign, f"{letter} goes as the speed"))
+            axes.append(_Axis(one.names[letter], "v_x", sign, f"{letter} goes as the speed"))
             v = np.abs(grid[one.names[letter]]) if v is None else v
             across = [name for key, name in one.names.items() if key != letter]
     v = np.abs(grid[speed]) if v is None and speed else v
     if v is None:
-        return Found(frozenset(misled), tuple(axes))
+        return _Found(frozenset(misled), tuple(axes))
     for one in usable:
         if one.quantity == ACCELERATION:
             rates = [other for other in usable if other.quantity == RATE]
@@ -188,7 +187,7 @@ def along_axes(
     known |= {k: grid[one] for k, one in (("r", yaw_rate), ("a_y", lateral)) if one}
     if across and {"r", "a_y"} <= set(known):
         axes += _sideways(grid, across, v, known["r"], known["a_y"])
-    return Found(frozenset(misled), tuple(axes), frozenset(oblique))
+    return _Found(frozenset(misled), tuple(axes), frozenset(oblique))
 
 
 def _forward(grid: _Grid, triad: Triad, v: Array | None) -> tuple[str, float] | None:
@@ -197,14 +196,14 @@ def _forward(grid: _Grid, triad: Triad, v: Array | None) -> tuple[str, float] | 
     sizes = {letter: math.sqrt(float(np.nanmean(one**2))) for letter, one in values.items()}
     best = max(sizes, key=lambda letter: sizes[letter])
     second = sorted(sizes.values())[-2]
-    if best == "x" or sizes[best] < CLEAR * second or not sizes[best] > 0.0:
+    if best == "x" or sizes[best] < _CLEAR * second or not sizes[best] > 0.0:
         return None
     if v is not None and _alike(np.abs(values[best]), v) < 0.0:
         return None
     return best, math.copysign(1.0, float(np.nanmean(values[best])))
 
 
-def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array) -> list[Axis]:
+def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array) -> list[_Axis]:
     """Return which velocity is v_y: its change is what a_y has beside v_x r."""
     turning, lateral = v * r, a_y
     size = float(np.nanstd(turning))
@@ -212,12 +211,12 @@ def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array)
     if not size or not slope:
         return []
     missed = lateral / slope - turning  # in the units of v r, which may be no SI: signs are asked
-    alike = {name: _alike(np.gradient(grid[name], STEP), missed) for name in names}
+    alike = {name: _alike(np.gradient(grid[name], _STEP), missed) for name in names}
     best = max(alike, key=lambda name: abs(alike[name]))
-    if abs(alike[best]) < SURE:
+    if abs(alike[best]) < _SURE:
         return []
     why = "its change is what ay has beside vx r"
-    return [Axis(best, "v_y", math.copysign(1.0, alike[best]), why)]
+    return [_Axis(best, "v_y", math.copysign(1.0, alike[best]), why)]
 
 
 def _up(means: Mapping[str, float]) -> tuple[str, float]:
@@ -226,7 +225,7 @@ def _up(means: Mapping[str, float]) -> tuple[str, float]:
     "" where gravity is not in it, "?" where the box lies oblique.
     """
     size = math.sqrt(sum(one * one for one in means.values()))
-    if not any(abs(size / one - 1.0) < NEAR for one in (1.0, GRAVITY)):
+    if not any(abs(size / one - 1.0) < _NEAR for one in (1.0, _GRAVITY)):
         return "", 0.0
     best = max(means, key=lambda letter: abs(means[letter]))
     rest = math.sqrt(max(size * size - means[best] ** 2, 0.0))
@@ -241,9 +240,9 @@ def _of_a_box(
     v: Array,
     yaw_rate: str,
     steering: str,
-) -> list[Axis] | None:
+) -> list[_Axis] | None:
     """Return what the channels of a box are; None where they are what their letters say."""
-    moving = v > SLOW / 2.0 if np.nanmax(v) > SLOW else np.ones(v.size, dtype=bool)
+    moving = v > _SLOW / 2.0 if np.nanmax(v) > _SLOW else np.ones(v.size, dtype=bool)
     values = {letter: grid[name] for letter, name in box.names.items()}
     turns = {} if gyro is None else {letter: grid[name] for letter, name in gyro.names.items()}
     if yaw_rate:
@@ -257,7 +256,7 @@ def _of_a_box(
         if along not in (about, up[0])
     }
     about, along = max(pairs, key=lambda pair: abs(pairs[pair]), default=("", ""))
-    if abs(pairs.get((about, along), 0.0)) < SURE:
+    if abs(pairs.get((about, along), 0.0)) < _SURE:
         return None if up[0] in ("", "z") else []
     as_lettered = along == "y" and "z" in (about or "z", up[0] or "z")
     if as_lettered and (not up[1] or (up[1] > 0.0 and pairs[about, along] > 0.0)):
@@ -265,17 +264,17 @@ def _of_a_box(
     r = turns[about]
     sign = (up[1] or 1.0) if about else 1.0
     steers = _alike((v * grid[steering])[moving], r[moving]) if about and steering else 0.0
-    if abs(steers) > LIKELY:
+    if abs(steers) > _LIKELY:
         sign = math.copysign(1.0, steers)
     axes = []
     if about and gyro is not None:
-        axes.append(Axis(gyro.names[about], "r", sign, f"about {about}, which is up"))
+        axes.append(_Axis(gyro.names[about], "r", sign, f"about {about}, which is up"))
     side = sign * math.copysign(1.0, pairs[about, along])
-    axes.append(Axis(box.names[along], "a_y", side, f"along {along} it goes as vx r"))
+    axes.append(_Axis(box.names[along], "a_y", side, f"along {along} it goes as vx r"))
     vertical = about or up[0]
-    left = next(one for one in LETTERS if one not in (along, vertical))
-    change = _alike(np.gradient(v, STEP)[moving], values[left][moving])
-    if vertical and abs(change) > LIKELY:
+    left = next(one for one in _LETTERS if one not in (along, vertical))
+    change = _alike(np.gradient(v, _STEP)[moving], values[left][moving])
+    if vertical and abs(change) > _LIKELY:
         why = f"along {left} it goes as the change of the speed"
-        axes.append(Axis(box.names[left], "a_x", math.copysign(1.0, change), why))
+        axes.append(_Axis(box.names[left], "a_x", math.copysign(1.0, change), why))
     return axes

@@ -5,19 +5,22 @@ its header, and where there is none (or it is not set) the time at which the bag
 counts from the first message that is read of any topic.
 """
 
+import re
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.bounded import bounded
+from models.limits import limits
 from models.logs.cdr import (
     ORDERS,
     PREFIX,
@@ -34,56 +37,24 @@ from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError
-from models.logs.magic import MCAP, ROS1, SQLITE
+from models.logs.magic import BAG_METADATA, MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
-from models.schema import require_few
+from models.schema import CHUNK, most_unpacked, read_text, require_dense, require_few
 
 _NS = 1e9  # in a second
 _OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
-PROBED = 20  # messages that a rate is taken from
-TOGETHER, BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
+_PROBED = 20  # messages that a rate is taken from
+_TOGETHER, _BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
 _STAMPS = ("header.stamp.", "stamp.")
-TIME = ("sec", "nanosec")
+_TIME = ("sec", "nanosec")
 
-# Messages that cars tell their motion by and that are in no distribution of ROS.
-_DRIVE = "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n" + (
-    "float32 acceleration\nfloat32 jerk"
-)
-_STEERING = "builtin_interfaces/Time stamp\nfloat32 steering_tire_angle"
-_VELOCITY = "std_msgs/Header header\nfloat32 longitudinal_velocity\nfloat32 lateral_velocity\n" + (
-    "float32 heading_rate"
-)
-KNOWN = {
-    "ackermann_msgs/msg/AckermannDrive": _DRIVE,
-    "ackermann_msgs/msg/AckermannDriveStamped": (
-        "std_msgs/Header header\nackermann_msgs/AckermannDrive drive"
-    ),
-    "autoware_vehicle_msgs/msg/SteeringReport": _STEERING,
-    "autoware_vehicle_msgs/msg/VelocityReport": _VELOCITY,
-    "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
-    "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
-}
-# By package-free type and field: the unit of it and of all in it.
-UNITS = {
-    ("Twist", "linear"): "m/s", ("Twist", "angular"): "rad/s", ("Accel", "linear"): "m/s^2",
-    ("Accel", "angular"): "rad/s^2", ("Pose", "position"): "m",
-    ("Imu", "angular_velocity"): "rad/s", ("Imu", "linear_acceleration"): "m/s^2",
-    ("AckermannDrive", "steering_angle"): "rad",
-    ("AckermannDrive", "steering_angle_velocity"): "rad/s", ("AckermannDrive", "speed"): "m/s",
-    ("AckermannDrive", "acceleration"): "m/s^2", ("AckermannDrive", "jerk"): "m/s^3",
-    ("SteeringReport", "steering_tire_angle"): "rad",
-    ("VelocityReport", "longitudinal_velocity"): "m/s",
-    ("VelocityReport", "lateral_velocity"): "m/s", ("VelocityReport", "heading_rate"): "rad/s",
-}  # fmt: skip
-PACKAGES = (
-    "geometry_msgs", "sensor_msgs", "ackermann_msgs", "autoware_vehicle_msgs",
-    "autoware_auto_vehicle_msgs",
-)  # fmt: skip
+_TABLES = tomllib.loads(Path(__file__).with_name("ros.toml").read_text(encoding="utf-8"))
+_KNOWN: Mapping[str, str] = _TABLES["known"]  # definitions by type
+_PACKAGES = tuple(_TABLES["packages"]["known"].split())  # whose types have units
 
 
 class _Topic(NamedTuple):
     """Messages of one name and type.
-
     stamp: begins the paths of its clock, None where that is the bag's; zero: of its clock [ns].
     """
 
@@ -184,7 +155,6 @@ def _moving(path: Path, bag: Any) -> list[_Moving]:
 
 def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
     """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
-
     It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
     """
     order, place = ORDERS.get(bytes(raw[:2])), PREFIX
@@ -229,7 +199,7 @@ def _opened(path: Path) -> Iterator[Any]:
     """Open a bag; what is compressed in it unpacks to no more than is allowed."""
     plugin = _plugin(path)
     reader = need(path, "rosbags.rosbag2.reader", "ROS 2 bags", "ros")
-    with bounded(path):
+    with _bounded(path):
         storage = reader.Reader.STORAGE_PLUGINS[plugin]
         bag = storage(path)
         storage.open(bag)
@@ -243,7 +213,7 @@ def _definitions(path: Path, bag: Any) -> tuple[Definitions, dict[str, str]]:
     """Return the definitions of types, the bag's own first, and why a topic has none."""
     typesys = need(path, "rosbags.typesys", "ROS 2 bags", "ros")
     result = dict(typesys.get_typestore(typesys.Stores.LATEST).fielddefs)
-    for kind, text in KNOWN.items():
+    for kind, text in _KNOWN.items():
         result.update(typesys.get_types_from_msg(text, kind))
     bad: dict[str, str] = {}
     for connection in bag.connections:
@@ -284,7 +254,8 @@ def _topics(
             continue
         try:
             fields = tuple(fields_of(definitions, kind))
-            stamp = next((one for one in _STAMPS if _has_time(fields, one)), None)
+            paths = {field.path for field in fields}
+            stamp = next((s for s in _STAMPS if {s + one for one in _TIME} <= paths), None)
             kept = tuple(one for one in fields if stamp is None or not one.path.startswith(stamp))
             if not kept:
                 continue
@@ -297,10 +268,6 @@ def _topics(
             topic = topic._replace(stamp=None)
         found.append((topic._replace(zero=first if stamped is None else stamped), first))
     return _with_zero(found), rates, skipped
-
-
-def _has_time(fields: Sequence[Field], stamp: str) -> bool:
-    return {stamp + one for one in TIME} <= {field.path for field in fields}
 
 
 def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
@@ -325,12 +292,11 @@ def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
 
 def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None, float]:
     """Return when the first message was received, its stamp if it has one [ns], and the rate [Hz].
-
     The rate is that of the first messages: a topic may be silent for most of a bag.
     """
     received: list[int] = []
     stamps: list[int] = []
-    for _, time, raw in islice(_messages(bag, [topic]), PROBED):
+    for _, time, raw in islice(_messages(bag, [topic]), _PROBED):
         try:
             layout = layout_of(definitions, topic.kind, raw)
         except CdrError:
@@ -373,7 +339,7 @@ class _Reading:
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)
-        if len(self.raws) == TOGETHER or self.bytes > BYTES:
+        if len(self.raws) == _TOGETHER or self.bytes > _BYTES:
             self._read()
 
     def _read(self) -> None:
@@ -435,7 +401,7 @@ def _stamps(layout: Layout, rows: NDArray[np.uint8], stamp: str) -> NDArray[np.i
     """Return the stamps of messages [ns]."""
     sec, nanosec = (
         numbers(layout, rows, Field(stamp + name, (), kind)).astype(np.int64)
-        for name, kind in zip(TIME, ("i4", "u4"), strict=True)
+        for name, kind in zip(_TIME, ("i4", "u4"), strict=True)
     )
     return np.asarray(sec * 1_000_000_000 + nanosec)
 
@@ -444,8 +410,8 @@ def _unit(field: Field) -> str:
     """Return the unit that the type of a known message gives."""
     for kind, name in reversed(field.owners):
         package, _, word = kind.partition("/")
-        unit = UNITS.get((word.rpartition("/")[2], name))
-        if unit and package in PACKAGES:
+        unit: str = _TABLES["units"].get(f"{word.rpartition('/')[2]}.{name}", "")
+        if unit and package in _PACKAGES:
             return unit
     return ""
 
@@ -456,3 +422,84 @@ def _said(topics: Sequence[_Topic], skipped: Mapping[str, str]) -> tuple[str, ..
         *noted("no stamp in the message, its clock is when the bag received it", received),
         *noted("not read", [f"{name} ({why})" for name, why in skipped.items()]),
     )
+
+
+# Limits on what rosbags does with a bag, whatever the bag says of itself.
+#
+# Its compressed parts unpack to no more than is allowed. Its metadata, which are YAML, may not be
+# deep: the parser takes the square of it; what they say of the quality of service is not parsed.
+
+_Unpack = Callable[[bytes, int], bytes]
+_DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
+
+
+@contextmanager
+def _bounded(path: Path) -> Iterator[None]:
+    """Let rosbags read with limits."""
+    reader, mcap, sqlite = (
+        need(path, f"rosbags.rosbag2.{name}", "ROS 2 bags", "ros")
+        for name in ("reader", "storage_mcap", "storage_sqlite3")
+    )
+    lz4 = need(path, "lz4.frame", "ROS 2 bags", "ros")
+    zstd = mcap.zstd
+    if path.is_dir():
+        _require_shallow(path / BAG_METADATA)
+        for one in sorted(path.glob("*.zstd")):
+            _require_small(one, zstd)
+
+    def of_zstd(data: bytes, size: int) -> bytes:
+        _require_allowed(path, size, len(data))
+        return bytes(zstd.ZstdDecompressor().decompress(data, max_length=size + 1))
+
+    def of_lz4(data: bytes, size: int) -> bytes:
+        _require_allowed(path, size, len(data))
+        return bytes(lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
+
+    def of_message(data: bytes) -> bytes:
+        most = most_unpacked(len(data))
+        message = bytes(zstd.ZstdDecompressor().decompress(data, max_length=most + 1))
+        _require_allowed(path, len(message), len(data))
+        return message
+
+    table: dict[str, _Unpack] = mcap.DECOMPRESSORS
+    before = dict(table)
+    table.update(zstd=of_zstd, lz4=of_lz4)
+    reader.zstd = SimpleNamespace(open=zstd.open, decompress=of_message)
+    parse = reader.parse_qos
+    for module in (reader, mcap, sqlite):
+        module.parse_qos = lambda _: []
+    try:
+        yield
+    finally:
+        table.update(before)
+        reader.zstd = zstd
+        for module in (reader, mcap, sqlite):
+            module.parse_qos = parse
+
+
+def _require_shallow(path: Path) -> None:
+    """Refuse metadata of more levels than is allowed."""
+    text = read_text(path, RecordingError)
+    depth = deepest = 0
+    for mark in re.findall(r"[\[\]{}]", text):
+        depth += 1 if mark in "[{" else -1
+        deepest = max(deepest, depth)
+    indent = max((len(line) - len(line.lstrip()) for line in text.splitlines()), default=0) // 2
+    require_few(RecordingError, str(path), max(deepest, indent), "depth", "levels of metadata")
+    if _DEEP.search(text):
+        raise RecordingError(f"{path}: must not hold lists in lists")
+
+
+def _require_allowed(path: Path, size: int, packed: int) -> None:
+    require_few(RecordingError, str(path), size / 1e6, "block", "megabytes of a chunk")
+    require_dense(RecordingError, str(path), size, packed, "chunks")
+
+
+def _require_small(path: Path, zstd: Any) -> None:
+    """Refuse a file that unpacks to more than is allowed."""
+    size, most = 0, 1e6 * limits().megabytes
+    with zstd.open(path, "rb") as file:
+        while size <= most and (part := file.read(CHUNK)):
+            size += len(part)
+            require_dense(RecordingError, str(path), size, path.stat().st_size, "zstd data")
+    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes unpacked")

@@ -1,12 +1,21 @@
 """Logs of a CAN bus with the DBC that tells its signals: each is a channel "Frame.Signal".
 
-A log holds bytes; where in them a signal lies, its factor, offset and unit are the DBC's. Raw
-values that the DBC names as not available or invalid are NaN.
+Logs keep frames as ASC, BLF, candump, TRC, tables in text, MDF4 with a bus. They are gathered by
+bus and identifier, times beside bytes; what is no data frame, or not in the database, is counted.
+Those of J1939 are known by their parameter group: priority and addresses of the sender, and of the
+receiver where the group has one, may differ from the database's. Where in the bytes a signal lies,
+its factor, offset and unit are the DBC's. Raw values that the DBC names as not available or invalid
+are NaN.
 """
 
+import csv
+import math
 import re
+import struct
+import zlib
+from array import array
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -15,13 +24,368 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
+from codegen.escape import shown
+from models.limits import limits
 from models.logs.foreign import need, one_line
-from models.logs.frames import EXTENDED, FROM_ALL, Frames, Known, gather, group_of
 from models.logs.grouped import GroupedLog, Samples
+from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import HEAD, frames_in
-from models.logs.stamps import typical_rate
-from models.schema import LONGEST_NAME, read_bytes
+from models.logs.mdf import is_bus, opened
+from models.logs.stamps import CALENDAR, nanoseconds, since, typical_rate
+from models.schema import LONGEST_NAME, read_bytes, require_few
+
+_FRAME = "CAN_DataFrame"  # of MDF
+_NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
+_TOGETHER = 1 << 16  # frames that are stored at a time
+_SHORT = 0x7FF  # largest identifier of 11 bits
+_EXTENDED = 1 << 31  # marks an identifier of 29 bits
+_IDENTIFIER = (1 << 29) - 1
+_INFLATION = 1032  # most bytes that deflate makes of one
+_OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
+_CONTAINER, _DEFLATED = 10, 2
+_METHOD = struct.Struct("<H14x")  # of a container, before its data
+_FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
+
+_Key = tuple[str, int]  # bus, identifier with _EXTENDED
+_FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
+
+
+def _group_of(identifier: int) -> int:
+    group = (identifier >> 8) & 0x3FFFF
+    return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00  # else it has a receiver
+
+
+@dataclass(frozen=True)
+class _Known:
+    """The frames of a database.
+    widths : how many bytes they have, by identifier with `_EXTENDED`.
+    groups : parameter group of J1939 -> identifier of it in the database.
+    """
+
+    widths: Mapping[int, int]
+    groups: Mapping[int, int]
+
+    def named(self, identifier: int) -> int | None:
+        """Return the identifier by which the database knows a frame; None where it does not."""
+        if identifier in self.widths:
+            return identifier
+        return self.groups.get(_group_of(identifier)) if identifier & _EXTENDED else None
+
+
+class _Frames(NamedTuple):
+    """Frames of one identifier on one bus.
+    t: (n,) [s]; data: (n, bytes).
+    """
+
+    t: Array
+    data: NDArray[np.uint8]
+
+
+class _Gathered:
+    """Frames of one identifier as they come, all of the same bytes."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self._times = array("d")
+        self._bytes = bytearray()
+        self._t, self._data = Growing(), Growing(np.uint8)
+
+    def add(self, time: float, data: bytes) -> None:
+        self._times.append(time)
+        self._bytes += data[: self.width]
+        if len(self._times) == _TOGETHER:
+            self._store()
+
+    def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
+        """Take the next frames.   times : (n,) [s].   data : (n, bytes)."""
+        self._t.extend(times)
+        self._data.extend(data[:, : self.width].reshape(-1))
+
+    def _store(self) -> None:
+        if self._times:
+            times, data = np.frombuffer(self._times), np.frombuffer(self._bytes, np.uint8)
+            self.extend(times, data.reshape(-1, self.width))
+            self._times, self._bytes = array("d"), bytearray()
+
+    def finished(self) -> _Frames:
+        self._store()
+        return _Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
+
+
+def _in_order(frames: _Frames) -> _Frames:
+    """Return frames in the order of their times: groups of a file follow one another."""
+    t, data = frames
+    if all(np.all(np.diff(t[part]) >= 0.0) for part in blocks(t.size, overlap=1)):
+        return frames
+    order = np.argsort(t, kind="stable")
+    sorted_data = Growing(np.uint8)
+    for part in blocks(t.size):
+        sorted_data.extend(data[order[part]].reshape(-1))
+    times = filled(t.size, lambda part: t[order[part]])
+    return _Frames(times, sorted_data.finished().reshape(-1, data.shape[1]))
+
+
+class _Log(NamedTuple):
+    """Frames of a log by bus and identifier; how many others it has, by what they are."""
+
+    format: str
+    frames: dict[_Key, _Frames]
+    others: Counter[str]
+
+
+def _gather(path: Path, kind: str, known: _Known) -> _Log:
+    if kind == "MDF4":
+        return _of_mdf(path, known)
+    found: dict[_Key, _Gathered] = {}
+    others: Counter[str] = Counter()
+    count = 0
+    for message in _messages(path, kind):
+        identifier = message.arbitration_id | (_EXTENDED if message.is_extended_id else 0)
+        if message.is_error_frame or message.is_remote_frame:
+            others["error and remote"] += 1
+        elif (named := known.named(identifier)) is None:
+            others["unknown"] += 1
+        elif len(message.data) < (width := known.widths[named]):
+            others["cut short"] += 1
+        else:
+            key = str(message.channel), identifier
+            if key not in found:
+                found[key] = _Gathered(width)
+            found[key].add(message.timestamp, message.data)
+            count += 1
+            if count % _TOGETHER == 0:
+                require_few(RecordingError, str(path), count, "samples", "frames")
+    frames = {key: one.finished() for key, one in found.items()}
+    first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
+    if first > CALENDAR:
+        for key, kept in frames.items():
+            frames[key] = kept._replace(t=since(kept.t, first))
+    return _Log(f"CAN {kind}", frames, others)
+
+
+def _messages(path: Path, kind: str) -> Iterator[Any]:
+    if kind in ("CSV", "candump text"):
+        yield from _of_table(path) if kind == "CSV" else _of_lines(path)
+        return
+    io = need(path, "can.io", "CAN logs", "can")
+    if kind == "BLF":
+        _require_whole_blf(path)
+        with io.BLFReader(path) as reader:
+            yield from reader
+        return
+    reader_of = {"ASC": io.ASCReader, "candump": io.CanutilsLogReader, "TRC": io.TRCReader}[kind]
+    with path.open("r", encoding="latin-1") as text, reader_of(text) as reader:
+        messages = iter(reader)
+        for message in messages:
+            if getattr(reader, "timestamps_format", None) == "relative":
+                raise RecordingError(
+                    f"{path}: its times count from the frame before each; save it with "
+                    "timestamps absolute"
+                )
+            yield message
+
+
+class _Frame(NamedTuple):
+    timestamp: float
+    arbitration_id: int
+    data: bytes
+    channel: str
+    is_extended_id: bool
+    is_error_frame: bool = False
+    is_remote_frame: bool = False
+
+
+_LINE = re.compile(  # of candump without -L: (1600000000.123456)  can0  18F0093E   [8]  01 02 ...
+    r"\s*\((?P<time>[\d.]+|[\d-]+ [\d:.]+)\)\s+(?P<bus>\w+)\s+(?:[RT]X\s[- \w]*\s)?"
+    r"(?P<id>[0-9A-Fa-f]{3,8})\s+\[\d+\]\s+(?P<data>remote request|(?:[0-9A-Fa-f]{2}\s*)*)"
+)
+
+
+def _of_lines(path: Path) -> Iterator[_Frame]:
+    before = -math.inf
+    with path.open("r", encoding="latin-1") as text:
+        for number, line in enumerate(text, start=1):
+            found = _LINE.match(line)
+            if found is None:
+                if line.strip():
+                    raise RecordingError(
+                        f"{path}: line {number} has no time in front of its frame; record with "
+                        "candump -L"
+                    )
+                continue
+            ns = None if "." in found["time"][:12] else nanoseconds(found["time"])
+            time = float(found["time"]) if ns is None else ns / 1e9
+            if time < before - 1.0:
+                raise RecordingError(
+                    f"{path}: line {number} is {before - time:.3g} s before the one above: times "
+                    "must count from one instant; record with candump -L"
+                )
+            before = time
+            word = found["id"]
+            remote = found["data"].startswith("remote")
+            data = b"" if remote else bytes.fromhex(found["data"])
+            yield _Frame(time, int(word, 16), data, found["bus"], len(word) > 3, False, remote)
+
+
+_COLUMNS = {  # of tables of frames, by what each is
+    "time": "timestamp time timestampus timestamps t",
+    "id": "id addr address messageid arbitrationid canid identifier",
+    "bus": "bus channel interface",
+    "long": "extended ext ide isextended",
+    "data": "data message payload d0 d1",
+}
+
+
+def _of_table(path: Path) -> Iterator[_Frame]:
+    """Yield the frames of a table in text; identifiers and bytes are hexadecimal."""
+    with path.open("r", encoding="utf-8-sig", errors="replace", newline="") as text:
+        rows = csv.reader(text, delimiter=";" if ";" in text.readline() else ",")
+        text.seek(0)
+        header = [re.sub("[^a-z0-9]", "", one.lower()) for one in next(rows, [])]
+        at = {
+            what: next((header.index(one) for one in names.split() if one in header), -1)
+            for what, names in _COLUMNS.items()
+        }
+        if min(at["time"], at["id"], at["data"]) < 0:
+            lacking = ", ".join(what for what in ("time", "id", "data") if at[what] < 0)
+            raise RecordingError(f"{path}: a table of frames must have a column for {lacking}")
+        many = header[at["data"]] in ("d0", "d1")  # a byte a column
+        decimal = header[at["id"]] in ("addr", "address")
+        for number, row in enumerate(rows, start=2):
+            if not row:
+                continue
+            try:
+                word, cell = row[at["id"]].strip(), row[at["time"]].strip()
+                identifier = int(word, 10 if decimal and word.isdigit() else 16)
+                rest = row[at["data"] :] if many else row[at["data"]].split()
+                data = bytes.fromhex("".join(one.strip().removeprefix("0x") for one in rest))
+                # SavvyCAN counts whole microseconds, all others seconds.
+                time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
+                given = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
+                extended = given in ("true", "1") if given else identifier > _SHORT
+                bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"
+            except (ValueError, IndexError):
+                raise RecordingError(
+                    f"{path}: line {number} must hold a frame: time, identifier and bytes in "
+                    f"hexadecimal, not {shown(','.join(row))}"
+                ) from None
+            yield _Frame(time, identifier & _IDENTIFIER, data, bus, extended)
+
+
+def _require_whole_blf(path: Path) -> None:
+    """Refuse a file that is shorter than it says, or inflates to more than is allowed."""
+    most = 1e6 * limits().block
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(144)
+        given = _FILE_SIZE.unpack_from(head, 16)[0]
+        if given > size:
+            raise RecordingError(f"{path}: is cut off, it has {size} of {given} bytes")
+        file.seek(struct.unpack_from("<I", head, 4)[0])
+        while len(mark := file.read(_OBJECT.size)) == _OBJECT.size:
+            signature, _, _, length, kind = _OBJECT.unpack(mark)
+            if signature != b"LOBJ" or length < _OBJECT.size or length > size:
+                return  # the reader says so
+            body = length - _OBJECT.size
+            if kind == _CONTAINER and body * _INFLATION > most:
+                data = file.read(body)
+                size_of = len(data) - _METHOD.size
+                if size_of > 0 and _METHOD.unpack_from(data)[0] == _DEFLATED:
+                    unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
+                    size_of = len(unpacked)
+                require_few(
+                    RecordingError, str(path), size_of / 1e6, "block", "megabytes of a block"
+                )
+                body = 0
+            file.seek(body + length % 4, 1)
+
+
+def _of_mdf(path: Path, known: _Known) -> _Log:
+    """Read the frames of the buses that an MDF4 file logs."""
+    found: dict[_Key, _Gathered] = {}
+    others: Counter[str] = Counter()
+    with opened(path, "CAN frames of MDF") as file:
+        if str(file.version) < "4":
+            raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
+        for number, group in enumerate(file.groups):
+            samples = int(group.channel_group.cycles_nr)
+            require_few(RecordingError, str(path), samples, "samples", "frames")
+            if not is_bus(group):
+                continue
+            names = _names(group)
+            if not {f"{_FRAME}.ID", f"{_FRAME}.DataBytes"} <= names:  # no data frames of a CAN bus
+                known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
+                others["error and remote" if known_others else "other"] += samples
+                continue
+            for first in range(0, samples, _TOGETHER):
+                part = _of_group(file, number, first, min(_TOGETHER, samples - first))
+                _sort(part, known, found, others)
+    return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
+
+
+def _names(group: Any) -> set[str]:
+    return {channel.name for channel in group.channels}
+
+
+class _Part(NamedTuple):
+    """Some frames of a group: all of (n,), but for the data (n, bytes)."""
+
+    t: Array
+    ids: NDArray[np.int64]
+    buses: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    data: NDArray[np.uint8]
+
+
+def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
+    names = _names(file.groups[number])
+
+    def signal(name: str) -> Any:
+        full = f"{_FRAME}.{name}"
+        if full not in names:
+            return None
+        return file.get(
+            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=first,
+            record_count=count,
+        )  # fmt: skip
+
+    def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
+        found = signal(name)
+        return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
+
+    identifiers, data = signal("ID"), signal("DataBytes")
+    bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
+    raw = identifiers.samples.astype(np.int64)
+    ids = raw & _IDENTIFIER
+    is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > _SHORT)) != 0
+    return _Part(
+        np.asarray(identifiers.timestamps, dtype=np.float64),
+        np.where(is_long, ids | _EXTENDED, ids),
+        whole("BusChannel", 0),
+        np.minimum(whole("DataLength", bytes_.shape[1]), bytes_.shape[1]),
+        bytes_,
+    )
+
+
+def _sort(part: _Part, known: _Known, found: dict[_Key, _Gathered], others: Counter[str]) -> None:
+    """Add frames to those of their bus and identifier."""
+    for identifier in np.unique(part.ids).tolist():
+        mine = part.ids == identifier
+        named = known.named(identifier)
+        if named is None:
+            others["unknown"] += int(mine.sum())
+            continue
+        width = known.widths[named]
+        whole = mine & (part.sizes >= width)
+        others["cut short"] += int(mine.sum() - whole.sum())
+        for bus in np.unique(part.buses[whole]).tolist():
+            which = whole & (part.buses == bus)
+            frames = found.setdefault((str(bus), identifier), _Gathered(width))
+            frames.extend(part.t[which], part.data[which])
+
+
+# Signals of frames, by a DBC.
 
 _FLOATS = (16, 32, 64)  # bits of a signal that is a float
 _LONGEST_SIGNAL = 64  # bits
@@ -53,13 +417,12 @@ class _Group:
         """Return a signal in its unit, (n,)."""
         data, sent = self.data, self.sent
         return filled(
-            self.t.size, lambda part: values_of(data[part if sent is None else sent[part]], signal)
+            self.t.size, lambda part: _values_of(data[part if sent is None else sent[part]], signal)
         )
 
 
 class _Place(NamedTuple):
     """Where a channel is: with which others it is sent, and the signal of the DBC.
-
     fault: why it cannot be read as the DBC tells it, "" where it can.
     """
 
@@ -69,13 +432,12 @@ class _Place(NamedTuple):
 
 
 class _Dbc(NamedTuple):
-    """What a DBC tells: messages by identifier, with `EXTENDED`; what is wrong, by their signals.
-
+    """What a DBC tells: messages by identifier, with `_EXTENDED`; what is wrong, by their signals.
     faults: by names of frame and signal, a line each.
     """
 
     messages: dict[int, Any]
-    known: Known
+    known: _Known
     faults: dict[tuple[str, str], str]
 
 
@@ -106,7 +468,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             raise RecordingError(
                 f"{path}: is no CAN log: neither ASC, BLF, candump, TRC, a table of frames nor MDF4"
             )
-        log = gather(path, kind, given.known)
+        log = _gather(path, kind, given.known)
         senders = Counter((bus, given.known.named(one)) for bus, one in log.frames)
         found = [
             (_group(bus, identifier, senders[bus, given.known.named(identifier)]), listed, place)
@@ -133,7 +495,7 @@ def _group(bus: str, identifier: int, senders: int) -> str:
     return f"bus {bus}" + f" from {identifier & 0xFF:02X}" * (senders > 1)
 
 
-def _channels(given: _Dbc, identifier: int, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
+def _channels(given: _Dbc, identifier: int, frames: _Frames) -> Iterator[tuple[Listed, _Place]]:
     """Yield the signals that are sent in the frames of a message."""
     named = given.known.named(identifier)
     assert named is not None
@@ -171,7 +533,7 @@ def _read_dbc(path: Path) -> _Dbc:
         database = need(path, "cantools.database", "DBC", "can")
         found = database.load_string(text, database_format="dbc", strict=False)
         messages = {
-            message.frame_id | (EXTENDED if message.is_extended_frame else 0): message
+            message.frame_id | (_EXTENDED if message.is_extended_frame else 0): message
             for message in found.messages
             if message.length and message.signals
         }
@@ -186,12 +548,12 @@ def _read_dbc(path: Path) -> _Dbc:
     attributes = found.dbc.attributes if found.dbc else {}
     j1939 = "ProtocolType" in attributes and attributes["ProtocolType"].value == "J1939"
     groups = {
-        group_of(key): key
+        _group_of(key): key
         for key, one in messages.items()
-        if key & EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == FROM_ALL)
+        if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == _FROM_ALL)
     }
     widths = {key: one.length for key, one in messages.items()}
-    return _Dbc(messages, Known(widths, groups), faults)
+    return _Dbc(messages, _Known(widths, groups), faults)
 
 
 def _fault(message: Any, signal: Any) -> str:
@@ -228,35 +590,31 @@ def _selectors(message: Any, signal: Any) -> _Selectors:
     return tuple(result)
 
 
-def _sent(frames: Frames, selectors: _Selectors) -> NDArray[np.intp] | None:
+def _sent(frames: _Frames, selectors: _Selectors) -> NDArray[np.intp] | None:
     """Return which frames hold a signal, None where all do: of multiplexed ones not all do."""
     if not selectors:
         return None
     sent = np.ones(frames.t.size, dtype=bool)
     for selector, ids in selectors:
         for part in blocks(sent.size):
-            sent[part] &= np.isin(raw_values(frames.data[part], selector), ids)
+            sent[part] &= np.isin(_raw_values(frames.data[part], selector), ids)
     return np.flatnonzero(sent)
 
 
-def values_of(data: NDArray[np.uint8], signal: Any) -> Array:
+def _values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """Return a signal in its unit, (n,), NaN where the DBC says that a value is no number.
     data : of the frames, (n, bytes).
     """
-    raw = raw_values(data, signal)
+    raw = _raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
-    states = [
-        value for value, name in (signal.choices or {}).items() if _NO_NUMBER.search(_words(name))
-    ]
-    values[np.isin(raw, states)] = np.nan
+    named = {value: str(name).replace("_", " ") for value, name in (signal.choices or {}).items()}
+    values[np.isin(raw, [value for value, name in named.items() if _NO_NUMBER.search(name)])] = (
+        np.nan
+    )
     return values
 
 
-def _words(name: Any) -> str:
-    return str(name).replace("_", " ")
-
-
-def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
+def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     """Return the integers, or floats, of a signal as they are in frames, (n,).
     data : of the frames, (n, bytes).
     """

@@ -18,13 +18,13 @@ from models.limits import limits
 PREFIX = 4  # bytes
 ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 # numpy's kind and bytes of what has a fixed size; no signals are what is given by a bool, or words.
-NUMBERS = {
+_NUMBERS = {
     **{f"int{8 * size}": f"i{size}" for size in (1, 2, 4, 8)},
     **{f"uint{8 * size}": f"u{size}" for size in (1, 2, 4, 8)},
     **{"float32": "f4", "float64": "f8"},
 }
-SIZES = {name: int(kind[1]) for name, kind in NUMBERS.items()} | {"bool": 1, "byte": 1, "char": 1}
-_BASE, NAME, ARRAY, _SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
+_SIZES = {name: int(kind[1]) for name, kind in _NUMBERS.items()} | {"bool": 1, "byte": 1, "char": 1}
+_BASE, _NAME, _ARRAY, _SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
 
 # By name of a type: its constants, and name and node of each field.
 Definitions = Mapping[str, tuple[Any, list[tuple[str, Any]]]]
@@ -36,7 +36,6 @@ class CdrError(TireidError, ValueError):
 
 class Field(NamedTuple):
     """A number of a message.
-
     path: its name, with those of the messages that it lies in; owners: types and fields of these,
     the outermost first; kind: as numpy calls it.
     """
@@ -48,7 +47,6 @@ class Field(NamedTuple):
 
 class Layout(NamedTuple):
     """Where numbers lie in messages of the same lengths.
-
     size: bytes of the message; lengths: place and value of each length; places: of the fields.
     """
 
@@ -66,11 +64,11 @@ def fields_of(
     for name, node in _fields(definitions, kind):
         inner = (*owners, (kind, name))
         number, value = _kind(node), node[1]
-        if number == NAME:
+        if number == _NAME:
             yield from fields_of(definitions, value, f"{prefix}{name}.", inner)
-        elif number == _BASE and value[0] in NUMBERS:
-            yield Field(prefix + name, inner, NUMBERS[value[0]])
-        elif number in (ARRAY, _SEQUENCE) and _kind(value[0]) == NAME:
+        elif number == _BASE and value[0] in _NUMBERS:
+            yield Field(prefix + name, inner, _NUMBERS[value[0]])
+        elif number in (_ARRAY, _SEQUENCE) and _kind(value[0]) == _NAME:
             for _ in fields_of(definitions, value[0][1], "", inner):  # it must be known, too
                 pass
 
@@ -118,15 +116,15 @@ class _Walk:
         for name, node in _fields(self.definitions, kind):
             path = None if prefix is None else prefix + name
             number, value = _kind(node), node[1]
-            if number in (_BASE, NAME):
+            if number in (_BASE, _NAME):
                 self.one(node, path, depth)
             else:
-                count = value[1] if number == ARRAY else self.length()
+                count = value[1] if number == _ARRAY else self.length()
                 self.many(value[0], count, depth)
 
     def one(self, node: Any, path: str | None, depth: int) -> None:
         number, value = _kind(node), node[1]
-        if number == NAME:
+        if number == _NAME:
             self.message(value, None if path is None else f"{path}.", depth + 1)
         elif number != _BASE:
             raise CdrError("a definition has arrays of arrays")
@@ -155,7 +153,7 @@ class _Walk:
 
     def align(self, name: str) -> int:
         """Go to where a number begins; return its size."""
-        size = SIZES.get(name)
+        size = _SIZES.get(name)
         if size is None:
             raise CdrError(f"a definition has the type {name}, which is not read")
         self.place += -self.place % size

@@ -12,6 +12,7 @@ intervals: a car can build up or lose all its lateral force meanwhile. It ends a
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ class Raw(NamedTuple):
 
 
 def holes(channel: Channel) -> NDArray[np.intp]:
-    """Return which samples of a channel are empty cells where its sensor should have told one.
+    """Return which samples of a channel are empty cells where its sensor should have given one.
 
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
     """
@@ -63,14 +64,8 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     kept = ~np.isnan(channel.values)
     if kept.all() or not kept.any() or (not cut and holes(channel).size):
         return channel
-    return Channel(
-        name=channel.name,
-        unit=channel.unit,
-        t=channel.t[kept],
-        values=channel.values[kept],
-        place=channel.place,
-        rows=channel.rows[kept],
-    )
+    t, values, rows = channel.t[kept], channel.values[kept], channel.rows[kept]
+    return replace(channel, t=t, values=values, rows=rows)
 
 
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:

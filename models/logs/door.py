@@ -15,17 +15,17 @@ from models.logs.magic import GZIP, HEAD, format_of
 from models.logs.table import TableLog
 
 # Endings of names that logs have; "LOG:RUN" is split after one, and a recording's name lacks it.
-TEXTS = (".csv", ".txt", ".dat", ".asc", ".tsv", ".vbo", ".log")  # which gzip may pack
+_TEXTS = (".csv", ".txt", ".dat", ".asc", ".tsv", ".vbo", ".log")  # which gzip may pack
 ENDINGS = (
-    *TEXTS, *(ending + ".gz" for ending in TEXTS), ".parquet", ".mat", ".h5", ".hdf5", ".mf4",
+    *_TEXTS, *(ending + ".gz" for ending in _TEXTS), ".parquet", ".mat", ".h5", ".hdf5", ".mf4",
     ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".npz", ".npy",
 )  # fmt: skip
-OPENERS = {
+_OPENERS = {
     "parquet": "models.logs.parquet:open_parquet", "mdf": "models.logs.mdf:open_",
     "matlab": "models.logs.matlab:open_", "bag": "models.logs.bag:open_",
     "can": "models.logs.can:open_", "text": "models.logs.text:open_text",
 }  # fmt: skip
-_JOINED, LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
+_JOINED, _LONG = "models.logs.joined:open_folder", "models.logs.joined:long_log"
 _RATED = ("text", "parquet", "matlab")  # which may lack a time
 
 
@@ -67,9 +67,9 @@ def open_log(
         if rate and format not in _RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
         given += (rate,) * (format == "matlab")
-        opened: Any = _function(OPENERS[format])(path, *given)
+        opened: Any = _function(_OPENERS[format])(path, *given)
         if isinstance(opened, TableLog) and opened.may_be_long:
-            opened = _function(LONG)(opened.table) or opened
+            opened = _function(_LONG)(opened.table) or opened
         more = {"rate": rate} if isinstance(opened, TableLog) else {}
         log: LogFile = replace(opened, mend=mend, clock_name=clock, clock_unit=clock_unit, **more)
         return log

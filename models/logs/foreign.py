@@ -25,7 +25,7 @@ from models.extras import needs
 from models.logs.log import RecordingError
 
 _LONGEST_REASON = 160  # characters
-FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 _LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 
@@ -42,7 +42,6 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
 @contextmanager
 def one_line(path: Path, format: str) -> Iterator[None]:
     """Let a library read a file: what it raises is a refusal, what it warns of is not said.
-
     What is no fault of the file is not reported as one: a full disk is one, and MemoryError
     stays what it is.
     """
@@ -58,7 +57,7 @@ def one_line(path: Path, format: str) -> Iterator[None]:
                 raise RecordingError(f"{path}: there is no such file") from None
             if isinstance(error, PermissionError):
                 raise RecordingError(f"{path}: may not be read") from None
-            if isinstance(error, OSError) and error.errno in FULL:
+            if isinstance(error, OSError) and error.errno in _FULL:
                 raise RecordingError(
                     f"{path}: cannot be unpacked, there is no room in {tempfile.gettempdir()}; "
                     "name a folder with room by TMPDIR"

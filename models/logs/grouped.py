@@ -21,12 +21,11 @@ from models.schema import require_few
 
 _MOST_NOTED = 5  # names that a note lists
 
-P = TypeVar("P")
+_P = TypeVar("_P")
 
 
 class Samples(NamedTuple):
     """What was asked for on one clock.
-
     clock: its name, for messages; t: times as in the file [s], (n,); values: by name as listed,
     (n,).
     """
@@ -37,7 +36,7 @@ class Samples(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class GroupedLog(Generic[P]):
+class GroupedLog(Generic[_P]):
     """A log of groups of channels, as `LogFile` says.
     place : what a sample is in the file: "message" or "sample".
     channels : as listed, each with where the format finds it.
@@ -56,9 +55,9 @@ class GroupedLog(Generic[P]):
     format: str
     what: str
     place: str
-    channels: tuple[tuple[Listed, P], ...]
+    channels: tuple[tuple[Listed, _P], ...]
     said: tuple[str, ...]
-    samples: Callable[[Sequence[tuple[Listed, P]]], list[Samples]]
+    samples: Callable[[Sequence[tuple[Listed, _P]]], list[Samples]]
     mend: bool = False
     clock_name: str = ""
     clock_unit: str = ""
@@ -71,13 +70,13 @@ class GroupedLog(Generic[P]):
         format: str,
         what: str,
         place: str,
-        found: Sequence[tuple[str, Listed, P]],
+        found: Sequence[tuple[str, Listed, _P]],
         said: tuple[str, ...],
-        samples: Callable[[Sequence[tuple[Listed, P]]], list[Samples]],
+        samples: Callable[[Sequence[tuple[Listed, _P]]], list[Samples]],
         *,
         missing: str,
         remedy: str = "",
-    ) -> "GroupedLog[P]":
+    ) -> "GroupedLog[_P]":
         """Return the log of channels whose names may repeat.
         missing : what the file does not hold where there are none, for the message.
         """
@@ -85,7 +84,7 @@ class GroupedLog(Generic[P]):
             why = "".join(f"; {one}" for one in (*said, remedy) if one)
             raise RecordingError(f"{path}: holds no {missing}{why}")
         require_few(RecordingError, str(path), len(found), "columns", "channels")
-        names = unique((group, listed.name) for group, listed, _ in found)
+        names = _unique((group, listed.name) for group, listed, _ in found)
         return cls(
             path=path,
             format=format,
@@ -163,7 +162,7 @@ class GroupedLog(Generic[P]):
         )
 
 
-def unique(names: Iterable[tuple[str, str]]) -> list[str]:
+def _unique(names: Iterable[tuple[str, str]]) -> list[str]:
     """Return names; what several share gets the name of its group before it, then a number
     behind.
     """

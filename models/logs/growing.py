@@ -34,13 +34,10 @@ def _told(file: IO[bytes] | None) -> Iterator[None]:
 
 
 class Growing:
-    """A column of unknown length.
-    in_memory : how many it holds before it goes to disk; None takes `LONGEST_IN_MEMORY`.
-    """
+    """A column of unknown length, which goes to disk where it is long."""
 
-    def __init__(self, dtype: Any = np.float64, in_memory: int | None = None) -> None:
+    def __init__(self, dtype: Any = np.float64) -> None:
         self._dtype = np.dtype(dtype)
-        self._in_memory = LONGEST_IN_MEMORY if in_memory is None else in_memory
         self._parts: list[NDArray[Any]] = []
         self._file: IO[bytes] | None = None
         self._size = 0
@@ -54,7 +51,7 @@ class Growing:
         part = np.array(values, dtype=self._dtype)
         self._size += part.size
         self._parts.append(part)
-        if self._file is None and self._size <= self._in_memory:
+        if self._file is None and self._size <= LONGEST_IN_MEMORY:
             return
         if self._file is None:
             with _told(None):

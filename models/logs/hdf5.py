@@ -17,7 +17,7 @@ from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import require_few, swells
 
-OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
+_OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 _LONGEST_TEXT, _MOST_TEXTS = 1_000_000, 10_000  # bytes of all texts of a dataset, how many they are
 
 
@@ -26,7 +26,7 @@ def read_tree(path: Path) -> dict[str, Tree]:
     h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
     with h5py.File(path, "r") as file:
         reader = _Reader(path, h5py, file)
-        return {name: reader.tree(one, 0) for name, one in reader.members(file) if name not in OWN}
+        return {name: reader.tree(one, 0) for name, one in reader.members(file) if name not in _OWN}
 
 
 class _Reader:

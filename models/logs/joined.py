@@ -15,8 +15,8 @@ from models.logs.table import Kind, Table, TableLog, kind_of
 from models.schema import require_few
 
 # A table with a row for each value: what the columns of names and of values are called.
-NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
-VALUES = ("value", "val", "data", "values", "reading")
+_NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
+_VALUES = ("value", "val", "data", "values", "reading")
 
 
 def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:
@@ -33,7 +33,8 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
             f"{path}: is a folder of logs with the same channels, drives and no messages of one; "
             f"name them: {some([one.name for one in logs])}"
         )
-    starts = {file: _start(log) for file, log in logs.items()}
+    # When the times of each count from [s]: those of the calendar from their first.
+    starts = {f: log.start if isinstance(log, TableLog) else 0.0 for f, log in logs.items()}
     zero = min(starts.values(), default=0.0)
     found = [
         (file.stem, one, (log, one.name, starts[file] - zero))
@@ -45,11 +46,6 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     return GroupedLog.of(
         path, "a log a message", "a log", "row", found, said, _of_files, missing="channel"
     )
-
-
-def _start(log: LogFile) -> float:
-    """Return when the times of a log count from [s]: those of the calendar from their first."""
-    return log.start if isinstance(log, TableLog) else 0.0
 
 
 def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
@@ -71,21 +67,22 @@ def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
 
 def long_log(table: Table) -> GroupedLog[Any] | None:
     """Return the log in a table with a row for each value: time, name, value; None of any other."""
-    bare = ["".join(filter(str.isalpha, one.lower())) for one in table.names]
-    name = next((bare.index(one) for one in NAMES if one in bare), None)
-    value = next((bare.index(one) for one in VALUES if one in bare), None)
-    if name is None or value is None or table.numeric[name] or not table.numeric[value]:
+    names, units, numeric, *_ = table.columns
+    bare = ["".join(filter(str.isalpha, one.lower())) for one in names]
+    name = next((bare.index(one) for one in _NAMES if one in bare), None)
+    value = next((bare.index(one) for one in _VALUES if one in bare), None)
+    if name is None or value is None or numeric[name] or not numeric[value]:
         return None
     words = [one for one in table.first_rows(name) if one]
     clock = find_clock(
-        [one if k not in (name, value) else "" for k, one in enumerate(table.names)],
-        table.units,
+        [one if k not in (name, value) else "" for k, one in enumerate(names)],
+        units,
         table.first_rows,
     )
     if clock is None or clock.column in (name, value) or len(set(words)) == len(words):
         return None
     given = table.first_rows(bare.index("unit")) if "unit" in bare else []
-    units = dict(zip(table.first_rows(name), given, strict=False))
+    unit_of = dict(zip(table.first_rows(name), given, strict=False))
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
     cells = table.cells(kinds)
     require_few(RecordingError, str(table.path), len(cells.words[name].names), "columns", "names")
@@ -98,9 +95,9 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     for k, word in enumerate(cells.words[name].names):
         rows = order[edges[k] : edges[k + 1]]
         rate = typical_rate(t[rows])
-        listed = Listed(name=word, unit=units.get(word, ""), samples=rows.size, rate=rate)
+        listed = Listed(name=word, unit=unit_of.get(word, ""), samples=rows.size, rate=rate)
         found.append(("", listed, rows))
-    said = (f"a row for each value: {table.names[name]} names it; time is {clock.words}",)
+    said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
     read = partial(_of_rows, t, cells.columns[value])
     return GroupedLog.of(
         table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"

@@ -17,10 +17,10 @@ from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.escape import shown, visible
 
-SOME = 12  # names in a message
-LONGEST = 200  # characters of them
+_SOME = 12  # names in a message
+_LONGEST = 200  # characters of them
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 class RecordingError(TireidError, ValueError):
@@ -36,15 +36,13 @@ class Heading(NamedTuple):
 
 class Clock(NamedTuple):
     """The column that is the time.
-
-    column: from 0; name: as in the file; unit: of `units.PER_SECOND`, "hhmmss" or "instant"; epoch:
-    whether it counts from 1970; words: for people.
+    column: from 0; name: as in the file; unit: of `units.PER_SECOND`, "hhmmss" or "instant"; words:
+    for people.
     """
 
     column: int
     name: str
     unit: str
-    epoch: bool
     words: str
 
 
@@ -121,7 +119,7 @@ class LogFile(Protocol):
         """
 
 
-def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
+def chosen(path: Path, names: Sequence[str], known: Mapping[str, _T]) -> list[_T]:
     for name in names:
         if name not in known:
             similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
@@ -146,8 +144,8 @@ def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
     return runs[0] if run is None else run
 
 
-def some(names: Sequence[str], most: int = SOME) -> str:
+def some(names: Sequence[str], most: int = _SOME) -> str:
     """Return names for a message, the first of many, on one line."""
     listing = visible(", ".join(names[:most]))
-    cut = len(names) > most or len(listing) > LONGEST
-    return listing[:LONGEST] + (f", ... ({len(names)})" if cut else "")
+    cut = len(names) > most or len(listing) > _LONGEST
+    return listing[:_LONGEST] + (f", ... ({len(names)})" if cut else "")

@@ -9,13 +9,13 @@ from pathlib import Path
 HEAD = 1 << 12  # bytes that tell a format
 GZIP = b"\x1f\x8b"
 _PARQUET = b"PAR1"
-MDF = (b"MDF     ", b"UnFinMF ")
-HDF5, _HDF5_PLACES = b"\x89HDF\r\n\x1a\n", (0, 512)  # MATLAB puts a header before
+_MDF = (b"MDF     ", b"UnFinMF ")
+_HDF5, _HDF5_PLACES = b"\x89HDF\r\n\x1a\n", (0, 512)  # MATLAB puts a header before
 MATLAB, _MATLAB_ORDERS = b"MATLAB", (b"IM", b"MI")
 SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
 BAG_METADATA = "metadata.yaml"  # in the folder of a bag
-NUMPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"  # an .npz is a ZIP file of .npy
-BLF = b"LOGG"
+_NUMPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"  # an .npz is a ZIP file of .npy
+_BLF = b"LOGG"
 _FRAMES_IN_TEXT = {
     "ASC": re.compile(
         rb"\s*(?://[^\n]*\n\s*)*date\s[^\n]*\n\s*(?://[^\n]*\n\s*)*base\s+(?:hex|dec)\b", re.I
@@ -36,12 +36,12 @@ _FRAMES_IN_TEXT = {
 
 def is_hdf5(head: bytes) -> bool:
     """Whether a file is HDF5, as MATLAB 7.3 writes it or others do."""
-    return any(head[k : k + len(HDF5)] == HDF5 for k in _HDF5_PLACES)
+    return any(head[k : k + len(_HDF5)] == _HDF5 for k in _HDF5_PLACES)
 
 
 def is_numpy(head: bytes) -> bool:
     """Whether a file is an array of NumPy, or an archive of them."""
-    return head.startswith(NUMPY) or (head.startswith(_ZIP) and b".npy" in head[:300])
+    return head.startswith(_NUMPY) or (head.startswith(_ZIP) and b".npy" in head[:300])
 
 
 def is_mat5(head: bytes) -> bool:
@@ -51,9 +51,9 @@ def is_mat5(head: bytes) -> bool:
 
 def frames_in(head: bytes) -> str:
     """Return which log of frames a file is, "" for none; an MDF file may hold some."""
-    if head.startswith(BLF):
+    if head.startswith(_BLF):
         return "BLF"
-    if head.startswith(MDF):
+    if head.startswith(_MDF):
         return "MDF4"
     return next((name for name, form in _FRAMES_IN_TEXT.items() if form.match(head)), "")
 
@@ -66,7 +66,7 @@ def format_of(path: Path, head: bytes) -> str:
         return "bag" if (path / BAG_METADATA).is_file() else "folder"
     if head.startswith(_PARQUET) or path.suffix.lower() == ".parquet":
         return "parquet"
-    if head.startswith(MDF):
+    if head.startswith(_MDF):
         return "mdf"
     if is_hdf5(head) or is_mat5(head) or is_numpy(head):
         return "matlab"

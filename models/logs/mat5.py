@@ -9,6 +9,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,28 +22,31 @@ from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import most_unpacked, require_dense, require_few, swells
 
-HEADER = 128  # bytes
-MATRIX, _COMPRESSED = 14, 15  # types of an element
-NUMBERS = {
+_HEADER = 128  # bytes
+_MATRIX, _COMPRESSED = 14, 15  # types of an element
+_NUMBERS = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
-TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-_CELL, _STRUCT, OBJECT, _CHAR, _SPARSE, _OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
+_TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
 _NUMERIC = range(6, 16)
 _COMPLEX = 0x0800  # flag
 _BEGINNING = 4096  # bytes that hold what a variable of numbers says of itself
 _LARGEST_DIMENSION = 2**40
 
-Load = Callable[[], memoryview]
+_Load = Callable[[], memoryview]
 
 
-class DamagedError(TireidError, ValueError):
+class _DamagedError(TireidError, ValueError):
     """The file is not what it says."""
 
 
 class _Element(NamedTuple):
+    """A part of a variable; end: where the next one begins."""
+
     kind: int
     data: memoryview
+    end: int
 
 
 class _Beginning(NamedTuple):
@@ -59,23 +63,23 @@ class _Beginning(NamedTuple):
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for."""
     with path.open("rb") as file:
-        header = file.read(HEADER)
+        header = file.read(_HEADER)
         order = {b"IM": "<", b"MI": ">"}.get(header[126:128])
         if order is None:
-            raise DamagedError("its header has no byte order")
+            raise _DamagedError("its header has no byte order")
         size = path.stat().st_size
         result: dict[str, Tree] = {}
-        place, held, packed = HEADER, 0, 0
+        place, held, packed = _HEADER, 0, 0
         while place < size:
             file.seek(place)
             tag = file.read(8)
             if len(tag) < 8:
-                raise DamagedError(f"cut off at byte {place}")
+                raise _DamagedError(f"cut off at byte {place}")
             kind, length = struct.unpack(order + "II", tag)
             place += 8
             if length > size - place:
-                raise DamagedError(f"the variable at byte {place - 8} is cut off")
-            if kind in (MATRIX, _COMPRESSED):
+                raise _DamagedError(f"the variable at byte {place - 8} is cut off")
+            if kind in (_MATRIX, _COMPRESSED):
                 variable = _Variable(path, place, length, kind == _COMPRESSED, order)
                 if (found := variable.tree()) is not None:
                     result[found.name] = found.tree
@@ -108,10 +112,10 @@ class _Variable(NamedTuple):
         require_few(RecordingError, where, size / 1e6, "block", "megabytes of a variable")
         require_dense(RecordingError, where, size, self.length, "variables")
         if len(inflated) < 8:
-            raise DamagedError(f"the variable at byte {self.place} is cut off")
+            raise _DamagedError(f"the variable at byte {self.place} is cut off")
         kind, length = struct.unpack(self.order + "II", inflated[:8])
-        if kind != MATRIX or (most is None and length > len(inflated) - 8):
-            raise DamagedError(f"the variable at byte {self.place} is cut off")
+        if kind != _MATRIX or (most is None and length > len(inflated) - 8):
+            raise _DamagedError(f"the variable at byte {self.place} is cut off")
         return memoryview(inflated)[8 : 8 + length]
 
     def tree(self) -> "_Read | None":
@@ -146,57 +150,43 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
     while place + 8 <= len(data):
         kind, length = struct.unpack(order + "II", data[place : place + 8])
         if kind >> 16:  # small: size and type share a word, the data are in the other
-            yield _Element(kind & 0xFFFF, data[place + 4 : place + 4 + min(kind >> 16, 4)])
+            some = data[place + 4 : place + 4 + min(kind >> 16, 4)]
             place += 8
+            yield _Element(kind & 0xFFFF, some, place)
             continue
-        yield _Element(kind, data[place + 8 : place + 8 + length])
+        some = data[place + 8 : place + 8 + length]
         place += 8 + length + (-length % 8)
+        yield _Element(kind, some, place)
 
 
 def _beginning(data: memoryview, order: str) -> _Beginning:
     if not data:
         return _Beginning(6, False, (0, 0), 2, "", data)
-    place, parts = 0, []
-    for element in _elements(data, order):
-        parts.append(element)
-        if len(parts) == 1 and len(element.data) < 8:
-            break
-        if len(parts) == 3:
-            break
+    parts = list(islice(_elements(data, order), 3))
     if len(parts) < 2 or len(parts[0].data) < 8:
-        raise DamagedError("a variable has no flags")
+        raise _DamagedError("a variable has no flags")
     flags = struct.unpack(order + "I", parts[0].data[:4])[0]
     kind = flags & 0xFF
     if kind == _OPAQUE:  # it has no dimensions: name, system, class
         words = [bytes(one.data).decode("latin-1") for one in parts[1:]]
         return _Beginning(kind, False, (0, 0), 0, words[0], data[:0])
     if len(parts) < 3:
-        raise DamagedError("a variable has no name")
+        raise _DamagedError("a variable has no name")
     raw = parts[1].data
     dimensions = [one for (one,) in struct.iter_unpack(order + "i", raw[: len(raw) // 4 * 4])]
     if len(dimensions) < 2 or min(dimensions) < 0:
-        raise DamagedError("a variable has no dimensions")
+        raise _DamagedError("a variable has no dimensions")
     shape = dimensions[0], math.prod(dimensions[1:])
     if math.prod(shape) > _LARGEST_DIMENSION:
-        raise DamagedError("a variable is too large")
-    place = _after(data, order, 3)
+        raise _DamagedError("a variable is too large")
     return _Beginning(
         kind,
         bool(flags & _COMPLEX),
         shape,
         len(dimensions),
         bytes(parts[2].data).decode("latin-1"),
-        data[place:],
+        data[parts[2].end :],
     )
-
-
-def _after(data: memoryview, order: str, count: int) -> int:
-    """Return where the elements after the first few begin."""
-    place = 0
-    for _ in range(count):
-        kind, length = struct.unpack(order + "II", data[place : place + 8])
-        place += 8 if kind >> 16 else 8 + length + (-length % 8)
-    return place
 
 
 def _load(path: Path, begin: _Beginning, order: str) -> Array:
@@ -204,13 +194,13 @@ def _load(path: Path, begin: _Beginning, order: str) -> Array:
     require_room(path, max(begin.shape), 8 * min(begin.shape))
     element = next(_elements(begin.rest, order), None)
     count = begin.shape[0] * begin.shape[1]
-    if element is None or element.kind not in NUMBERS:
+    if element is None or element.kind not in _NUMBERS:
         if not count:
             return np.zeros(begin.shape)
-        raise DamagedError("a variable has no numbers")
-    stored = np.dtype(order + NUMBERS[element.kind])
+        raise _DamagedError("a variable has no numbers")
+    stored = np.dtype(order + _NUMBERS[element.kind])
     if len(element.data) < count * stored.itemsize:
-        raise DamagedError("the numbers of a variable are cut off")
+        raise _DamagedError("the numbers of a variable are cut off")
     flat = np.frombuffer(element.data, stored, count)
     return flat.astype(np.float64).reshape(begin.shape, order="F")
 
@@ -234,10 +224,10 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
         return _unread(begin)
     head = [next(elements, None), next(elements, None)]
     if head[0] is None or head[1] is None or len(head[0].data) < 4:
-        raise DamagedError("a struct has no fields")
+        raise _DamagedError("a struct has no fields")
     longest = struct.unpack(order + "i", head[0].data[:4])[0]
     if longest < 1:
-        raise DamagedError("a struct has no fields")
+        raise _DamagedError("a struct has no fields")
     raw = bytes(head[1].data)
     names = [
         raw[k : k + longest].split(b"\0")[0].decode("latin-1") for k in range(0, len(raw), longest)
@@ -257,8 +247,8 @@ def _take(elements: Iterator[_Element], count: int) -> list[_Element]:
     result = []
     for _ in range(count):
         element = next(elements, None)
-        if element is None or element.kind != MATRIX:
-            raise DamagedError("a cell or struct is cut off")
+        if element is None or element.kind != _MATRIX:
+            raise _DamagedError("a cell or struct is cut off")
         result.append(element)
     return result
 
@@ -266,9 +256,9 @@ def _take(elements: Iterator[_Element], count: int) -> list[_Element]:
 def _words(begin: _Beginning, order: str) -> Tree:
     """Return a text; of several rows a list."""
     element = next(_elements(begin.rest, order), None)
-    if element is None or element.kind not in TEXTS:
+    if element is None or element.kind not in _TEXTS:
         return ""
-    encoding = TEXTS[element.kind]
+    encoding = _TEXTS[element.kind]
     if encoding.startswith("utf-") and encoding != "utf-8":
         encoding += "-le" if order == "<" else "-be"
     text = bytes(element.data).decode(encoding, errors="replace")
@@ -281,7 +271,8 @@ def _words(begin: _Beginning, order: str) -> Tree:
 def _unread(begin: _Beginning) -> Unread:
     if begin.is_complex:
         return Unread("complex numbers")
-    kinds = {_OPAQUE: "a table, timeseries or other object", OBJECT: "an object", _SPARSE: "sparse"}
+    objects = {_OPAQUE: "a table, timeseries or other object", _OBJECT: "an object"}
+    kinds = objects | {_SPARSE: "sparse"}
     if begin.kind in _NUMERIC:
         return Unread(f"an array of {begin.dimensions} dimensions")
     return Unread(kinds.get(begin.kind, f"class {begin.kind}"))

@@ -24,7 +24,6 @@ _REMEDY = (
 
 class _Time(NamedTuple):
     """How a clock is read.
-
     per_second: of its unit; rate: typical [Hz].
     """
 
@@ -55,21 +54,17 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
             *noted("there is no vector t or time of the same length for", found.clockless),
         )
         times = _times(found.signals)
+    channels = []
+    for one in found.signals:
+        struct, rate = one.clock.name.rpartition(".")[0] or "top", times[one.clock].rate
+        listed = Listed(name=one.name, unit=one.unit, samples=one.samples, rate=rate)
+        channels.append((struct, listed, one))
     return GroupedLog.of(
         path,
         format,
         what,
         "sample",
-        [
-            (
-                one.clock.name.rpartition(".")[0] or "top",
-                Listed(
-                    name=one.name, unit=one.unit, samples=one.samples, rate=times[one.clock].rate
-                ),
-                one,
-            )
-            for one in found.signals
-        ],
+        channels,
         said,
         partial(_samples, times),
         missing="signal with a time",
@@ -89,7 +84,7 @@ def _samples(times: Mapping[Clock, _Time], asked: Sequence[tuple[Listed, Signal]
         for listed, signal in some:
             found.setdefault(signal.clock, {})[listed.name] = line_of(values, signal)
     return [
-        Samples(clock.name, _seconds(times_of(clock), times[clock]), values)
+        Samples(clock.name, times_of(clock) / times[clock].per_second, values)
         for clock, values in found.items()
     ]
 
@@ -104,7 +99,3 @@ def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:
         per_second = PER_SECOND[known.unit] if known is not None else 1.0
         result[clock] = _Time(per_second, typical_rate(t / per_second))
     return result
-
-
-def _seconds(t: Array, time: _Time) -> Array:
-    return t / time.per_second if time.per_second != 1.0 else t

@@ -6,20 +6,22 @@ numbers, as "not available", these samples are NaN. So are samples that the logg
 """
 
 import re
-from collections.abc import Sequence
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array, filled
-from models.logs.foreign import one_line
+from models.limits import limits
+from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError
-from models.logs.mdf_blocks import is_bus, opened
 from models.logs.stamps import typical_rate
-from models.schema import LONGEST_NAME
+from models.schema import LONGEST_NAME, require_dense, require_few
 
 _NUMERIC_4, _NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
 _WORDS_4, _WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
@@ -29,17 +31,17 @@ _FORMULA = re.compile(
     r"(?:[\s\d.+\-*/(),]|\d[eE][+-]?\d|\b[xX]1?\b|\b(?:sin|cos|tan|asin|acos|atan|sinh|cosh|tanh"
     r"|exp|log|log10|abs|sqrt|pow)\b)*"
 )
-VALUES, TIME = (0, 6), 1  # types of a channel, of what a master counts
+_VALUES, _TIME = (0, 6), 1  # types of a channel, of what a master counts
 # Why a channel is not listed, by its kind.
-REASONS = {
+_REASONS = {
     "word": "enumerations and texts are no signals",
     "array": "arrays are not read",
     "formula": "a conversion must be a formula of numbers, x, + - * / and functions",
     "clockless": "there is no time beside",
     "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
-TOGETHER = 1 << 23  # numbers that are read at a time
-PROBED = 200  # samples of a clock that its rate is taken from
+_TOGETHER = 1 << 23  # numbers that are read at a time
+_PROBED = 200  # samples of a clock that its rate is taken from
 
 
 class _Place(NamedTuple):
@@ -60,7 +62,7 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
 
 def _of_group(path: Path, file: Any, mine: Sequence[_Asked]) -> Samples:
     """Read channels of one group, as many at a time as the memory takes."""
-    several = max(1, TOGETHER // max(mine[0][0].samples, 1))
+    several = max(1, _TOGETHER // max(mine[0][0].samples, 1))
     t: Array | None = None
     values: dict[str, Array] = {}
     for k in range(0, len(mine), several):
@@ -107,7 +109,7 @@ class _Found:
 
     def __init__(self) -> None:
         self.channels: list[tuple[str, Listed, _Place]] = []
-        self.others: dict[str, list[str]] = {reason: [] for reason in REASONS}
+        self.others: dict[str, list[str]] = {reason: [] for reason in _REASONS}
 
     def group(self, file: Any, number: int, is_4: bool) -> None:
         group = file.groups[number]
@@ -117,10 +119,13 @@ class _Found:
         if is_4 and is_bus(group):
             self.others["frames"].append(name)
             return
-        clock = master is not None and _tells_time(group.channels[master], is_4)
+        # Other masters are angles, distances or counts.
+        clock = master is not None and (
+            not is_4 or int(group.channels[master].sync_type) in (0, _TIME)
+        )
         rate = float("nan")
         if clock and samples:
-            probed = min(samples, PROBED)
+            probed = min(samples, _PROBED)
             t = file.get_master(number, record_offset=0, record_count=probed)
             rate = typical_rate(np.asarray(t, dtype=np.float64))
         for index, channel in enumerate(group.channels):
@@ -141,7 +146,7 @@ def _list(path: Path, file: Any) -> GroupedLog[_Place]:
     for number in range(len(file.groups)):
         found.group(file, number, is_4)
     said = tuple(
-        note for kind, reason in REASONS.items() for note in noted(reason, found.others[kind])
+        note for kind, reason in _REASONS.items() for note in noted(reason, found.others[kind])
     )
     return GroupedLog.of(
         path,
@@ -163,17 +168,12 @@ def _group_name(group: Any, number: int) -> str:
     return f"group {number + 1}"
 
 
-def _tells_time(master: Any, is_4: bool) -> bool:
-    """Whether a master channel is a time; others are angles, distances or counts."""
-    return not is_4 or int(master.sync_type) in (0, TIME)
-
-
 def _kind(group: Any, index: int, is_4: bool) -> str:
     """Return what a channel holds: "number", "word", "formula" that is none, or "array"."""
     channel = group.channels[index]
     if group.channel_dependencies[index]:
         return "array"
-    if is_4 and int(channel.channel_type) not in VALUES:
+    if is_4 and int(channel.channel_type) not in _VALUES:
         return "word"
     if channel.data_type not in (_NUMERIC_4 if is_4 else _NUMERIC_3):
         return "word"
@@ -185,7 +185,9 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
         return "number"
     kind = int(conversion.conversion_type)
     if kind == (_FORMULA_4 if is_4 else _FORMULA_3):
-        return "number" if _FORMULA.fullmatch(_text(conversion.formula)) else "formula"
+        raw = conversion.formula
+        text = raw.decode("latin-1").strip(" \0") if isinstance(raw, bytes) else str(raw)
+        return "number" if _FORMULA.fullmatch(text) else "formula"
     if kind not in (_WORDS_4 if is_4 else _WORDS_3):
         return "number"
     # Words: all of its values are, or some beside a default that is a conversion of its own.
@@ -201,10 +203,6 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
     return "word" if default is None or isinstance(default, str | bytes) else "number"
 
 
-def _text(formula: Any) -> str:
-    return formula.decode("latin-1").strip(" \0") if isinstance(formula, bytes) else str(formula)
-
-
 def _numbers(path: Path, name: str, samples: Any) -> Array:
     """Return samples as numbers, NaN for the words among them."""
     values = np.asarray(samples)
@@ -215,3 +213,118 @@ def _numbers(path: Path, name: str, samples: Any) -> Array:
     if values.ndim != 1 or values.dtype.kind not in "fiub":
         raise RecordingError(f"{path}: {name} must be numeric, its samples are {values.dtype}")
     return values.astype(np.float64)
+
+
+# Files whose blocks fit together: what asammdf reads without a look goes astray else.
+#
+# Blocks refer to one another by their place in the file. Before a file is opened its lists of
+# groups and channels must end; before a group is read its channels must lie in its records, and its
+# records in the file.
+
+_MOST_BLOCKS = 1_000_000  # of data
+_BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
+
+
+def is_bus(group: Any) -> bool:
+    """Whether a group of channels of an MDF4 file holds frames of a bus."""
+    return bool(int(group.channel_group.flags) & _BUS_EVENT)
+
+
+class _Form(NamedTuple):
+    """Where blocks of a version refer to others: the first group, the next of a kind, the first in.
+    link: how a place is stored.
+    """
+
+    first: int
+    next: int
+    inner: int
+    link: struct.Struct
+
+
+@contextmanager
+def opened(path: Path, format: str) -> Iterator[Any]:
+    """Open a file by asammdf.
+    format : that it is read as, for the message where the library is missing.
+    """
+    asammdf = need(path, "asammdf", format, "mdf")
+    _require_ends(path)
+    with asammdf.MDF(path, process_bus_logging=False) as file:
+        count = sum(len(group.channels) for group in file.groups)
+        require_few(RecordingError, str(path), count, "columns", "channels")
+        for group in file.groups:
+            _require_fitting(path, group, str(file.version) >= "4")
+        yield file
+
+
+def _require_ends(path: Path) -> None:
+    """Refuse lists of groups and channels that run in circles."""
+    with path.open("rb") as file:
+        head = file.read(64)
+        is_4 = head[8:9] == b"4"
+        order = "<" if is_4 or head[24:26] == b"\0\0" else ">"
+        form = (
+            _Form(88, 24, 32, struct.Struct("<Q"))
+            if is_4
+            else _Form(68, 4, 8, struct.Struct(order + "I"))
+        )
+        seen: set[int] = set()
+        for group in _linked(path, file, form, _link(file, form.first, form), seen):
+            for records in _linked(path, file, form, _link(file, group + form.inner, form), seen):
+                first = _link(file, records + form.inner, form)
+                for _ in _linked(path, file, form, first, seen):
+                    require_few(RecordingError, str(path), len(seen) / 3, "columns", "channels")
+
+
+def _linked(path: Path, file: BinaryIO, form: _Form, place: int, seen: set[int]) -> Iterator[int]:
+    while place:
+        if place in seen:
+            raise RecordingError(f"{path}: is a damaged MDF file, its blocks run in a circle")
+        seen.add(place)
+        yield place
+        place = _link(file, place + form.next, form)
+
+
+def _link(file: BinaryIO, place: int, form: _Form) -> int:
+    file.seek(place)
+    raw = file.read(form.link.size)
+    return int(form.link.unpack(raw)[0]) if len(raw) == form.link.size else 0
+
+
+def _require_fitting(path: Path, group: Any, is_4: bool) -> None:
+    """Refuse channels beyond their record, and records beyond the file."""
+    about = group.channel_group
+    width = int(about.samples_byte_nr)
+    for channel in group.channels:
+        bits = int(channel.bit_count)
+        if is_4:
+            first = 8 * int(channel.byte_offset) + int(channel.bit_offset)
+            if int(channel.channel_type) not in (0, 2):  # others have no place in the record
+                continue
+            invalid = int(about.invalidation_bytes_nr)
+            if invalid and int(channel.pos_invalidation_bit) >= 8 * invalid:
+                raise RecordingError(f"{path}: is a damaged MDF file, a channel lies nowhere")
+        else:
+            first = int(channel.start_offset) + 8 * int(channel.additional_byte_offset)
+        if first + bits > 8 * width:
+            raise RecordingError(
+                f"{path}: is a damaged MDF file, a channel lies beyond its record of {width} bytes"
+            )
+    file_size, total, packed = path.stat().st_size, 0, 0
+    for number, block in enumerate(group.get_data_blocks()):
+        inflated, stored = int(block.original_size or 0), int(block.compressed_size or 0)
+        require_few(RecordingError, str(path), inflated / 1e6, "block", "megabytes of a block")
+        total, packed = total + inflated, packed + stored
+        require_dense(RecordingError, str(path), total, packed, "groups of channels")
+        here = group.data_location == 0
+        if (
+            number > _MOST_BLOCKS
+            or total > 1e6 * limits().megabytes
+            or (here and int(block.address) + stored > file_size)
+        ):
+            raise RecordingError(f"{path}: is a damaged or cut off MDF file, its data do not fit")
+    record = width + (int(about.invalidation_bytes_nr) if is_4 else 0)
+    if group.sorted and total < int(about.cycles_nr) * record:
+        raise RecordingError(
+            f"{path}: is a cut off MDF file, it holds {total} bytes of {about.cycles_nr} records "
+            f"of {record}"
+        )

@@ -1,6 +1,6 @@
-"""Arrays in memory, as of a data frame, as a log."""
+"""Arrays in memory, as of a data frame, as a table."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,19 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.log import RecordingError, some
 from models.logs.spelling import without_unit
-from models.logs.stamps import Stamps, risen
+from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
 from models.logs.units import TIME, to_si
 
-TIMES = ("t", "time", "timestamp")  # what the clock is called
-RUN = "run"
-EVEN = "(even)"  # a time that a rate makes
-_NANOSECONDS = 1e9  # of a second
+_TIMES = ("t", "time", "timestamp")  # what the clock is called
+_HEAD = 400  # rows that tell what columns are
 
 
-class ArrayLog:
-    """Columns of one length, of which one is the time.
+def open_arrays(
+    name: str,
+    data: Any,
+    clock: str = "",
+    clock_unit: str = "",
+    *,
+    mend: bool = False,
+    rate: float = 0.0,
+) -> TableLog:
+    """Return columns of one length as a log.
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
@@ -28,128 +34,31 @@ class ArrayLog:
     mend : whether times that do not rise are mended, and not refused.
     rate : of the samples [Hz], in place of a time; 0 where none is given.
     """
-
-    format = "arrays"
-    dialect = ()
-    clock = None
-    unlisted = ()
-
-    def __init__(
-        self,
-        name: str,
-        data: Any,
-        clock: str = "",
-        clock_unit: str = "",
-        *,
-        mend: bool = False,
-        rate: float = 0.0,
-    ) -> None:
-        found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
-        try:
-            header = [str(column) for column in found]
-            columns = (_array(name, str(column), data[column]) for column in found)
-            arrays = dict(zip(header, columns, strict=True))
-        except (TypeError, KeyError, IndexError):
-            raise RecordingError(
-                f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
-            ) from None
-        if rate and arrays:
-            clock = EVEN
-            arrays[EVEN] = np.arange(next(iter(arrays.values())).size) / rate
-        self._name, self._arrays, self._mend = name, arrays, mend
-        self._noted: list[str] = []
-        lower = {column.lower(): column for column in reversed(header)}
-        named = next((lower[one] for one in TIMES if one in lower), None)
-        if clock and clock not in arrays:  # it may stand with its unit
-            clock = next((one for one in header if without_unit(one) == clock), clock)
-        self._clock, self._second = clock or named, to_si(clock_unit, TIME, f"{name}: {clock}")
-        if self._clock not in arrays:
-            missing = f"{clock!r}" if clock else "t"
-            raise RecordingError(
-                f"{name}: column {missing} is missing, the time [s]; columns found: "
-                f"'{some(header)}'"
-            )
-
-    @property
-    def path(self) -> Path:
-        return Path(self._name)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was mended in what has been read so far, one sentence each."""
-        return tuple(dict.fromkeys(self._noted))
-
-    def headings(self) -> tuple[Heading, ...]:
-        """Return the columns, but for the time and the runs; which are numeric shows in reading."""
-        return tuple(Heading(name, "") for name in self._arrays if name not in (self._clock, RUN))
-
-    def listed(self) -> tuple[Listed, ...]:
-        """Return the columns of `headings`, with how many samples there are."""
-        size = self._arrays[str(self._clock)].size
-        return tuple(
-            Listed(name=one.name, unit=one.unit, samples=size, rate=np.nan)
-            for one in self.headings()
+    found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
+    try:
+        header = [str(column) for column in found]
+        arrays = (_array(name, str(column), data[column]) for column in found)
+        columns = dict(zip(header, arrays, strict=True))
+    except (TypeError, KeyError, IndexError):
+        raise RecordingError(
+            f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
+        ) from None
+    if rate:
+        return TableLog(table=_ArrayTable(name, columns), rate=rate)
+    lower = {column.lower(): column for column in reversed(header)}
+    likely = [one for one in header if without_unit(one) == clock]  # it may stand with its unit
+    named = next((lower[one] for one in _TIMES if one in lower), "")
+    time = clock if clock in header else next(iter(likely), clock) or named
+    if time not in header:
+        missing = f"{clock!r}" if clock else "t"
+        raise RecordingError(
+            f"{name}: column {missing} is missing, the time [s]; columns found: '{some(header)}'"
         )
-
-    def runs(self) -> tuple[str, ...]:
-        """Return the words of the column run in their order."""
-        if RUN not in self._arrays:
-            return ()
-        return tuple(dict.fromkeys(str(word) for word in self._arrays[RUN].tolist()))
-
-    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return columns as channels.   run : one of `runs`; None where there are none, or one."""
-        run = one_run(self.path, self.runs(), run)
-        chosen(self.path, names, self._arrays)
-        clock = str(self._clock)
-        columns = {name: self._column(name) for name in (clock, *names)}
-        kept: NDArray[np.bool_] = np.ones(columns[clock].size, dtype=np.bool_)
-        sizes = {name: column.size for name, column in columns.items()}
-        if RUN in self._arrays:
-            sizes[RUN] = self._arrays[RUN].size
-        if len(set(sizes.values())) > 1:
-            raise RecordingError(f"{self._name}: columns must have one length, they have {sizes}")
-        if run is not None:
-            kept = np.array([str(word) == run for word in self._arrays[RUN].tolist()])
-        t, rows = columns[clock][kept], np.flatnonzero(kept)
-        stamps = Stamps(t, ())
-        if self._mend:
-            stamps = risen(self._name, clock, t, rows, "index", mend=True)
-            self._noted.extend(stamps.notes)
-        return tuple(
-            Channel(
-                name=name,
-                unit="",
-                t=stamps.t,
-                values=stamps.of(columns[name][kept]),
-                place="index",
-                rows=stamps.of(rows),
-            )
-            for name in names
-        )
-
-    def _column(self, name: str) -> Array:
-        value = self._arrays[name]
-        if value.ndim != 1:
-            raise RecordingError(
-                f"{self._name}: {name} must have one axis, its shape is {value.shape}"
-            )
-        if name == self._clock and value.dtype.kind in "Mm":
-            there = value[~np.isnat(value)]
-            seconds = np.full(value.size, np.nan)
-            if there.size:
-                since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
-                seconds[~np.isnat(value)] = since / _NANOSECONDS
-            return seconds
-        try:
-            if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
-                raise TypeError
-            number = value.astype(np.float64)
-            return number * self._second if name == self._clock else number
-        except (TypeError, ValueError):
-            raise RecordingError(
-                f"{self._name}: {name} must be numeric, its type is {value.dtype}"
-            ) from None
+    to_si(clock_unit, TIME, f"{name}: {clock}")
+    if columns[time].dtype.kind == "m":
+        columns[time] = _in_seconds(columns[time])
+    table = _ArrayTable(name, columns)
+    return TableLog(table=table, clock_name=time, clock_unit=clock_unit or "s", mend=mend)
 
 
 def _array(name: str, column: str, value: Any) -> NDArray[Any]:
@@ -164,3 +73,62 @@ def _array(name: str, column: str, value: Any) -> NDArray[Any]:
         raise RecordingError(
             f"{name}: {column} must have one axis, its rows are of several lengths"
         ) from None
+
+
+def _in_seconds(durations: NDArray[Any]) -> Array:
+    """Return durations from the first that is there [s], (n,)."""
+    first = durations[~np.isnat(durations)][:1]
+    since = (durations - first).astype("timedelta64[ns]") if first.size else durations
+    return np.where(np.isnat(durations), np.nan, since.astype(np.int64) / 1e9)
+
+
+class _ArrayTable:
+    """Columns in memory."""
+
+    format, place = "arrays", "index"
+
+    def __init__(self, name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+        self.path, self._names, self._arrays = Path(name), tuple(arrays), list(arrays.values())
+        numeric = tuple(self._is_numeric(k) for k in range(len(arrays)))
+        self.columns = Columns(self._names, ("",) * len(arrays), numeric)
+
+    def _is_numeric(self, column: int) -> bool:
+        try:
+            self._number(column, slice(_HEAD))
+        except RecordingError:
+            return False
+        return True
+
+    def first_rows(self, column: int) -> list[str]:
+        head = np.ravel(self._arrays[column])[:_HEAD]
+        return ["" if cell is None or cell != cell else str(cell) for cell in head]  # as NaN is
+
+    def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
+        """Return columns, of the rows of a run where one is named."""
+        wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
+        found = {column: self._read(column, kind) for column, kind in wanted.items()}
+        sizes = {self._names[column]: self._arrays[column].size for column in wanted}
+        if len(set(sizes.values())) > 1:
+            raise RecordingError(f"{self.path}: columns must have one length, they have {sizes}")
+        gathered = Gathered(self.path, wanted, self._names, "index", run)
+        size = next(iter(sizes.values()), self._arrays[0].size)
+        gathered.extend(np.arange(size, dtype=np.int64), found)
+        return gathered.finished()
+
+    def _read(self, column: int, kind: Kind) -> Any:
+        if kind is Kind.WORD:
+            return Words.of([str(word) for word in np.ravel(self._arrays[column]).tolist()])
+        if kind is Kind.INSTANT:
+            return self._arrays[column].astype("datetime64[ns]").astype(np.int64)
+        return self._number(column, slice(None))
+
+    def _number(self, column: int, part: slice) -> Array:
+        value, where = self._arrays[column], f"{self.path}: {self._names[column]}"
+        if value.ndim != 1:
+            raise RecordingError(f"{where} must have one axis, its shape is {value.shape}")
+        try:
+            if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
+                raise TypeError
+            return value[part].astype(np.float64)
+        except (TypeError, ValueError):
+            raise RecordingError(f"{where} must be numeric, its type is {value.dtype}") from None

@@ -39,24 +39,24 @@ from models.logs.units import (
     unit_of_range,
 )
 
-SURE = 0.8  # confidence from which a proposal is used without being told to
-_STANDARD, KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
+_SURE = 0.8  # confidence from which a proposal is used without being declared
+_STANDARD, _KNOWN, WORDS, _VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
 HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
 _NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
 _FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
 STILL = 0.25  # of confidence that is left to a channel that never changes
-APART = 0.04  # of confidence: nearer ones are equal
-HAND = "steering wheel"  # an angle that wants a ratio
+_APART = 0.04  # of confidence: nearer ones are equal
+_HAND = "steering wheel"  # an angle that wants a ratio
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
 # Units that are met where none is given, "" SI.
-UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
+_UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
 _OBLIQUE = "its box is mounted obliquely: no axis of it is one of the car"
-SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
+_SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
-class Rule(NamedTuple):
+class _Rule(NamedTuple):
     """How a signal is called.
     known : whole names, words joined.   vague : names that may mean something else.
     never : words that mean something else.   words : sets of words that all occur; "a|b" is either.
@@ -68,8 +68,8 @@ class Rule(NamedTuple):
     words: tuple[str, ...]
 
 
-TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
-_WORDS = {name: some.replace("|", " ").split() for name, some in TABLES["words"].items()}
+_TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+_WORDS = {name: some.replace("|", " ").split() for name, some in _TABLES["words"].items()}
 
 
 def _spelled(text: str, apart: str = "|") -> str:
@@ -79,21 +79,22 @@ def _spelled(text: str, apart: str = "|") -> str:
     return text
 
 
-REFERENCE, CORNERS, SOURCES, FILTERED, SIGN = (
+_REFERENCE, _CORNERS, _SOURCES, _FILTERED, _SIGN = (
     frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
 )
 
 
-def _rule(one: Mapping[str, Any]) -> Rule:
+def _rule(one: Mapping[str, Any]) -> _Rule:
     known, vague, never = (
         frozenset(_spelled(one.get(key, ""), " ").split()) for key in ("known", "vague", "never")
     )
-    return Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
+    return _Rule(known, vague, never, tuple(map(_spelled, one.get("words", ()))))
 
 
-RULES: Mapping[str, Rule] = {name: _rule(one) for name, one in TABLES["signals"].items()}
-_PER_WHEEL, _HINTS = TABLES["per_wheel"], {k: tuple(v.split()) for k, v in TABLES["hints"].items()}
-SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in TABLES["sides"].items()}
+_RULES: Mapping[str, _Rule] = {name: _rule(one) for name, one in _TABLES["signals"].items()}
+_PER_WHEEL = _TABLES["per_wheel"]
+_HINTS = {name: tuple(some.split()) for name, some in _TABLES["hints"].items()}
+_SIDES = {name: [pair.split() for pair in v.split(",")] for name, v in _TABLES["sides"].items()}
 # German words are written together: "Querbeschl", "Lenkradwinkel", "Sollgierrate".
 _FIRST = "soll|ist|fahrzeug|fahr|quer|laengs|gier|vertikal|hoch|radlenk|lenkrad|lenk|schwimm|rad"
 _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
@@ -108,12 +109,12 @@ _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": 
                          "δ": "delta", "ω": "omega"})  # fmt: skip
 
 
-_WHEELS = TABLES["wheels"]
-PLACES = {
+_WHEELS = _TABLES["wheels"]
+_PLACES = {
     name: [frozenset(way.split()) for way in _WHEELS[name].split(",")] for name in WHEELS[:-1]
 }
-_ANYWHERE = frozenset(word for ways in PLACES.values() for way in ways for word in way)
-WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
+_ANYWHERE = frozenset(word for ways in _PLACES.values() for way in ways for word in way)
+_WHEEL, _TURNING, _SPEEDS, _BOTH, _ENCODER, _OTHERS = (
     frozenset(_WHEELS[name].split())
     for name in ("wheel", "turns", "speeds", "both", "encoder", "others")
 )
@@ -121,25 +122,25 @@ WHEEL, TURNING, SPEEDS, _BOTH, _ENCODER, OTHERS = (
 
 def _with_corner(word: str) -> tuple[str, ...]:
     for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
-        if corner in CORNERS and stem in _BOTH:
+        if corner in _CORNERS and stem in _BOTH:
             return stem, corner
     return (word,)
 
 
-def wheel_words(signal: str, words: Sequence[str]) -> bool:
+def _wheel_words(signal: str, words: Sequence[str]) -> bool:
     listed = frozenset(part for word in words for part in _with_corner(word))
-    if listed & OTHERS:
+    if listed & _OTHERS:
         return False
     if signal == WHEELS[-1]:
-        turns = listed & _ENCODER or (listed & WHEEL and listed & TURNING) or listed == {signal}
+        turns = listed & _ENCODER or (listed & _WHEEL and listed & _TURNING) or listed == {signal}
         return bool(turns and not listed & _ANYWHERE)
-    for place in PLACES[signal]:
+    for place in _PLACES[signal]:
         rest = listed - place
         if listed >= place and not rest & _ANYWHERE:
             return bool(
                 rest & _BOTH
-                or (rest & WHEEL and (rest & TURNING or rest <= WHEEL))
-                or (rest <= SPEEDS and rest)
+                or (rest & _WHEEL and (rest & _TURNING or rest <= _WHEEL))
+                or (rest <= _SPEEDS and rest)
             )
     return False
 
@@ -177,7 +178,7 @@ class Proposal:
         return (
             guess is not None
             and name not in self.rivals
-            and guess.confidence >= SURE
+            and guess.confidence >= _SURE
             and not guess.hand
         )
 
@@ -205,7 +206,7 @@ class Proposal:
         }
 
 
-def words_of(name: str) -> tuple[str, ...]:
+def _words_of(name: str) -> tuple[str, ...]:
     """Return a name as small words: "Car.YawRate" is car, yaw, rate."""
     plain = unicodedata.normalize("NFC", name).translate(_UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
@@ -237,32 +238,32 @@ def _matches(group: str, words: frozenset[str]) -> bool:
     return all(words & set(part.split("|")) for part in group.split(";"))
 
 
-def name_confidence(signal: str, name: str) -> float:
+def _name_confidence(signal: str, name: str) -> float:
     """Return how sure a name alone says that a channel is a signal, 0 where it does not.
-    signal : one of `RULES`, or a wheel.
+    signal : one of `_RULES`, or a wheel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
         return _STANDARD
-    listed = words_of(name)
+    listed = _words_of(name)
     if signal in WHEELS:
-        return WORDS if wheel_words(signal, listed) else 0.0
+        return WORDS if _wheel_words(signal, listed) else 0.0
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
-    rule, words = RULES[signal], _with_parts(listed)
+    rule, words = _RULES[signal], _with_parts(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
-    while len(listed) > 1 and listed[-1] in SOURCES:
+    while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]
         ends += ["".join(listed[k:]) for k in range(len(listed))]
     if rule.known & {ends[0], "".join(listed)}:
-        return KNOWN
-    if _with_parts(words_of(_field(name))).union(ends) & rule.never:
+        return _KNOWN
+    if _with_parts(_words_of(_field(name))).union(ends) & rule.never:
         return 0.0
     if (
         len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
     ):  # the R of "M_Mtr_D2_R" is a side, or anything
         ends = [end for end in ends if len(end) > 1]
-    loss = _FILTERED_LOSS if words & FILTERED else 0.0
+    loss = _FILTERED_LOSS if words & _FILTERED else 0.0
     if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
         return WORDS - loss
     return _VAGUE if rule.vague & set(ends) else 0.0
@@ -270,11 +271,11 @@ def name_confidence(signal: str, name: str) -> float:
 
 def _is_hint(signal: str, one: Heading) -> bool:
     """Return whether a word of a name and its unit let a channel be what no rule knows."""
-    words = _with_parts(words_of(_field(one.name)))
+    words = _with_parts(_words_of(_field(one.name)))
     starts = _HINTS.get(signal, ())
     fits = is_given(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
-    return fits and named and not words & RULES[signal].never
+    return fits and named and not words & _RULES[signal].never
 
 
 def propose(
@@ -307,7 +308,7 @@ def propose(
         equal = [
             one
             for one in ranked
-            if one.confidence > ranked[0].confidence - APART
+            if one.confidence > ranked[0].confidence - _APART
             and _rank(one)[0] == _rank(ranked[0])[0]
         ]
         if len(equal) > 1:
@@ -319,17 +320,17 @@ def propose(
     return Proposal(guesses={**guesses, **posed}, rivals=rivals)
 
 
-_PLACE = re.compile(TABLES["pose"]["place"])
-_ANGLE = re.compile(TABLES["pose"]["angle"])
-_TURN = re.compile(TABLES["pose"]["turn"])
-_NO_POSE = set(TABLES["pose"]["never"].split())
+_PLACE = re.compile(_TABLES["pose"]["place"])
+_ANGLE = re.compile(_TABLES["pose"]["angle"])
+_TURN = re.compile(_TABLES["pose"]["turn"])
+_NO_POSE = set(_TABLES["pose"]["never"].split())
 
 
 def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
     groups: dict[str, dict[str, Heading]] = {}
     for one in map(_with_given_unit, headings):
-        words = "_".join(words_of(without_ending(one.name, one.unit)))
+        words = "_".join(_words_of(without_ending(one.name, one.unit)))
         possible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
@@ -347,7 +348,7 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     if not measured:
         return {}
     some = whole[measured[0]]
-    sure = KNOWN if len(measured) == 1 else HINT
+    sure = _KNOWN if len(measured) == 1 else HINT
     why = "" if len(measured) == 1 else "there are several poses"
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
@@ -372,12 +373,12 @@ def _with_signs(
     """Return the guesses; amounts with the channel of their sign, which is called as they are."""
     signs: dict[frozenset[str], str] = {}
     for one in headings:
-        words = frozenset(words_of(one.name))
-        if words & SIGN and not is_given(one.unit):
-            signs[words - SIGN] = one.name
+        words = frozenset(_words_of(one.name))
+        if words & _SIGN and not is_given(one.unit):
+            signs[words - _SIGN] = one.name
 
     def completed(guess: Guess) -> Guess:
-        sign = signs.get(frozenset(words_of(guess.channel[0])), "")
+        sign = signs.get(frozenset(_words_of(guess.channel[0])), "")
         values = seen[guess.channel[0]].values if sign and guess.channel[0] in seen else np.zeros(0)
         if not values.size or np.nanmin(values) < 0.0:
             return guess
@@ -390,8 +391,8 @@ def _triads(headings: Sequence[Heading]) -> list[Triad]:
     """Return the channels that are called alike but for x, y and z."""
     named = map(_with_given_unit, headings)
     units = {one.name: possible.unit for one, possible in zip(headings, named, strict=True)}
-    words = {name: words_of(without_ending(name, unit)) for name, unit in units.items()}
-    bad = REFERENCE | CORNERS
+    words = {name: _words_of(without_ending(name, unit)) for name, unit in units.items()}
+    bad = _REFERENCE | _CORNERS
     return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
 
 
@@ -407,11 +408,9 @@ def _along_axes(
     within = {name for box in boxes for name in box.names.values()}
 
     def best(name: str) -> str:
-        free = [one for one in candidates[name] if not within & set(one.channel)]
-        likely = max(free, key=lambda one: one.confidence, default=None)
-        return likely.channel[0] if likely and likely.confidence > STILL else ""
+        return _likeliest([one for one in candidates[name] if not within & set(one.channel)])
 
-    speed = best("v_x") or _of_a_triad(candidates["v_x"])
+    speed = best("v_x") or _likeliest(candidates["v_x"])
     found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
     units = {one.name: _with_given_unit(one).unit.strip() for one in headings}
     mended = {
@@ -425,7 +424,7 @@ def _along_axes(
         for name, some in candidates.items()
     }
     for one in found.axes:
-        near = KNOWN if is_given(units[one.name]) else KNOWN - _NO_UNIT_LOSS
+        near = _KNOWN if is_given(units[one.name]) else _KNOWN - _NO_UNIT_LOSS
         guess = Guess(
             channel=(one.name,),
             confidence=near,
@@ -437,8 +436,8 @@ def _along_axes(
     return mended
 
 
-def _of_a_triad(found: Sequence[Guess]) -> str:
-    """Return the channel that is the speed by its letter; "" where there is none."""
+def _likeliest(found: Sequence[Guess]) -> str:
+    """Return the channel of the surest guess; "" where there is none."""
     likely = max(found, key=lambda one: one.confidence, default=None)
     return likely.channel[0] if likely and likely.confidence > STILL else ""
 
@@ -452,7 +451,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
     if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
-    names = (words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
+    names = (_words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
     if len(set(names)) > 1:
         return False
     first, second = (seen[guess.channel[0]] for guess in (one, other))
@@ -464,7 +463,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     here, beside = (
         x * scale for x, scale in zip((first.values[good], beside), scales, strict=True)
     )
-    return _root_mean_square(here - beside) <= SAME * _root_mean_square(here)
+    return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
 
 
 def _rate(channel: Channel) -> float:
@@ -494,8 +493,8 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     for one in listed:
         names = {without_ending(one.name, one.unit)}
         names |= {one.name} if one.name.lower().endswith("_g") else set()  # "lat_g" is in g, and g
-        by_name = max(name_confidence(signal, name) for name in names)
-        by_hand = max(name_confidence(HAND, name) for name in names) * (signal == "delta_f")
+        by_name = max(_name_confidence(signal, name) for name in names)
+        by_hand = max(_name_confidence(_HAND, name) for name in names) * (signal == "delta_f")
         best = max(by_name, by_hand)
         if best > 0.0:
             found.append(
@@ -538,10 +537,10 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
 def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
     """Return the corner of the car that a name speaks of, and its other words."""
     rest = frozenset(words)
-    for pair, short in TABLES["corners"].items():
+    for pair, short in _TABLES["corners"].items():
         if rest >= set(pair.split()):
             return short, rest - set(pair.split())
-    corners = [word for word in words if word in CORNERS]
+    corners = [word for word in words if word in _CORNERS]
     return (corners[-1], rest - {corners[-1]}) if corners else None
 
 
@@ -549,14 +548,14 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     """Return pairs of channels of the left and the right wheel of an axle."""
     by_corner: dict[tuple[str, frozenset[str]], Heading] = {}
     for one in listed:
-        found = _corner(words_of(one.name))
+        found = _corner(_words_of(one.name))
         quantity = QUANTITIES[signal]
         fits = not is_given(one.unit) or quantity in quantities(one.unit)
-        if found and fits and not found[1] & REFERENCE:
+        if found and fits and not found[1] & _REFERENCE:
             by_corner.setdefault(found, one)
     pairs = []
     for (corner, rest), left in by_corner.items():
-        for first, second in SIDES[signal]:
+        for first, second in _SIDES[signal]:
             right = by_corner.get((second, rest))
             named = any(_matches(group, rest) for group in _PER_WHEEL[signal])
             if corner == first and right is not None and named:
@@ -611,7 +610,7 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     A name that may mean hand or road wheels, as "steer", means these where it stays as near.
     """
     quantity = QUANTITIES[signal]
-    vague = max(name_confidence(HAND, name) for name in guess.channel) <= _VAGUE
+    vague = max(_name_confidence(_HAND, name) for name in guess.channel) <= _VAGUE
     if guess.hand and vague and not unit_of_range(quantity, usual):
         return _said(replace(guess, hand=False), f"goes to {size:.3g}, as road wheels do in rad")
     if quantity == ACCELERATION:
@@ -639,7 +638,7 @@ def _beside_turning(
         if (likely := [one for one in candidates[name] if one.confidence > STILL])
     }
     mended = dict(candidates)
-    for name in UNTOLD:
+    for name in _UNTOLD:
         mended[name] = [
             guess
             if _is_given(guess) or guess.confidence == 0.0
@@ -647,17 +646,14 @@ def _beside_turning(
             for guess in candidates[name]
         ]
     for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
-        first = next((one for one in mended[like] if one.channel == _channel_of(best, like)), None)
+        channel = best[like].channel if like in best else ()
+        first = next((one for one in mended[like] if one.channel == channel), None)
         if first is not None and first.unit and not _is_given(best[like]):
             mended[name] = [
                 guess if _is_given(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
                 for guess in candidates[name]
             ]
     return mended
-
-
-def _channel_of(there: Mapping[str, Guess], name: str) -> tuple[str, ...]:
-    return there[name].channel if name in there else ()
 
 
 def _is_given(guess: Guess) -> bool:
@@ -680,7 +676,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         }
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
-    choices = [(one.unit,) if _is_given(one) else UNTOLD[key] for key, one in there.items()]
+    choices = [(one.unit,) if _is_given(one) else _UNTOLD[key] for key, one in there.items()]
     nearest = min(itertools.product(*choices), key=far)
     unit = nearest[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess

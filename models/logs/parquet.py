@@ -14,18 +14,18 @@ from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
-from models.logs.table import Cells, Gathered, Kind, TableLog
+from models.logs.table import Cells, Columns, Gathered, Kind, TableLog
 from models.schema import LONGEST_NAME, require_dense, require_few, require_file
 
-HEAD = 400  # rows that tell what columns are
-WHAT = "a Parquet file"  # that a file is read as
-BATCH = 1 << 16  # rows that are read at once
+_HEAD = 400  # rows that tell what columns are
+_WHAT = "a Parquet file"  # that a file is read as
+_BATCH = 1 << 16  # rows that are read at once
 
 
 def open_parquet(path: Path) -> TableLog:
     parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
-    with one_line(path, WHAT), parquet.ParquetFile(path) as file:
+    with one_line(path, _WHAT), parquet.ParquetFile(path) as file:
         about = file.metadata
         require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
         require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
@@ -44,40 +44,30 @@ def open_parquet(path: Path) -> TableLog:
 class _ParquetTable:
     """A table in a Parquet file."""
 
-    words = ()
-
     path: Path
     schema: Any
     rows: int
 
     format = "Parquet"
     place = "row"
-    rate = 0.0
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.schema.names)
-
-    @cached_property
-    def units(self) -> tuple[str, ...]:
-        """Units of the columns: as their metadata say, or as in the names."""
-        return tuple(_unit(one) for one in self.schema)
-
-    @cached_property
-    def numeric(self) -> tuple[bool, ...]:
-        return tuple(_is_numeric(one.type) for one in self.schema)
+    def columns(self) -> Columns:
+        """The columns; their units as metadata say, or as in the names."""
+        units, numeric = map(_unit, self.schema), (_is_numeric(one.type) for one in self.schema)
+        return Columns(tuple(self.schema.names), tuple(units), tuple(numeric))
 
     def first_rows(self, column: int) -> list[str]:
-        with one_line(self.path, WHAT):
+        with one_line(self.path, _WHAT):
             if column not in self._head:
-                return ["?"] * min(self.rows, HEAD)
+                return ["?"] * min(self.rows, _HEAD)
             return _as_text(self._head[column], self.schema.field(column).type)
 
     @cached_property
     def _head(self) -> dict[int, Any]:
         """The first rows of the columns that may be read, which all are looked at."""
         columns = [k for k, one in enumerate(self.schema) if _is_read(one.type)]
-        first = next(self._batches(columns, HEAD), [])
+        first = next(self._batches(columns, _HEAD), [])
         return dict(zip(columns, first, strict=False))
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
@@ -87,17 +77,17 @@ class _ParquetTable:
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         for column, kind in wanted.items():
-            name, found = self.names[column], self.schema.field(column).type
-            if self.names.count(name) > 1:
+            name, found = self.columns.names[column], self.schema.field(column).type
+            if self.columns.names.count(name) > 1:
                 raise RecordingError(f"{self.path}: column {name} appears more than once")
             if kind is Kind.NUMBER and not _is_numeric(found):
                 raise RecordingError(f"{self.path}: {name} must be numeric, its type is {found}")
         if self.rows == 0:
             raise RecordingError(f"{self.path}: has columns but no row of data")
-        gathered = Gathered(self.path, wanted, self.names, "row", run)
+        gathered = Gathered(self.path, wanted, self.columns.names, "row", run)
         order = list(wanted)
-        with one_line(self.path, WHAT):
-            for batch in self._batches(order, BATCH):
+        with one_line(self.path, _WHAT):
+            for batch in self._batches(order, _BATCH):
                 rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
                 columns = {
                     column: self._column(column, wanted[column], cells, rows)
@@ -108,7 +98,7 @@ class _ParquetTable:
 
     def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""
-        names = list(dict.fromkeys(self.names[k] for k in columns))
+        names = list(dict.fromkeys(self.columns.names[k] for k in columns))
         parquet = need(self.path, "pyarrow.parquet", "Parquet", "parquet")
         texts = [one.name for one in self.schema if _is_text(one.type)]  # each is kept once
         with parquet.ParquetFile(self.path, read_dictionary=texts) as file:
@@ -116,14 +106,14 @@ class _ParquetTable:
                 places: dict[str, list[int]] = {}
                 for place, name in enumerate(batch.schema.names):
                     places.setdefault(name, []).append(place)
-                yield [batch.column(places[self.names[k]][self._which[k]]) for k in columns]
+                yield [batch.column(places[self.columns.names[k]][self._which[k]]) for k in columns]
 
     @cached_property
     def _which(self) -> tuple[int, ...]:
         """How many columns of the same name stand before each."""
         seen: dict[str, int] = {}
         result = []
-        for name in self.names:
+        for name in self.columns.names:
             result.append(seen.get(name, 0))
             seen[name] = result[-1] + 1
         return tuple(result)
@@ -141,7 +131,7 @@ class _ParquetTable:
                 return whole_numbers(cells, MISSING)
             except pyarrow.ArrowInvalid:
                 raise RecordingError(
-                    f"{self.path}: {self.names[column]} must be of the years 1678 to 2262, "
+                    f"{self.path}: {self.columns.names[column]} must be of the years 1678 to 2262, "
                     f"rows from {rows[0]} on are not"
                 ) from None
         names, codes = words(cells)
@@ -149,7 +139,7 @@ class _ParquetTable:
         if None in instants:
             k = instants.index(None)  # the first: words stand in the order of the rows
             raise RecordingError(
-                f"{self.path}: {self.names[column]} must be a time, row "
+                f"{self.path}: {self.columns.names[column]} must be a time, row "
                 f"{rows[np.argmax(codes == k)]} has {shown(names[k][:LONGEST_NAME])}"
             )
         return np.array(instants, dtype=np.int64)[codes]

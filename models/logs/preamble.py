@@ -22,20 +22,21 @@ from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
+from models.logs.table import Columns
 from models.logs.units import PER_SECOND, quantities, time_unit
 from models.schema import require_few
 
 HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
-ROWS = 400  # of data that tell what columns are
-TAIL = 40  # last lines of them that tell how cells are written
+_ROWS = 400  # of data that tell what columns are
+_TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
-DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
+_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
 _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
-_ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
+_ONES = "1" + " ".join(_DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
-MANY = 300  # cells of a line that tell how all are written
-CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
+_MANY = 300  # cells of a line that tell how all are written
+_CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
 
 _DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
@@ -54,7 +55,7 @@ _GIVEN_STEP = re.compile(
     r"|delta[ _]?[xt]\b|\bd[tx]\b)"
     r"[^\d\n]{0,20}(\d*\.?\d+(?:e-?\d+)?)(?:\W{0,5}(ms|us|s|sec)\b)?"
 )
-RATES = (1.0, 1e5)  # [Hz]
+_RATES = (1.0, 1e5)  # [Hz]
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
@@ -67,28 +68,23 @@ _LONGEST_CELL = csv.field_size_limit()  # characters
 class Layout:
     """Where the table of a text file is, and how its cells are written.
     encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
-    delimiter : one character, " " for any number of blanks and tabs.   decimal : "." or ",".
-    thousands : what sets thousands apart in some cell, "" where nothing does.
-    units : of the columns, "" where none is given.
+    delimiter : one character, " " for any number of blanks and tabs.
     first : line of the first row of data, from 1; one beyond the header where there is none.
+    decimal : "." or ",".   thousands : what sets thousands apart, "" where nothing does.
     again : lines of header and units, which may come again further down and are no data then.
+    rows : cells of the first rows of data.
     made_by : the logger or program whose format it is, "" where nothing tells.
-    rate : of samples, that the preamble tells [Hz]; 0 where it tells none.
     """
 
     encoding: str
     delimiter: str
-    decimal: str
-    thousands: str
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    columns: Columns
     first: int
-    again: tuple[str, ...]
-    numeric: tuple[bool, ...]
-    rows: tuple[tuple[str, ...], ...]
-    words: tuple[str, ...]
-    made_by: str
-    rate: float = 0.0
+    decimal: str = "."
+    thousands: str = ""
+    again: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    made_by: str = ""
 
 
 class _Line(NamedTuple):
@@ -132,7 +128,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     if section is not None:
         return _racelogic(path, lines, encoding, section)
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
-    way = _way(filled[-TAIL:])
+    way = _way(filled[-_TAIL:])
     if way is None:
         return _no_data(path, lines, encoding)
     require_few(RecordingError, str(path), way.width, "columns", "columns")
@@ -231,12 +227,12 @@ def _is_instant(cell: str) -> bool:
 def _way(tail: list[str]) -> _Way | None:
     """Return how cells are written; None where hardly any is a number in any way."""
     best: _Way | None = None
-    for delimiter in DELIMITERS:
+    for delimiter in _DELIMITERS:
         rows = [cells_of(line, delimiter) for line in tail]
         width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2:
             continue
-        cells = [cell for row in rows if len(row) == width for cell in row[:MANY] if cell]
+        cells = [cell for row in rows if len(row) == width for cell in row[:_MANY] if cell]
         for decimal, thousands in ((".", ""), (",", ""), (".", ","), (",", ".")):
             if thousands == delimiter and not any(thousands in cell for cell in cells):
                 continue
@@ -256,7 +252,7 @@ def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
 
 
 def _numbers_in(line: _Line, way: _Way) -> int:
-    cells = [cell for cell in line.cells[:MANY] if cell]
+    cells = [cell for cell in line.cells[:_MANY] if cell]
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
@@ -265,7 +261,7 @@ def _is_data(line: _Line, way: _Way) -> bool:
     if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
-    filled = [cell for cell in cells[:MANY] if cell]
+    filled = [cell for cell in cells[:_MANY] if cell]
     right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
     return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
 
@@ -304,11 +300,11 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     ]
     again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
     rows = (line.cells for line in lines[first:])
-    data = tuple(islice((row for row in rows if len(row) == len(names)), ROWS))
+    data = tuple(islice((row for row in rows if len(row) == len(names)), _ROWS))
     made_by = _maker(lines[:first])
     words = [
         _encoding_word(encoding),
-        f"cells apart by {DELIMITERS[way.delimiter]} ({_sure(way.share)})",
+        f"cells apart by {_DELIMITERS[way.delimiter]} ({_sure(way.share)})",
         "decimal comma" if way.decimal == "," else "decimal point",
     ]
     words += [f"thousands apart by {shown(way.thousands)}"] * bool(way.thousands)
@@ -316,20 +312,18 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     words += [f"names in line {names_line.number}"]
     words += [f"units in line {units_line.number}"] if units_line is not None else []
     words += [] if units_line is not None or not any(units) else ["units in the names"]
+    rate = _given_rate([line.text for line in lines[: lines.index(names_line)]])
+    numeric = _numeric(data, names, way)
     return Layout(
         encoding=encoding,
         delimiter=way.delimiter,
+        columns=Columns(tuple(names), tuple(units), numeric, tuple(words), rate),
+        first=lines[first].number,
         decimal=way.decimal,
         thousands=way.thousands,
-        names=tuple(names),
-        units=tuple(units),
-        first=lines[first].number,
         again=again,
-        numeric=_numeric(data, names, way),
         rows=data,
-        words=tuple(words),
         made_by=made_by,
-        rate=_given_rate([line.text for line in lines[: lines.index(names_line)]]),
     )
 
 
@@ -344,7 +338,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
             rate = PER_SECOND[time_unit(found[2] or "s")] / step if step else 0.0
         else:
             continue
-        if RATES[0] <= rate <= RATES[1]:
+        if _RATES[0] <= rate <= _RATES[1]:
             return rate
     return 0.0
 
@@ -352,7 +346,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
-    full = sorted(_numbers_in(lines[k], way) for k in above[-TAIL:])[len(above[-TAIL:]) // 2]
+    full = sorted(_numbers_in(lines[k], way) for k in above[-_TAIL:])[len(above[-_TAIL:]) // 2]
     first = None
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
@@ -395,7 +389,7 @@ def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
     """Return the lines of names and of units, of those above the data, the nearest first."""
     fitting = [line for line in zone[:6] if way.width - 1 <= len(_uncommented(line, way))]
     if not fitting:
-        return zone[0], None  # of another width, which the first row of data will be told
+        return zone[0], None  # of another width: the first row of data is refused
     units = next((line for line in fitting[:3] if is_units_row(_uncommented(line, way))), None)
     if units is None or len(fitting) == 1:
         return fitting[0], None
@@ -425,7 +419,7 @@ def _all_instants(cells: Sequence[str]) -> bool:
 
 
 def _sure(share: float) -> str:
-    return "sure" if share > CLEAR else "likely" if share > 0.6 else "a guess"
+    return "sure" if share > _CLEAR else "likely" if share > 0.6 else "a guess"
 
 
 def _encoding_word(encoding: str) -> str:
@@ -450,24 +444,17 @@ def _maker(lines: Sequence[_Line]) -> str:
 
 def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
     number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
-    delimiter = max(DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
+    delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
     names = cells_of(text, delimiter)
     require_few(RecordingError, str(path), len(names), "columns", "columns")
     after = cells_of(lines[number], delimiter) if number < len(lines) else ()
     under = len(after) == len(names) and is_units_row(after)
+    words = (_encoding_word(encoding), f"names in line {number}")
+    units = tuple(unit_in_name(name) for name in names)
+    columns = Columns(names, units, (True,) * len(names), words)
+    first = number + 1 + under
     return Layout(
-        encoding=encoding,
-        delimiter=delimiter,
-        decimal=".",
-        thousands="",
-        names=names,
-        units=tuple(unit_in_name(name) for name in names),
-        first=number + 1 + under,
-        again=(text,),
-        numeric=(True,) * len(names),
-        rows=(),
-        words=(_encoding_word(encoding), f"names in line {number}"),
-        made_by="",
+        encoding=encoding, delimiter=delimiter, columns=columns, first=first, again=(text,)
     )
 
 
@@ -503,29 +490,23 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         units = _with_channel_units(lines, at, names, units)
     known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
     units = [unit or known.get(name.lower(), "") for name, unit in zip(names, units, strict=True)]
-    units = [
-        "hhmmss" if name.lower() == "time" else u for name, u in zip(names, units, strict=True)
-    ]
+    units = [known["time"] if a.lower() == "time" else u for a, u in zip(names, units, strict=True)]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
-    way = _way([line for line in lines[first:] if line.strip()][-TAIL:])
+    way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])
     decimal = "." if way is None else way.decimal
+    words = (
+        _encoding_word(encoding),
+        "Racelogic VBOX sections (sure)",
+        "decimal comma" if decimal == "," else "decimal point",
+    )
     return Layout(
         encoding=encoding,
         delimiter=BLANKS,
-        decimal=decimal,
-        thousands="",
-        names=names,
-        units=tuple(units),
+        columns=Columns(names, tuple(units), (True,) * len(names), words),
         first=first + 1,
-        again=(),
-        numeric=(True,) * len(names),
-        rows=tuple(data[:ROWS]),
-        words=(
-            _encoding_word(encoding),
-            "Racelogic VBOX sections (sure)",
-            "decimal comma" if decimal == "," else "decimal point",
-        ),
+        decimal=decimal,
+        rows=tuple(data[:_ROWS]),
         made_by="Racelogic VBOX",
     )
 

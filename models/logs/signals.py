@@ -5,16 +5,17 @@ axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is posit
 """
 
 import math
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
+from pathlib import Path
 
 import numpy as np
 
 from codegen.arrays import Array, filled
 from codegen.escape import shown
 from models.logs.log import RecordingError
-from models.logs.units import ACCELERATION, ANGLE, FORCE, LENGTH, RATE, SPEED, TURNS, quantities
+from models.logs.units import FORCE, RATE, TURNS, quantities
 
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
@@ -22,42 +23,12 @@ AXLES = (("wheel_fl", "wheel_fr"), ("wheel_rl", "wheel_rr"))
 WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # turns or speeds, the last of one encoder: for v_x
 POSE = ("x", "y", "heading")  # position and angle from x to y, of which v_x, v_y and r are made
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
-QUANTITIES: Mapping[str, str] = MappingProxyType(
-    {
-        "v_x": SPEED,
-        "v_y": SPEED,
-        BETA: ANGLE,
-        "r": RATE,
-        "delta_f": ANGLE,
-        "delta_r": ANGLE,
-        "a_y": ACCELERATION,
-        "a_x": ACCELERATION,
-        "x": LENGTH,
-        "y": LENGTH,
-        "heading": ANGLE,  # or four channels, of a quaternion x, y, z, w
-        "Fyf": FORCE,
-        "Fyr": FORCE,
-        **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
-    }
-)
-COLUMNS = {
-    "v_x": "vx",
-    "v_y": "vy",
-    "a_y": "ay",
-    "a_x": "ax",
-}  # what a column is called where it differs
-MEANINGS: Mapping[str, str] = MappingProxyType(
-    {
-        "v_x": "forward speed", "v_y": "lateral velocity", BETA: "sideslip angle", "r": "yaw rate",
-        "delta_f": "front steering angle", "delta_r": "rear steering angle",
-        "a_y": "lateral acceleration", "a_x": "longitudinal acceleration", "x": "position",
-        "y": "position", "heading": "heading", "Fyf": "front axle force", "Fyr": "rear axle force",
-        "wheel_fl": "speed of the front left wheel", "wheel_fr": "speed of the front right wheel",
-        "wheel_rl": "speed of the rear left wheel", "wheel_rr": "speed of the rear right wheel",
-        "wheel": "speed of the wheels, by one encoder",
-    }
-)  # fmt: skip
-SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody told it, it is left out
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+QUANTITIES: Mapping[str, str] = {name: one["quantity"] for name, one in _TABLE.items()}
+# What a column is called where it differs.
+COLUMNS: Mapping[str, str] = {n: one["column"] for n, one in _TABLE.items() if "column" in one}
+MEANINGS: Mapping[str, str] = {name: one["meaning"] for name, one in _TABLE.items()}
+SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody declared it, it is left out
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
@@ -130,8 +101,8 @@ class Signal:
         if self.table and self.ratio != 1.0:
             raise RecordingError("ratio and table say the same: give one of them")
         if self.table:
-            hand, road = np.array(self.table).T
-            if len(self.table) < 2 or not ((np.diff(hand) > 0.0) & (np.diff(road) > 0.0)).all():
+            rises = np.diff(self.table, axis=0) > 0.0
+            if len(self.table) < 2 or not (rises.all() and np.isfinite(self.table).all()):
                 raise RecordingError(
                     "table must hold at least two pairs [hand wheel, road wheel] in rad that rise, "
                     f"not {shown(str(self.table))}"

@@ -27,29 +27,29 @@ from models.logs.spelling import unit_in_name
 from models.logs.units import PER_SECOND, TABLES, time_unit
 
 MISSING = -(2**63)  # an instant that is not there, in ns
-DAY = 86400.0
+_DAY = 86400.0
 NAMES: tuple[str, ...] = tuple(TABLES["clock"]["names"].split())
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 _EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 CALENDAR = 1e8  # [s]: times above count from 1970
 _MICROSECONDS = 1e6
-FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
+_FASTEST, _SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
 _COARSEST = 1.0  # between stamps without a unit: more than that are no seconds
-TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
-WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
+_TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
+_WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
 _MOST_STEPS = 100_000  # samples that a rate is taken from
-SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
-JITTER, WINDOW = 1.2, 50  # steps that stamps of an even clock may lie apart, samples of a mean
-PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
-BACK, FEWEST = 1.0, 10  # [s], samples: what goes back so far and lasts so long is no sample astray
+_SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
+_JITTER, _WINDOW = 1.2, 50  # steps that stamps of an even clock may lie apart, samples of a mean
+_PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
+_BACK, _FEWEST = 1.0, 10  # [s], samples: what goes back so far, so long is no sample astray
 
-REPEATED = 0.2  # share of stamps of a column that repeat, of which another may be finer
-WAYS = TABLES["clock"]["ways"].split()
+_REPEATED = 0.2  # share of stamps of a column that repeat, of which another may be finer
+_WAYS = TABLES["clock"]["ways"].split()
 _COUNTERS = tuple(TABLES["clock"]["counters"].split())
 
 _MENDING = '--mend-clock (in Python LogMap(order="mend"))'
 
-_OTHER_RATE, NEAR = 0.2, 60.0  # share of a step, [s]: of a clock that another column has for itself
+_OTHER_RATE, _NEAR = 0.2, 60.0  # share of a step, [s]: of another clock
 
 _DATE = re.compile(
     r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d))(?:[T, ]+(.+))?"
@@ -159,7 +159,8 @@ def _even(
 
 def _is_way(name: str, unit: str) -> bool:
     plain = _plain(name)
-    return plain in WAYS or (plain.endswith(("distance", "dist")) and unit in ("", "m", "km", "ft"))
+    far = plain.endswith(("distance", "dist")) and unit in ("", "m", "km", "ft")
+    return plain in _WAYS or far
 
 
 @np.errstate(all="ignore")
@@ -179,7 +180,6 @@ def own_clocks(
     names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]], first: Clock
 ) -> dict[int, Clock]:
     """Return by column the clock of those that stand behind a time of their own; else nothing.
-
     So tables are written whose channels were sampled at rates of their own: "time_1, v_x, time_2,
     v_y". It is such a table where it begins with a time, a channel stands between any two, and one
     of the others, called alike or of another rate, rises without a rest from about the same instant
@@ -211,10 +211,10 @@ def _is_beside(
     times = []
     for advice, column in ((clock, cells), (first, first_cells)):
         numbers = [value for cell in column if (value := _number(cell)) is not None]
-        if advice.unit not in PER_SECOND or len(numbers) < FEWEST:
+        if advice.unit not in PER_SECOND or len(numbers) < _FEWEST:
             return False
         times.append(np.array(numbers) / PER_SECOND[advice.unit])
-    if any((np.diff(t) <= 0.0).any() for t in times) or abs(times[0][0] - times[1][0]) > NEAR:
+    if any((np.diff(t) <= 0.0).any() for t in times) or abs(times[0][0] - times[1][0]) > _NEAR:
         return False
     if _plain(clock.name) == _plain(first.name):
         return not np.array_equal(times[0], times[1])
@@ -259,14 +259,14 @@ def _clock(
     if not fits(np.diff(t)):
         return None
     if kind == "instant":
-        return Clock(column, name, kind, False, f"{name!r} as date or time of day, {words}")
+        return Clock(column, name, kind, f"{name!r} as date or time of day, {words}")
     if kind == "hhmmss":
-        return Clock(column, name, kind, False, f"{name!r} as hhmmss, {words}")
+        return Clock(column, name, kind, f"{name!r} as hhmmss, {words}")
     advice = time_unit(unit)
     found, epoch = _unit(t, advice)
     since = " since 1970" if epoch else ""
     guessed = "" if advice else ", a unit that its steps tell (likely)"
-    return Clock(column, name, found, epoch, f"{name!r} in {found}{since}, {words}{guessed}")
+    return Clock(column, name, found, f"{name!r} in {found}{since}, {words}{guessed}")
 
 
 def _is_any(_: Array) -> bool:
@@ -275,7 +275,7 @@ def _is_any(_: Array) -> bool:
 
 def _moves(steps: Array) -> bool:
     """Return whether steps rise, and hardly any stands still."""
-    return _rises(steps) and not (steps.size and float((steps == 0.0).mean()) > REPEATED)
+    return _rises(steps) and not (steps.size and float((steps == 0.0).mean()) > _REPEATED)
 
 
 def _rises(steps: Array) -> bool:
@@ -303,7 +303,7 @@ def _unit(t: Array, advice: str) -> tuple[str, bool]:
         return advice, False
     if not _step(finite, "s") < _COARSEST:
         for unit in ("ms", "us", "ns"):
-            if FASTEST <= _step(finite, unit) <= SLOWEST:
+            if _FASTEST <= _step(finite, unit) <= _SLOWEST:
                 return unit, False
     return "s", False
 
@@ -372,22 +372,16 @@ def _of_duration(found: re.Match[str]) -> int | None:
 
 def _of_day(text: str) -> int | None:
     """Return a time of day [ns], less its time zone."""
-    found = _TIME.fullmatch(text)
+    found = _TIME.fullmatch(text) or _SHORT.fullmatch(text)
     if found is None:
-        short = _SHORT.fullmatch(text)
-        if short is None:
+        return None
+    hours, minutes, whole, part, *more = found.groups()
+    half, sign, *away = more or (None, None)
+    if half:
+        if not hours or not 1 <= int(hours) <= 12:
             return None
-        hours, minutes, whole, part = short.groups()
-        zone = 0
-    else:
-        hours, minutes, whole, part = found[1], found[2], found[3], found[4]
-        if found[5]:
-            if not hours or not 1 <= int(hours) <= 12:
-                return None
-            hours = str(int(hours) % 12 + 12 * (found[5] in "pP"))
-        zone = 0
-        if found[6]:
-            zone = (int(found[7]) * 60 + int(found[8])) * (-1 if found[6] == "-" else 1)
+        hours = str(int(hours) % 12 + 12 * (half in "pP"))
+    zone = (int(away[0]) * 60 + int(away[1])) * (-1 if sign == "-" else 1) if sign else 0
     if len(hours or "") > 6 or int(minutes) > 59 or int(whole) > 60:
         return None
     seconds = int(hours or 0) * 3600 + (int(minutes) - zone) * 60 + int(whole)
@@ -435,8 +429,8 @@ def seconds(
     fall = _first_step(t, lambda step: step < 0.0)
     if fall is not None and clock.unit in ("instant", "hhmmss"):
         steps = np.diff(t)
-        days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * DAY) & (steps > -1.1 * DAY))])
-        later: Array = np.round(t + DAY * days, 6)
+        days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * _DAY) & (steps > -1.1 * _DAY))])
+        later: Array = np.round(t + _DAY * days, 6)
         t = later
         fall = _first_step(t, lambda step: step < 0.0)
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
@@ -462,7 +456,7 @@ def risen(
     mend: bool = False,
     restarts: bool = True,
 ) -> Stamps:
-    clock = Clock(0, name, "s", False, "")
+    clock = Clock(0, name, "s", "")
     return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 
 
@@ -474,8 +468,8 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     falls = (np.flatnonzero(np.diff(t) < 0.0) + 1).tolist()
     begins = [0]
     for first, end in pairwise([*falls, t.size]):
-        lasts = end - first >= FEWEST and t[end - 1] - t[first] >= BACK
-        if lasts and t[first - 1] - t[first] >= BACK:
+        lasts = end - first >= _FEWEST and t[end - 1] - t[first] >= _BACK
+        if lasts and t[first - 1] - t[first] >= _BACK:
             begins.append(first)
     if len(begins) > 1 and not restarts:
         return None
@@ -489,10 +483,10 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
         risen = piece[order]
         single = np.concatenate([[True], np.diff(risen) > 0.0])
         orders.append(first + order[single])
-        times.append(risen[single] + (times[-1][-1] + PAUSE - risen[0] if times else 0.0))
+        times.append(risen[single] + (times[-1][-1] + _PAUSE - risen[0] if times else 0.0))
     found = np.concatenate(times)
     twice = t.size - found.size
-    if t.size >= SHARED * found.size:
+    if t.size >= _SHARED * found.size:
         return None  # rounded, or written twice throughout: who leaves them out leaves out too much
     notes = []
     if late:
@@ -500,8 +494,8 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     if twice:
         notes.append(f"samples that share their stamp with one before are left out: {twice}")
     if len(begins) > 1:
-        again = len(begins) - 1
-        notes.append(f"times it goes back by {BACK:g} s or more, and on {PAUSE:g} s later: {again}")
+        back = f"times it goes back by {_BACK:g} s or more, and on {_PAUSE:g} s later"
+        notes.append(f"{back}: {len(begins) - 1}")
     return Stamps(found, tuple(notes), np.concatenate(orders))
 
 
@@ -593,28 +587,27 @@ def _even_clock(t: Array) -> _Even | None:
     if tick is None or tick > 1.0:
         return None
     repeats = bool(moves.size < steps.size)
-    if repeats and shared < SHARED:
+    if repeats and shared < _SHARED:
         return _unjittered(t)
     usual = float(np.median(moves))
     near = moves[moves < usual + 1.5 * tick]
-    if not repeats and (not WORTH * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick):
+    if not repeats and (not _WORTH * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick):
         return None  # by a coarser tick a lost sample could look rounded
     return _fitted(t, tick)
 
 
 def _unjittered(t: Array) -> _Even | None:
     """Return the even clock of stamps that jitter so far that some are there twice; or None.
-
     They must wander about it by less than a step, and not drift by half of one: then none is lost.
     """
     usual = float(np.median(np.diff(t)))
-    dt = _even_step(t, JITTER * usual) if usual > 0.0 else None
-    if dt is None or t.size < 2 * WINDOW:
+    dt = _even_step(t, _JITTER * usual) if usual > 0.0 else None
+    if dt is None or t.size < 2 * _WINDOW:
         return None
     off = t - dt * np.arange(t.size)
-    smooth = np.convolve(off, np.full(WINDOW, 1.0 / WINDOW), "valid")
+    smooth = np.convolve(off, np.full(_WINDOW, 1.0 / _WINDOW), "valid")
     rough = float(np.median(np.abs(np.diff(off))))
-    if np.ptp(off) > JITTER * dt or np.ptp(smooth) > 0.5 * dt or rough < 0.1 * dt:
+    if np.ptp(off) > _JITTER * dt or np.ptp(smooth) > 0.5 * dt or rough < 0.1 * dt:
         return None
     begin = float(off.max() + off.min()) / 2.0
     even = np.round(begin + dt * np.arange(t.size), 9)
@@ -625,7 +618,7 @@ def _tick(t: Array) -> float | None:
     """Return what stamps are rounded to: the coarsest tick of which all are whole numbers [s]."""
     some = t[: 1 << 17]
     lost = float(np.spacing(np.abs(some).max()))  # by floats, of seconds since 1970 0.24 us
-    for tick in TICKS:
+    for tick in _TICKS:
         counts = some / tick
         if lost < 0.01 * tick and np.abs(counts - np.rint(counts)).max() < 1e-4 + lost / tick:
             return tick
@@ -692,7 +685,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     assert k is not None
     said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
     if t[k + 1] < t[k]:
-        if not restarts and t[k] - t[k + 1] >= BACK:
+        if not restarts and t[k] - t[k + 1] >= _BACK:
             return said + "the clock starts again beside others: cut the log there"
         if _starts_again(t[0], t[k], t[k + 1]):
             return said + (
@@ -704,7 +697,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     moves = int(np.count_nonzero(steps > 0.0))
     if k == 0 and not moves:
         return said + "it never moves: declare the column of the time"
-    if moves and steps.size / moves >= SHARED:
+    if moves and steps.size / moves >= _SHARED:
         return said + (
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "
             "explains them: export time with more digits"

@@ -28,8 +28,8 @@ from models.logs.stamps import (
 )
 from models.schema import LONGEST_NAME, limits, require_few
 
-RUN = "run"
-LONG = 8  # columns at most of a table with a row for each value
+_RUN = "run"
+_LONG = 8  # columns at most of a table with a row for each value
 _MOST_WORDS = 10_000  # names of runs in one log
 
 
@@ -43,7 +43,6 @@ class Kind(Enum):
 
 class Words(NamedTuple):
     """A column of words: the distinct ones in their order, and which of them each row has.
-
     names: of the words; codes: (n,) places among them.
     """
 
@@ -59,7 +58,6 @@ class Words(NamedTuple):
 
 class Cells(NamedTuple):
     """Columns of a table.
-
     columns: column from 0 -> (n,) float64, or int64 of nanoseconds; words: column -> its words;
     rows: (n,) lines of a text or rows from 1, for messages.
     """
@@ -67,6 +65,20 @@ class Cells(NamedTuple):
     columns: dict[int, NDArray[Any]]
     words: dict[int, Words]
     rows: NDArray[np.int64]
+
+
+class Columns(NamedTuple):
+    """What a file tells of its columns, before its cells are read.
+    names: as in the file, which may repeat; units: "" where none is given; numeric: whether they
+    hold numbers; words: how the file is written, for people; rate: samples per second that the file
+    tells of all rows [Hz], 0 where it tells none.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    numeric: tuple[bool, ...]
+    words: tuple[str, ...] = ()
+    rate: float = 0.0
 
 
 class Table(Protocol):
@@ -85,24 +97,8 @@ class Table(Protocol):
         """What a sample is in: "line" or "row"."""
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all columns as in the file; they may repeat."""
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Their units, "" where none is given."""
-
-    @property
-    def numeric(self) -> tuple[bool, ...]:
-        """Which of them hold numbers."""
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """How the file is written, for people."""
-
-    @property
-    def rate(self) -> float:
-        """Samples per second that the file tells of all rows [Hz], 0 where it tells none."""
+    def columns(self) -> Columns:
+        """All columns."""
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column as text, "" where one is missing."""
@@ -203,6 +199,10 @@ class TableLog:
         return self.table.path
 
     @property
+    def _columns(self) -> Columns:
+        return self.table.columns
+
+    @property
     def format(self) -> str:
         return self.table.format
 
@@ -210,7 +210,7 @@ class TableLog:
     def dialect(self) -> tuple[str, ...]:
         """How the file is written, as it was detected, for people."""
         clock = self.clock
-        return (*self.table.words, *((f"time is {clock.words}",) if clock is not None else ()))
+        return (*self._columns.words, *((f"time is {clock.words}",) if clock is not None else ()))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -224,7 +224,7 @@ class TableLog:
         """Names of all columns, each once: the second "v" is "v (2)"."""
         seen: dict[str, int] = {}
         unique: list[str] = []
-        for k, name in enumerate(self.table.names):
+        for k, name in enumerate(self._columns.names):
             name = name or f"column {k + 1}"
             seen[name] = seen.get(name, 0) + 1
             unique.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
@@ -237,13 +237,13 @@ class TableLog:
         if self.rate:
             return None
         if not self.clock_name:
-            return find_clock(self.names, table.units, table.first_rows)
+            return find_clock(self.names, self._columns.units, table.first_rows)
         name = self.clock_name
-        if name not in self._places:  # it may stand with its unit in the file, or the unit be told
+        if name not in self._places:  # it may stand with its unit in the file, or the unit be given
             bare = [one for one in self.names if without_unit(one) == without_unit(name)]
             name = bare[0] if len(bare) == 1 else name
         (column,) = chosen(self.path, [name], self._places)
-        unit = self.clock_unit or table.units[column] or unit_in_name(self.clock_name)
+        unit = self.clock_unit or self._columns.units[column] or unit_in_name(self.clock_name)
         given = given_clock(column, name, unit, table.first_rows(column))
         if given is None:
             raise RecordingError(
@@ -255,7 +255,9 @@ class TableLog:
     @property
     def may_be_long(self) -> bool:
         """Whether a row may be one value of a channel that it names."""
-        return len(self.names) <= LONG and not all(self.table.numeric) and RUN not in self.names
+        return (
+            len(self.names) <= _LONG and not all(self._columns.numeric) and _RUN not in self.names
+        )
 
     @cached_property
     def start(self) -> float:
@@ -266,25 +268,27 @@ class TableLog:
 
     @cached_property
     def _even(self) -> float:
-        """The rate of samples [Hz], told or, without a time, of the preamble; 0 where none is."""
-        return self.rate or (self.table.rate if self.clock is None else 0.0)
+        """The rate of samples [Hz], given or, without a time, of the preamble; 0 where none is."""
+        return self.rate or (self._columns.rate if self.clock is None else 0.0)
 
     @cached_property
     def _own_clocks(self) -> dict[int, Clock]:
         if self.clock_name or self.clock is None or self._run_column is not None:
             return {}
-        return own_clocks(self.names, self.table.units, self.table.first_rows, self.clock)
+        return own_clocks(self.names, self._columns.units, self.table.first_rows, self.clock)
 
     @cached_property
     def _run_column(self) -> int | None:
-        return self.names.index(RUN) if RUN in self.names else None
+        return self.names.index(_RUN) if _RUN in self.names else None
 
     @cached_property
     def _channels(self) -> tuple[int, ...]:
         """Which columns are channels: the numeric ones, but for the clock and the runs."""
         other = {None if self.clock is None else self.clock.column, self._run_column}
         other |= {clock.column for clock in self._own_clocks.values()}
-        return tuple(k for k, is_one in enumerate(self.table.numeric) if is_one and k not in other)
+        return tuple(
+            k for k, is_one in enumerate(self._columns.numeric) if is_one and k not in other
+        )
 
     @property
     def unlisted(self) -> tuple[str, ...]:
@@ -293,7 +297,7 @@ class TableLog:
 
     def headings(self) -> tuple[Heading, ...]:
         """Return names and units of the numeric columns, but for the clock and the runs."""
-        units = self.table.units
+        units = self._columns.units
         return tuple(Heading(self.names[k], units[k]) for k in self._channels)
 
     def listed(self) -> tuple[Listed, ...]:
@@ -357,7 +361,7 @@ class TableLog:
         """
         places, clock = chosen(self.path, names, self._places), self.clock
         if clock is None and not self._even:
-            why = no_clock(self.names, self.table.units, self.table.first_rows)
+            why = no_clock(self.names, self._columns.units, self.table.first_rows)
             raise RecordingError(f"{self.path}: {why}; columns found: '{some(self.names)}'")
         clocks = {k: self._own_clocks.get(k, clock) for k in places}
         kinds = {one.column: kind_of(one) for one in clocks.values() if one}
@@ -379,7 +383,7 @@ class TableLog:
             channels.append(
                 Channel(
                     name=name,
-                    unit=self.table.units[k],
+                    unit=self._columns.units[k],
                     t=stamps.t,
                     values=stamps.t if asked else stamps.of(cells.columns[k]),
                     place=self.table.place,

@@ -24,7 +24,7 @@ from models.logs import arrow
 from models.logs.log import RecordingError
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
-from models.logs.table import Cells, Gathered, Kind, TableLog, Words
+from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
 from models.schema import pieces, require_few
 
 BLOCK, SMALL_BLOCK = 1 << 22, 1 << 19  # bytes of text that are read at once: pyarrow, Python
@@ -43,7 +43,7 @@ def open_text(path: Path) -> TableLog:
             head, whole = head[:HEAD], False
             break
     layout = find_layout(path, head, whole)
-    require_few(RecordingError, str(path), len(layout.names), "columns", "columns")
+    require_few(RecordingError, str(path), len(layout.columns.names), "columns", "columns")
     table = TextTable(path=path, layout=layout)
     return TableLog(table=table)
 
@@ -65,28 +65,8 @@ class TextTable:
         return "VBO" if self.layout.made_by == "Racelogic VBOX" else "CSV"
 
     @property
-    def names(self) -> tuple[str, ...]:
-        return self.layout.names
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Units of the columns, "" where none is given."""
-        return self.layout.units
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """How the file is written, for people."""
-        return self.layout.words
-
-    @property
-    def rate(self) -> float:
-        """Samples per second by the lines above the table [Hz], 0 where they tell none."""
-        return self.layout.rate
-
-    @property
-    def numeric(self) -> tuple[bool, ...]:
-        """Which columns hold numbers, by the first rows."""
-        return self.layout.numeric
+    def columns(self) -> Columns:
+        return self.layout.columns
 
     def first_rows(self, column: int) -> list[str]:
         """Return the first cells of a column, with decimal points, "" where one is missing.
@@ -104,7 +84,7 @@ class TextTable:
         run : a column and the word that it must have; other rows are left out.
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
-        gathered = Gathered(self.path, wanted, self.names, "line", run)
+        gathered = Gathered(self.path, wanted, self.columns.names, "line", run)
         reader = _Python(self.path, self.layout, wanted)
         fast = arrow.is_used(self.path) if self.arrow is None else self.arrow
         fast = fast and arrow.is_installed()
@@ -206,7 +186,7 @@ class _Python:
 
     def __init__(self, path: Path, layout: Layout, wanted: Mapping[int, Kind]) -> None:
         self._path, self._layout, self._wanted = path, layout, wanted
-        self._width = len(layout.names)
+        self._width = len(layout.columns.names)
         again = [list(cells_of(one, layout.delimiter)) for one in layout.again]
         self._again = [one for one in again if any(one)]
         self._marks = [one.encode() for one in COMMENT]
@@ -257,14 +237,14 @@ class _Python:
             return False
         if len(cells) == self._width + 1 and not cells[-1].strip():
             cells.pop()  # a delimiter at the end
-        elif len(cells) == self._width - 1 and not self._layout.names[-1]:
+        elif len(cells) == self._width - 1 and not self._layout.columns.names[-1]:
             cells.append("")  # no delimiter at the end, where others have one
         if len(cells) != self._width:
             raise RecordingError(
                 f"{self._path}: line {row.line} has {len(cells)} cells, the header has "
                 f"{self._width}; was the file cut off?"
             )
-        return _stripped(cells) not in self._again
+        return [cell.strip() for cell in cells] not in self._again
 
     def _column(
         self, column: int, kind: Kind, cells: list[str], lines: Sequence[int], marked: bool
@@ -302,14 +282,11 @@ class _Python:
             k = values.index(None)
             comma = self._layout.decimal == "," and "." in cells[k]
             raise RecordingError(
-                f"{self._path}: {self._layout.names[column]} must be {what}, line {lines[k]} has "
-                f"{shown(cells[k])}" + (" where others have decimal commas" if comma else "")
+                f"{self._path}: {self._layout.columns.names[column]} must be {what}, line "
+                f"{lines[k]} has {shown(cells[k])}"
+                + (" where others have decimal commas" if comma else "")
             )
         return np.array(values, dtype=dtype)
-
-
-def _stripped(cells: Sequence[str]) -> list[str]:
-    return [cell.strip() for cell in cells]
 
 
 def _float(cell: str, decimal: str, thousands: str) -> float | None:

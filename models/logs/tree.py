@@ -18,15 +18,17 @@ from codegen.arrays import Array
 from models.logs.stamps import NAMES
 
 # Of a variable: a name that a clock has, and the unit that may follow it.
-CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
+_CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
 _OTHER_CLOCKS = ("tout", "timestep")
 HEAD = 200  # times by which a clock is known
-DATA = ("data", "values", "value", "samples", "raw")
-NAME = ("name", "label", "signalname", "blockname")
-UNIT = ("unit", "units")
-COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
-RATES = ("fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq")
-STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
+_DATA = ("data", "values", "value", "samples", "raw")
+_NAME = ("name", "label", "signalname", "blockname")
+_UNIT = ("unit", "units")
+_COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
+_RATES = (
+    "fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq",
+)  # fmt: skip
+_STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
 _LEAST_RATE, _MOST_RATE = 1.0, 1e5  # [Hz]
 _MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
@@ -51,7 +53,6 @@ Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
 
 class Clock(NamedTuple):
     """Times of samples.
-
     leaf, column: where they are; unit: that is given of it, "" for none.
     """
 
@@ -63,7 +64,6 @@ class Clock(NamedTuple):
 
 class Signal(NamedTuple):
     """A channel of a tree.
-
     place: which column, or row where `along` is 1, of the leaf.
     """
 
@@ -79,7 +79,7 @@ class Signal(NamedTuple):
         return self.leaf.shape[self.along]
 
 
-class Found(NamedTuple):
+class _Found(NamedTuple):
     """What a tree holds: signals, names of vectors without clock, names of what is not read."""
 
     signals: tuple[Signal, ...]
@@ -88,7 +88,7 @@ class Found(NamedTuple):
     said: tuple[str, ...] = ()
 
 
-def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
+def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> _Found:
     """Return the channels of a tree, in its order; their names may repeat.
     rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
         the like of the tree, if there is one.
@@ -97,21 +97,16 @@ def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> Found:
     walk.struct(dict(tree), "", ())
     rate = rate or walk.rate
     if not rate or not walk.clockless:
-        return Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
+        return _Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
     sizes = Counter(max(leaf.shape) for _, _, leaf, _ in walk.clockless.values())
     samples = sizes.most_common(1)[0][0]
-    clock = Clock(
-        f"even {rate:g} Hz", Leaf(shape=(samples, 1), load=lambda: _even(samples, rate)), None, "s"
-    )
+    even = Leaf(shape=(samples, 1), load=lambda: (np.arange(samples) / rate).reshape(-1, 1))
+    clock = Clock(f"even {rate:g} Hz", even, None, "s")
     rest = _Walk()
     for name, unit, leaf, columns in walk.clockless.values():
         rest.leaf(leaf, name, unit, (clock,), columns)
     said = (f"time is even at {rate:g} Hz of vectors without a time of their own",)
-    return Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
-
-
-def _even(samples: int, rate: float) -> Array:
-    return (np.arange(samples) / rate).reshape(-1, 1)
+    return _Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
 
 
 def times_of(clock: Clock) -> Array:
@@ -140,14 +135,14 @@ class _Walk:
         clocks = (*_clocks_of(node, path), *clocks)
         own = [clock.leaf for clock in clocks]
         columns = _columns(node)
-        data = _pick(node, DATA)
+        data = _pick(node, _DATA)
         if any(data is leaf for leaf in own):
             return
-        if isinstance(data, Leaf) and (clocks or _text(node, UNIT)) and not _several(node):
-            label = _text(node, NAME) or path
+        if isinstance(data, Leaf) and (clocks or _text(node, _UNIT)) and not _several(node):
+            label = _text(node, _NAME) or path
             self.leaf(data, label, _unit(node), clocks, columns)
             return
-        units = _pick(node, UNIT)
+        units = _pick(node, _UNIT)
         known = units if isinstance(units, dict) else {}
         for key, child in node.items():
             name = f"{path}.{key}" if path else key
@@ -181,10 +176,10 @@ class _Walk:
     ) -> None:
         rows, width = leaf.shape
         if rows * width < 2:
-            self.told(name, leaf)
+            self.given_rate(name, leaf)
             return
         for clock in clocks:
-            samples = _samples(clock)
+            samples = max(clock.leaf.shape)
             if samples not in leaf.shape:
                 continue
             along = 0 if rows == samples else 1
@@ -201,12 +196,12 @@ class _Walk:
         else:
             self.clockless[name] = (name, unit, leaf, columns)
 
-    def told(self, name: str, leaf: Leaf) -> None:
+    def given_rate(self, name: str, leaf: Leaf) -> None:
         """Take a single number for the rate of samples, or the time between them, by its name."""
         word = re.sub("[^a-z]", "", name.rpartition(".")[2].lower())
-        if word in RATES + STEPS and leaf.shape == (1, 1):
+        if word in _RATES + _STEPS and leaf.shape == (1, 1):
             value = float(leaf.load()[0, 0])
-            rate = value if word in RATES or not value else 1.0 / value
+            rate = value if word in _RATES or not value else 1.0 / value
             self.rate = rate if _LEAST_RATE <= rate <= _MOST_RATE else self.rate
 
 
@@ -247,24 +242,24 @@ def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
         unit = _unit_of_clock(key)
         name = f"{path}.{key}" if path else key
         if unit is not None and isinstance(child, dict):
-            inner = _pick(child, DATA)
+            inner = _pick(child, _DATA)
             unit, child = _unit(child) or unit, inner if inner is not None else child
         if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
-            units = _pick(node, UNIT)
-            if isinstance(units, dict) and isinstance(told := units.get(key), str):
-                unit = told
+            units = _pick(node, _UNIT)
+            if isinstance(units, dict) and isinstance(given := units.get(key), str):
+                unit = given
             if max(child.shape) > 1:
                 yield Clock(name, child, None, unit)
     x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)
     if isinstance(x, dict) and isinstance(y, dict | list):
-        data = _pick(x, DATA)
+        data = _pick(x, _DATA)
         if isinstance(data, Leaf) and 1 in data.shape:
             yield Clock(f"{path}.X" if path else "X", data, None, "")
 
 
 def _unit_of_clock(name: str) -> str | None:
     """Return the unit that the name of a clock tells, "" for none; None where it names no clock."""
-    found = CLOCK.fullmatch(name.strip().lower())
+    found = _CLOCK.fullmatch(name.strip().lower())
     if found is None:
         return None
     word = re.sub("[^a-z]", "", found[1])
@@ -281,10 +276,6 @@ def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     return clock if bool(np.all(steps > 0.0)) and not counts else None
 
 
-def _samples(clock: Clock) -> int:
-    return max(clock.leaf.shape)
-
-
 def _pick(node: dict[str, Tree], names: Sequence[str]) -> Tree | None:
     """Return the first of a struct's fields that has one of these names, whatever its case."""
     lower = {key.lower(): child for key, child in reversed(list(node.items()))}
@@ -298,7 +289,7 @@ def _several(node: dict[str, Tree]) -> bool:
         for key, child in node.items()
         if isinstance(child, Leaf)
         and max(child.shape) > 1
-        and key.lower() not in DATA
+        and key.lower() not in _DATA
         and _unit_of_clock(key) is None
         and key.lower() not in ("dimensions", "x", "quality")
     ]
@@ -313,7 +304,7 @@ def _text(node: dict[str, Tree], names: Sequence[str]) -> str:
 def _unit(node: dict[str, Tree]) -> str:
     """Return the unit of a struct that is a signal; a timeseries has it in DataInfo."""
     about = _pick(node, ("datainfo",))
-    return _text(node, UNIT) or (_text(about, UNIT) if isinstance(about, dict) else "")
+    return _text(node, _UNIT) or (_text(about, _UNIT) if isinstance(about, dict) else "")
 
 
 def _columns(node: dict[str, Tree]) -> tuple[list[str], list[str]] | None:
@@ -325,5 +316,5 @@ def _columns(node: dict[str, Tree]) -> tuple[list[str], list[str]] | None:
             return []
         return [str(one).strip() for one in found]
 
-    names = words(COLUMNS)
-    return (names, words(UNIT)) if names else None
+    names = words(_COLUMNS)
+    return (names, words(_UNIT)) if names else None

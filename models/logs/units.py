@@ -26,8 +26,8 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
     quantity: {spelling: factor for some, factor in rows for spelling in some.split()}
     for quantity, rows in TABLES["factors"].items()
 }
-OTHERS = {name: tuple(some.split()) for name, some in TABLES["others"].items()}
-_NO_UNIT = ("", *OTHERS.pop("none"))
+_OTHERS = {name: tuple(some.split()) for name, some in TABLES["others"].items()}
+_NO_UNIT = ("", *_OTHERS.pop("none"))
 PER_SECOND = {  # exact
     unit: 1.0 / factor if factor > 1.0 else float(round(1.0 / factor))
     for unit, factor in FACTORS[TIME].items()
@@ -39,15 +39,13 @@ _WORD = re.compile(
 # Where nothing tells a unit: beyond which number it is no SI unit, and which it is then. A hand
 # wheel goes further. No car turns faster than once in a second, or drives at 430 km/h.
 HAND_WHEEL = "angle of a hand wheel"
-FARTHEST = {
+_FARTHEST = {
     SPEED: (120.0, "km/h"),
     ANGLE: (0.8, "deg"),
     HAND_WHEEL: (3.0 * math.pi, "deg"),
     RATE: (2.0 * math.pi, "deg/s"),
 }
-_SMALLEST_ACCELERATION = (
-    2.5  # [m/s²]: a drive that does not reach it teaches no tire, so it is in g
-)
+_SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire: it is in g
 
 
 def _plain(unit: str) -> str:
@@ -79,7 +77,7 @@ def is_known(unit: str) -> bool:
     """Return whether a spelling is a unit of anything that cars log, or stands for none."""
     plain = _plain(unit)
     return plain in _NO_UNIT or any(
-        plain in known for known in (*FACTORS.values(), *OTHERS.values())
+        plain in known for known in (*FACTORS.values(), *_OTHERS.values())
     )
 
 
@@ -109,7 +107,7 @@ def unit_of_range(quantity: str, largest: float) -> str:
     """
     if quantity == ACCELERATION:
         return "g" if largest < _SMALLEST_ACCELERATION else ""
-    limit, unit = FARTHEST.get(quantity, (math.inf, ""))
+    limit, unit = _FARTHEST.get(quantity, (math.inf, ""))
     return unit if largest > limit else ""
 
 
@@ -123,7 +121,7 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     if plain in FACTORS[quantity]:
         return FACTORS[quantity][plain]
     known = ", ".join(TABLES["typical"][quantity].split())
-    other = quantities(unit) or tuple(name for name, all_ in OTHERS.items() if plain in all_)
+    other = quantities(unit) or tuple(name for name, all_ in _OTHERS.items() if plain in all_)
     if other:
         raise RecordingError(
             f"{what} must be in a unit of {_named(quantity)} ({known}), {shown(unit.strip())} is "

@@ -31,7 +31,7 @@ _LEAST_LOAD = 1.0  # a tire is asked at this load or more, and its force scaled 
 _LARGEST_KAPPA = 0.1  # about where a passenger tire has its largest longitudinal force [-]
 
 
-class Wheel(NamedTuple):
+class _Wheel(NamedTuple):
     """Position [m] in the body frame, y > 0 left, and the axle it belongs to (0 front, 1 rear)."""
 
     x: float
@@ -45,19 +45,19 @@ class Wheel(NamedTuple):
         return v_x - self.y * r, v_y + self.x * r
 
 
-def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
+def _wheels(vehicle: Vehicle) -> tuple[_Wheel, _Wheel, _Wheel, _Wheel]:
     """Return the wheels: front left, front right, rear left, rear right."""
     c = vehicle.require_chassis()
     front, rear = 0.5 * c.track_front, 0.5 * c.track_rear
     return (
-        Wheel(vehicle.l_f, front, 0),
-        Wheel(vehicle.l_f, -front, 0),
-        Wheel(-vehicle.l_r, rear, 1),
-        Wheel(-vehicle.l_r, -rear, 1),
+        _Wheel(vehicle.l_f, front, 0),
+        _Wheel(vehicle.l_f, -front, 0),
+        _Wheel(-vehicle.l_r, rear, 1),
+        _Wheel(-vehicle.l_r, -rear, 1),
     )
 
 
-def mounted(tire: Tire, wheel: Wheel) -> Tire:
+def _mounted(tire: Tire, wheel: _Wheel) -> Tire:
     """Return the tire for the side of the wheel; only measured tires have sides.
     tire : any of `models.tires`.
     """
@@ -66,7 +66,7 @@ def mounted(tire: Tire, wheel: Wheel) -> Tire:
     return tire
 
 
-def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
+def _relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
     """Return the derivative [1/s] of the lagged lateral slip tan(α').
 
     σ d(tan α')/dt + |V_cx| tan α' = -V_cy with the velocity V_c of the contact point in the frame
@@ -81,7 +81,7 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
     return (-aside - ca.fmax(ca.fabs(along), _LEAST_SPEED) * slip) / length
 
 
-def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
+def _tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
     """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
     slip : lagged slip tan(α') [-].   camber : γ > 0 when the top leans right [rad].
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
@@ -101,7 +101,7 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
 # Order of wheels everywhere: front left, front right, rear left, rear right.
 
 
-def downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
+def _downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
     """Return what the air adds to the loads of front and rear axle [N]; 0 of a car without.
     v_x : longitudinal speed [m/s].
     """
@@ -179,7 +179,7 @@ class Driver:
 N_STATES = 18
 _LOAD_LAG = 0.01  # unsprung mass on the tire spring, about 15 Hz [s]
 
-OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "acceleration": 2}
+_OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "acceleration": 2}
 
 
 def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
@@ -208,23 +208,23 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     demand, integral_dot = driver.demand(v_ref - v_x, integral)
     front = ca.if_else(demand > 0.0, c.drive_front_share, c.brake_front_share)
     drive = [m * demand * share for share in (front, 1.0 - front)]
-    pressed = downforce(vehicle, v_x)
+    pressed = _downforce(vehicle, v_x)
     F_z = wheel_loads(vehicle, roll, roll_rate, F_lagged, a_x_lagged, pressed)
 
     F_x, F_y, alpha, slip_dot = [], [], [], []
     force, axle_force, moment = 0.0, [0.0, 0.0], 0.0
     sway = v_y + h * roll_rate  # on the roll axis, below the center of gravity
-    for k, wheel in enumerate(wheels(vehicle)):
+    for k, wheel in enumerate(_wheels(vehicle)):
         angle, axle = delta[wheel.axle], wheel.axle
         velocity = wheel.velocity(v_x, sway, r)
         length = (c.relaxation_length_front, c.relaxation_length_rear)[axle]
-        slip_dot.append(relax(slip[k], angle, velocity, length))
+        slip_dot.append(_relax(slip[k], angle, velocity, length))
         alpha.append(angle - ca.atan2(velocity[1], velocity[0]))
         here = X + wheel.x * ca.cos(psi) - wheel.y * ca.sin(psi)
         grip = mu + place_change(places, here)
         camber = (c.roll_camber_front, c.roll_camber_rear)[axle] * roll
-        tire = mounted(tires[axle], wheel)
-        of_tire = tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
+        tire = _mounted(tires[axle], wheel)
+        of_tire = _tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
         F_x.append(of_tire[0])
         F_y.append(of_tire[1])
         forward, sideward = _rotate(of_tire[0], of_tire[1], angle)
@@ -258,7 +258,7 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y + wind))]
     return ca.Function(
         "car", [x, command, v_ref, mu, places, aside], [x_dot, *outputs],
-        ["x", "command", "v_ref", "mu", "places", "aside"], ["x_dot", *OUTPUTS],
+        ["x", "command", "v_ref", "mu", "places", "aside"], ["x_dot", *_OUTPUTS],
     )  # fmt: skip
 
 
@@ -280,5 +280,5 @@ def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
         [x, *rest],
         [x_next, *(ca.densify(v) for v in outputs)],
         list(car.name_in()),
-        ["x_next", *OUTPUTS],
+        ["x_next", *_OUTPUTS],
     )

@@ -110,7 +110,7 @@ class PlantError(TireidError, ArithmeticError):
 
 # -O1 builds a car a third sooner than -O2, whose steps are faster by so little that it is ahead
 # after minutes of driving. The bits are the same.
-FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
+_FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
 
 
 class _CompiledLoop(NamedTuple):
@@ -130,11 +130,11 @@ def _compiled_loop(
     car, constants = lifted(dynamics(vehicle, tires, driver))
     step = runge_kutta(car, dt)
     over = ("command", "v_ref", "mu", "aside")
-    return _CompiledLoop(Scan(step, carry=("x",), over=over, flags=FLAGS), constants)
+    return _CompiledLoop(Scan(step, carry=("x",), over=over, flags=_FLAGS), constants)
 
 
-LEAST, MOST = 0.5, 500.0  # stiffness over load [1/rad or -]: about 20 of real tires
-LEAST_GRIP, MOST_GRIP = 0.05, 10.0  # largest side force over load: about 1
+_LEAST, _MOST = 0.5, 500.0  # stiffness over load [1/rad or -]: about 20 of real tires
+_LEAST_GRIP, _MOST_GRIP = 0.05, 10.0  # largest side force over load: about 1
 _GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
 
 
@@ -151,9 +151,9 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
         F_z = ca.DM(0.5 * load)
         grip = ca.mmax(tire.forces(ca.DM(_GRIP_SLIPS), 0.0, 0.0, F_z).F_y)
         for what, force, least, most in (
-            ("cornering stiffness", tire.cornering_stiffness(F_z), LEAST, MOST),
-            ("slip stiffness", tire.slip_stiffness(F_z), LEAST, MOST),
-            ("largest side force", grip, LEAST_GRIP, MOST_GRIP),
+            ("cornering stiffness", tire.cornering_stiffness(F_z), _LEAST, _MOST),
+            ("slip stiffness", tire.slip_stiffness(F_z), _LEAST, _MOST),
+            ("largest side force", grip, _LEAST_GRIP, _MOST_GRIP),
         ):
             if not least <= (ratio := float(force / F_z) + 0.0) <= most:
                 raise TirError(
@@ -198,7 +198,6 @@ class Plant:
         name: str | None = None,
     ) -> PlantRun:
         """Drive a maneuver from straight ahead, with classical Runge-Kutta steps.
-
         speed : wanted speed [m/s], a number or a function of the times (n,) [s].
         friction : of the road; None is what the tire was measured on.
         bank : slope of the road across the car [rad], positive where it falls to the left; wheel
@@ -217,7 +216,9 @@ class Plant:
         t = dt * np.arange(n, dtype=np.float64)
         middle = t + 0.5 * dt  # inputs are held over a step: at its middle they are not late
         command = maneuver.steering(middle)
-        v_ref, slope, push = (_over_time(one, middle) for one in (speed, bank, wind))
+        v_ref, slope, push = (
+            one(middle) if callable(one) else np.full(n, float(one)) for one in (speed, bank, wind)
+        )
         inputs = {"steering": command, "speed": v_ref, "bank": slope, "wind": push}
         for label, given in inputs.items():
             shape = (n, 2) if label == "steering" else (n,)
@@ -245,10 +246,6 @@ class Plant:
         return _compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
 
 
-def _over_time(given: _OverTime, t: Array) -> Array:
-    return given(t) if callable(given) else np.full(t.size, float(given))
-
-
 # The plant one control period at a time: for a driver or a controller that looks before it steers.
 #
 # The same compiled loop as `Plant.simulate`, so that the same commands give the same numbers.
@@ -258,20 +255,18 @@ class PlantState(NamedTuple):
     """The plant at one instant; nothing changes it, `StepwisePlant.step` returns the next.
 
     Forces and acceleration are those under the inputs of the period that ends here.
+    steps: of the integration since the start; x: state (18,) in the order of
+    `models.plant.dynamics`; axle_force: to the side, front and rear, frame of the body, (2,) [N];
+    acceleration: of the center of gravity along the axes of the body, (2,) [m/s^2]; alpha: slip
+    angles of the wheels FL, FR, RL, RR in the paper's sign, (4,) [rad]; F_z: their loads, (4,) [N].
     """
 
     steps: int
-    """Steps of the integration since the start."""
     x: Array
-    """State (18,) in the order of `models.plant.dynamics`."""
     axle_force: Array
-    """Side force of the front and the rear axle, frame of the body, (2,) [N]."""
     acceleration: Array
-    """Of the center of gravity along the axes of the body, (2,) [m/s^2]."""
     alpha: Array
-    """Slip angles of the wheels FL, FR, RL, RR in the paper's sign, (4,) [rad]."""
     F_z: Array
-    """Loads of the wheels, (4,) [N]."""
 
 
 class StepwisePlant:
@@ -301,7 +296,6 @@ class StepwisePlant:
     @cached_property
     def _steppers(self) -> tuple[Stepper, Stepper]:
         """Of the first instant, and of a period with the first step of the next one.
-
         That step is there for its outputs: they are those of the period's end.
         """
         scan, constants = self.plant.loop(self.dt)

@@ -46,11 +46,11 @@ from models.recordings.record import (
     side_by_side,
 )
 from models.recordings.rolled import rolled
-from models.recordings.wheel_scale import Scale, identified_scales, scale_text, wheel_factor
+from models.recordings.wheels import Scale, identified_scales, scale_text, wheel_factor
 from models.schema import require_few
 
-FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
-SHORTEST = 1.0  # [s]: a segment of less teaches nothing, since learning waits half a second
+_FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
+_SHORTEST = 1.0  # [s]: a segment of less teaches nothing, since learning waits half a second
 _FIELDS = {
     "Fyf": "axle_force",
     "Fyr": "axle_force",
@@ -62,10 +62,10 @@ _FIELDS = {
 }
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-class Segments(NamedTuple):
+class _Segments(NamedTuple):
     """Those that are kept, and how many are too short to be."""
 
     kept: list[Segment]
@@ -92,10 +92,16 @@ def recording_of(
             learnt = _scale_note(log, signals, log_map, run)
         signals = _without_wheels(signals)
     spared = ""
+
+    def on_one_clock(
+        chosen: Mapping[str, Signal],
+    ) -> tuple[dict[str, Signal], dict[str, list[Raw]], tuple[str, ...], _Segments]:
+        channels = _channels(log, label, chosen, log_map, run)
+        named, raws, said = with_pose(label, chosen, channels)
+        return named, raws, said, _segments(label, named, raws, log_map, dt)
+
     try:
-        parts = _channels(log, label, signals, log_map, run)
-        signals, parts, posed = with_pose(label, signals, parts)
-        segments = _segments(label, signals, parts, log_map, dt)
+        signals, parts, posed, segments = on_one_clock(signals)
     except RecordingError as error:
         needed = {
             key: one
@@ -105,10 +111,8 @@ def recording_of(
         if len(needed) == len(signals) or missing_signals(needed):
             raise
         left = ", ".join(column_of(key) for key in signals if key not in needed)
-        signals, spared = needed, f"{left} is left aside: {error}"
-        parts = _channels(log, label, signals, log_map, run)
-        signals, parts, posed = with_pose(label, signals, parts)
-        segments = _segments(label, signals, parts, log_map, dt)
+        spared = f"{left} is left aside: {error}"
+        signals, parts, posed, segments = on_one_clock(needed)
     rolls = ""
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, segments.kept, log_map, dt)
@@ -144,10 +148,7 @@ def _channels(
 
     Turns of wheels become speeds, where there is no v_x that tells their radius.
     """
-    asked = [
-        (*signal.channel, *([signal.sign] if signal.sign else [])) for signal in signals.values()
-    ]
-    names = list(dict.fromkeys(one for some in asked for one in some))
+    names = list(dict.fromkeys(one for signal in signals.values() for one in signal.asked))
     by_name = dict(zip(names, log.read(names, run), strict=True))
     found: dict[str, list[Raw]] = {}
     for ours, signal in signals.items():
@@ -162,7 +163,7 @@ def _channels(
             if ours in WHEELS and not has_speed(signals):
                 factor *= wheel_factor(what, ours, unit, log_map.wheels)
             _require_finite(label, column_of(ours), channel)
-            values = scaled(channel.values, factor)
+            values = _scaled(channel.values, factor)
             if signal.sign:
                 sign = by_name[signal.sign]
                 values = signed(values, channel.t, sign.t, sign.values)
@@ -172,7 +173,7 @@ def _channels(
     return found
 
 
-def scaled(values: Array, factor: float) -> Array:
+def _scaled(values: Array, factor: float) -> Array:
     """Return values times a factor; themselves where it is one.   values : (n,)."""
     if factor == 1.0:
         return values
@@ -211,7 +212,7 @@ def _segments(
     parts: Mapping[str, list[Raw]],
     log_map: LogMap,
     dt: float,
-) -> Segments:
+) -> _Segments:
     """Return the signals on one clock, in the segments between gaps; at least one."""
     raws = {f"{name}/{k}": raw for name, listed in parts.items() for k, raw in enumerate(listed)}
     for raw in {id(raw.t): raw for raw in raws.values()}.values():
@@ -251,12 +252,12 @@ def _segments(
             f"{label}: the run lasts {t[-1] - t[0]:.4g} s, at least {MINIMUM_SAMPLES} steps of "
             f"{dt:g} s are needed"
         )
-    return Segments(kept, len(found) - len(kept))
+    return _Segments(kept, len(found) - len(kept))
 
 
 def _shortest(dt: float) -> float:
     """Return how long a segment must be [s]: to teach something, and to be a recording."""
-    return max(SHORTEST, MINIMUM_SAMPLES * dt)
+    return max(_SHORTEST, MINIMUM_SAMPLES * dt)
 
 
 def _judge_time(label: str, raw: Raw) -> None:
@@ -277,7 +278,7 @@ def _judge_time(label: str, raw: Raw) -> None:
 def _other_unit(step: float) -> str:
     """Return what the time may be in where samples are so far apart."""
     for power, unit in ((3, "milliseconds"), (6, "microseconds"), (9, "nanoseconds")):
-        if FASTEST <= step / 10.0**power <= SLOWEST:
+        if _FASTEST <= step / 10.0**power <= SLOWEST:
             return f"; {unit}? divide by 1{power * '0'}"
     return ""
 
@@ -315,7 +316,7 @@ def _recording(name: str, segment: Segment, log_map: LogMap, dt: float) -> Recor
     """Return one segment as a recording, in ISO axes, filtered where the map says so."""
     t, sign = segment.t, AXES[log_map.axes]
     signals = {
-        key: values if key in ("v_x", "a_x") else scaled(values, sign)
+        key: values if key in ("v_x", "a_x") else _scaled(values, sign)
         for key, values in segment.signals.items()
     }
     if log_map.low_pass is not None:
@@ -371,7 +372,7 @@ def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> d
     }
 
 
-def _without_wheels(by_name: Mapping[str, T]) -> dict[str, T]:
+def _without_wheels(by_name: Mapping[str, _T]) -> dict[str, _T]:
     return {name: one for name, one in by_name.items() if name not in WHEELS}
 
 

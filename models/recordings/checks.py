@@ -34,15 +34,15 @@ from models.recordings.evidence import (
 from models.recordings.record import Recording, peak
 
 _LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
-LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
+_LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
 _LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
 _SURE_PAIR, _NO_PAIR = 0.9, 0.3  # correlations of two channels that are of one bend, or of none
 _COPY = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
 _LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
 _SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
 _LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
-DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
-LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
+_DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
+_LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 
 
 def check_physics(recording: Recording) -> None:
@@ -53,7 +53,7 @@ def check_physics(recording: Recording) -> None:
 def _refuse(recording: Recording, contradiction: str | None) -> None:
     """Raise what contradicts, and say who finds out why."""
     if contradiction is not None:
-        raise RecordingError(f"{recording.name}: {contradiction}; {DOCTOR}")
+        raise RecordingError(f"{recording.name}: {contradiction}; {_DOCTOR}")
 
 
 def physics_contradiction(recording: Recording) -> str | None:
@@ -87,9 +87,9 @@ def _check_peaks(recording: Recording) -> str | None:
                 "convert it (degrees: multiply by pi/180)"
             )
     fastest = peak(recording.v_x)
-    if fastest > LARGEST_SPEED:
+    if fastest > _LARGEST_SPEED:
         return (
-            f"vx must be in m/s, below {LARGEST_SPEED:g}, its peak is "
+            f"vx must be in m/s, below {_LARGEST_SPEED:g}, its peak is "
             f"{fastest:.4g}; km/h? divide by 3.6"
         )
     some = recording.v_x[:: thinning(len(recording))]
@@ -153,7 +153,6 @@ def world_axes(recording: Recording) -> str | None:
 
 def _check_turns(w: Means) -> str | None:
     """Answer with the one of r, steering and a_y that turns the other way than both others.
-
     Of two alone nobody can tell which is wrong: they are named both.
     """
     turn, felt = w.v_x_r, w.a_y
@@ -211,7 +210,6 @@ def _check_two(r_delta: Pair) -> str | None:
 
 def _check_lateral_acceleration(w: Means) -> str | None:
     """Answer with a_y that is not v̇_y + v_x r in size.
-
     Regressors: v_x r, v̇_y where v_y was measured, ṙ (a sensor off the center of gravity) and,
     where v_x r varies by half its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady
     turn of 1.5 m/s^2, three times a usual bias; or as much of an a_y that goes with v_x r. A slope
@@ -393,7 +391,7 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
     small = onset(w)
     L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
     mass = float(total @ a) / float(a @ a)
-    if mass < LIGHTEST * min(L, _LONGEST_WHEELBASE) ** 3:
+    if mass < _LIGHTEST * min(L, _LONGEST_WHEELBASE) ** 3:
         return (
             f"Fyf and Fyr must be in N, they imply a mass of {mass:.3g} kg on "
             f"an effective wheelbase of {L:.3g} m; kN? multiply by 1000"
@@ -403,10 +401,10 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
 
 # The checks that need the axle positions: slip angles against accelerations and forces.
 
-LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
+_LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
 
 
-class Axles(Protocol):
+class _Axles(Protocol):
     """What the check must know of a vehicle: its mass and the distances of its axles."""
 
     @property
@@ -422,7 +420,7 @@ class Axles(Protocol):
         """Mass [kg]."""
 
 
-def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
+def check_against_vehicle(recording: Recording, vehicle: _Axles) -> None:
     """Refuse a recording whose slip angles contradict this vehicle.
 
     Rules, each silent without excitation (2 s of motion, rms lateral acceleration 0.3 m/s^2):
@@ -436,7 +434,7 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     _refuse(recording, vehicle_contradiction(recording, vehicle))
 
 
-def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
+def vehicle_contradiction(recording: Recording, vehicle: _Axles) -> str | None:
     """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`.
     vehicle : anything with l_f and l_r [m] and mass [kg].
     """
@@ -450,10 +448,10 @@ def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
         motion = {"v_x": w.v_x, "v_y": w.v_y, "r": w.r}
         slip = measured_slip(l_f, l_r, **motion, delta_f=w.delta_f, delta_r=w.delta_r)
         typical = float(np.median(np.abs(slip[:, 1])))
-        if typical > LARGEST_SLIP:
+        if typical > _LARGEST_SLIP:
             return (
                 f"vy and r must be in m/s and rad/s, the median rear slip angle is "
-                f"{typical:.3g} rad, above {LARGEST_SLIP}; check units, and l_r = {l_r:g} m"
+                f"{typical:.3g} rad, above {_LARGEST_SLIP}; check units, and l_r = {l_r:g} m"
             )
     turn, small = steering(w), onset(w)
     other = ""
@@ -492,7 +490,7 @@ def _check_mass(force: Array, a: Array, mass: float) -> str | None:
     return None
 
 
-RISES = "must rise with its slip angle (paper's sign, alpha = delta - atan2(v_y +- l r, v_x))"
+_RISES = "must rise with its slip angle (paper's sign, alpha = delta - atan2(v_y +- l r, v_x))"
 
 
 def _check_rises(alpha: Array, force: Array, column: str, other: str) -> str | None:
@@ -500,7 +498,7 @@ def _check_rises(alpha: Array, force: Array, column: str, other: str) -> str | N
     together = correlation(alpha, force)
     if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003:
         return (
-            f"{column} {RISES}, their correlation is {together:.2f}; change the sign of {column} "
+            f"{column} {_RISES}, their correlation is {together:.2f}; change the sign of {column} "
             f"or of vy{other}"
         )
     return None
@@ -524,4 +522,4 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
             remedy = f"vy has the sign of ay: {car}, or {place}"
         elif slope < -0.3 < -error:
             remedy = "change the sign of vy"
-    return f"lateral acceleration {RISES}, their correlation is {together:.2f}; {remedy}"
+    return f"lateral acceleration {_RISES}, their correlation is {together:.2f}; {remedy}"

@@ -1,4 +1,4 @@
-"""Which channels of a log become which signals: told, by standard names, or beyond doubt.
+"""Which channels of a log become which signals: declared, by standard names, or beyond doubt.
 
 What is given by a map holds; then the standard names; then what the names of the channels propose,
 where every signal that is needed is sure. What was proposed is said in the recording's notes; where
@@ -37,8 +37,8 @@ _INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the m
 _OF_STRUCTS = ("MATLAB", "MATLAB 7.3", "HDF5", "NumPy")
 
 
-class Reading(NamedTuple):
-    """How the signals of a log are read, and what of it nobody told."""
+class _Reading(NamedTuple):
+    """How the signals of a log are read, and what of it nobody declared."""
 
     signals: dict[str, Signal]
     notes: tuple[str, ...]
@@ -51,26 +51,26 @@ def column_of(name: str) -> str:
 
 def chosen_signals(
     log: LogFile, headings: Sequence[Heading], log_map: LogMap, run: str | None
-) -> Reading:
+) -> _Reading:
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
     lost = _lost_text(log_map.signals, by_map)
     if log_map.is_complete:
-        return Reading(by_map, lost)
+        return _Reading(by_map, lost)
     given = _beside(standard_signals(log, names), by_map)
     given = _without_wheels(given, by_map)
     missing = missing_signals(given)
     if has_v_y(given) and not missing:
-        return Reading(given, lost)
+        return _Reading(given, lost)
     _refuse_words(log, missing if has_v_y(given) else ["v_y", *missing], run)
     proposal = propose(log, headings, run)
     found = _without_wheels(likely_signals(given, proposal), by_map)
     if missing := missing_signals(found):
-        raise RecordingError(missing_text(log, missing, proposal, names))
+        raise RecordingError(_missing_text(log, missing, proposal, names))
     notes = [_taken_text(name, found[name]) for name in found if name not in given]
     if aside := aside_text(found, proposal):
         notes.append(aside)
-    return Reading(found, (*lost, *notes))
+    return _Reading(found, (*lost, *notes))
 
 
 def as_listed(
@@ -78,7 +78,7 @@ def as_listed(
 ) -> dict[str, Signal]:
     """Return signals with the names of their channels as the log lists them.
 
-    A channel that is listed with its unit, "Vel Lat [km/h]", may be told without. A v_x that is
+    A channel that is listed with its unit, "Vel Lat [km/h]", may be declared without. A v_x that is
     not there is left out where wheels are given.
     """
     bare: dict[str, list[str]] = {}
@@ -94,7 +94,7 @@ def as_listed(
             if len(likely) != 1:
                 raise RecordingError(
                     f"{log.path}: there is no column {shown(channel)} to read as "
-                    f"{column_of(name)}; {listing(likely or names)}"
+                    f"{column_of(name)}; {_listing(likely or names)}"
                 )
             channels += likely
         else:
@@ -136,7 +136,7 @@ def has_wheels(signals: Iterable[str]) -> bool:
 
 
 def _without_wheels(found: Mapping[str, Signal], by_map: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Return signals without wheels that v_x has no need of and nobody told to learn of."""
+    """Return signals without wheels that v_x has no need of and nobody asked to identify."""
     if "v_x" not in found:
         return dict(found)
     return {name: one for name, one in found.items() if name not in WHEELS or name in by_map}
@@ -206,7 +206,7 @@ def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     return [name for name in NEEDED if name not in there]
 
 
-def listing(names: Sequence[str]) -> str:
+def _listing(names: Sequence[str]) -> str:
     """Return what channels there are, the first of many."""
     return f"columns found: '{some(names)}'" if names else "there is none but the time"
 
@@ -259,7 +259,7 @@ def stand_ins(name: str, proposal: Proposal) -> list[str]:
     return best + ["a_y"] * (there.get("a_y", 0.0) > STILL)
 
 
-def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
+def _missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
     """Return the error of a log in which not every signal is found: what may be it, what to do."""
     likely = [one for name in missing for one in stand_ins(name, proposal)]
     parts = [likely_text(one, proposal) for one in likely]
@@ -272,7 +272,7 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
         said += f"did you mean {', '.join(parts)}? declare it by --columns {' '.join(words)}; "
     else:
         said += f"tireid channels {log.path} lists what is there; "
-    return said + listing(names)
+    return said + _listing(names)
 
 
 def likely_text(name: str, proposal: Proposal) -> str:

@@ -16,11 +16,11 @@ from models.recordings.record import Recording
 
 WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
 STRIDE = 0.05  # [s], longer where a recording is: evenly over it, as many as of `LONG` samples
-SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
-TURNS = 0.2  # of what a channel reaches, beyond which the car turns
-ALIKE, _BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
-LEAST = 0.1  # [m/s^2], rms, below which nothing turns
-LONGEST = 8.0  # [m], wheelbase by which steering says how much it turns at least
+_SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
+_TURNS = 0.2  # of what a channel reaches, beyond which the car turns
+_ALIKE, _BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
+_LEAST = 0.1  # [m/s^2], rms, below which nothing turns
+_LONGEST = 8.0  # [m], wheelbase by which steering says how much it turns at least
 _TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
@@ -80,7 +80,6 @@ class Steering(NamedTuple):
 
 class Pair(NamedTuple):
     """How two channels that follow the same bends go together.
-
     correlation : from -1 to 1.   sign : 1 or -1 where that is beyond chance, else 0.   seconds : of
     windows that turn.
     """
@@ -100,7 +99,7 @@ def windows(recording: Recording) -> Means:
     n, dt = len(recording), recording.dt
     width = max(round(WINDOW / dt), 1)
     start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1) * thinning(n))
-    fast = max(SLOWEST, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
+    fast = max(_SLOWEST, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
     start = start[_sums(lambda at: (recording.v_x[at] < fast) + 0.0, n, start, width) == 0.0]
     start = start[recording.within_a_segment(start, width)]
 
@@ -160,7 +159,7 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
     """
     some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)
     for one in (a, b):
-        some |= np.abs(one) > TURNS * np.percentile(np.abs(one), 99)
+        some |= np.abs(one) > _TURNS * np.percentile(np.abs(one), 99)
     return some
 
 
@@ -177,7 +176,7 @@ def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     x, y = (_less_offset(one, some) for one in (a, b))
     rho = correlation(x, y)
     chance = rho**2 * max(seconds - 2.0, 0.5) / max(1.0 - rho**2, 1e-9)
-    sure = abs(rho) > ALIKE and chance > _BEYOND_CHANCE
+    sure = abs(rho) > _ALIKE and chance > _BEYOND_CHANCE
     return Pair(rho, int(np.sign(rho)) if sure else 0, seconds)
 
 
@@ -210,7 +209,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     before, after = (mean(recording.v_x, at) + 1j * mean(v_y, at) for at in (some, some + width))
     r = 0.5 * (mean(recording.r, some) + mean(recording.r, some + width))
     speed = np.abs(before)
-    fast = speed > max(SLOWEST, 0.3 * float(np.percentile(speed, 95))) if speed.size else speed > 0
+    fast = speed > max(_SLOWEST, 0.3 * float(np.percentile(speed, 95))) if speed.size else speed > 0
     turned: Array = np.angle(after[fast] * np.conj(before[fast])) / (width * dt)
     return (turned, r[fast]) if turned.size * WINDOW >= 2.0 else None
 
@@ -260,8 +259,8 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     together = pair(r[keep], kinematic[keep])
     felt = 0.0 if w.a_y is None else float(np.std(w.a_y))
     turned, steered = (float(np.sqrt(np.mean((w.v_x * one) ** 2))) for one in (r, kinematic))
-    moving = max(turned, felt, steered / LONGEST)
-    if together.sign == 0 or moving < LEAST:
+    moving = max(turned, felt, steered / _LONGEST)
+    if together.sign == 0 or moving < _LEAST:
         return None
     r, kinematic = r[keep], kinematic[keep]
     some = turning(r, kinematic)

@@ -11,11 +11,10 @@ channel = ["SteerFL", "SteerFR"]
 r = 0.004
 """
 
-import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -38,13 +37,20 @@ from models.logs.signals import (
 from models.logs.units import to_si
 from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
-from models.schema import Table, read_toml
+from models.schema import Table, changed, read_toml, toml_table
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
 _REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
 MEND = "mend"  # what may become of stamps that do not rise
-TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
-_SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
+# By table of a log.toml: its keys, and the fields of a `LogMap` that they are.
+_SECTIONS = {
+    "file": {"axes": "axes", "run": "run", "dbc": "dbc"},
+    "clock": {
+        "channel": "clock", "unit": "clock_unit", "rate": "rate", "longest_gap": "longest_gap",
+        "holes": "holes", "order": "order",
+    },
+    "filters": {"low_pass": "low_pass"},
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,13 +140,7 @@ class LogMap:
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> "LogMap":
-        """Read a log.toml.
-
-        Raises
-        ------
-        RecordingError
-            One line that names the file, the key, the rule and the value.
-        """
+        """Read a log.toml."""
         data = read_toml(Path(path), RecordingError)
         try:
             declared = cls._of_table(Table(data, "", RecordingError))
@@ -151,20 +151,16 @@ class LogMap:
 
     @classmethod
     def _of_table(cls, table: Table) -> "LogMap":
-        table.only(*TABLES)
+        table.only(*_SECTIONS, "signals", "wheels", "repair")
         given: dict[str, Any] = {}
-        if "file" in table:
-            given |= _texts(table.table("file"), "axes", "run", "dbc")
-        if "clock" in table:
-            inner = table.table("clock")
-            names = {"channel": "clock", "unit": "clock_unit", "holes": "holes", "order": "order"}
-            inner.only(*names, "longest_gap", "rate")
-            given |= {ours: inner.text(key) for key, ours in names.items() if key in inner}
-            given |= {key: inner.number(key) for key in ("longest_gap", "rate") if key in inner}
-        if "filters" in table:
-            inner = table.table("filters")
-            inner.only("low_pass")
-            given["low_pass"] = inner.number("low_pass")
+        for section, keys in _SECTIONS.items():
+            if section in table:
+                inner = table.table(section)
+                inner.only(*keys)
+                given |= {
+                    keys[key]: inner.typed(cls, keys[key], value, key)
+                    for key, value in inner.data.items()
+                }
         if "signals" in table:
             inner = table.table("signals")
             inner.only(*QUANTITIES)
@@ -185,25 +181,22 @@ class LogMap:
         """
         if self.dbc and folder is not None:
             return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
-        plain, blocks = LogMap(), []
-        clock = {"channel": "clock", "unit": "clock_unit"}
-        for table, keys in (
-            ("file", {"axes": "axes", "run": "run", "dbc": "dbc"}),
-            ("clock", clock | {key: key for key in ("rate", "longest_gap", "holes", "order")}),
-            ("filters", {"low_pass": "low_pass"}),
-        ):
-            declared = {key: getattr(self, ours) for key, ours in keys.items()}
-            usual = {key: getattr(plain, ours) for key, ours in keys.items()}
-            blocks.append(_block(table, {k: v for k, v in declared.items() if v != usual[k]}))
+        declared = changed(self)
+        tables: dict[str, dict[str, Any]] = {
+            section: {key: declared[one] for key, one in keys.items() if one in declared}
+            for section, keys in _SECTIONS.items()
+        }
         for name in QUANTITIES:
             if name in self.signals:
-                blocks.append(_block(f"signals.{name}", _signal_numbers(self.signals[name])))
-        blocks.append(_block("wheels", self.wheels.table()))
+                channel = self.signals[name].channel
+                first = {"channel": channel[0] if len(channel) == 1 else channel}
+                tables[f"signals.{name}"] = changed(self.signals[name]) | first
         repair = self.repair.tables()
         inner = {key: value for key, value in repair.items() if isinstance(value, dict)}
-        blocks.append(_block("repair", {k: v for k, v in repair.items() if k not in inner}))
-        blocks += [_block(f"repair.{key}", value) for key, value in inner.items()]
-        return "\n".join(block for block in blocks if block)
+        tables["wheels"] = self.wheels.table()
+        tables["repair"] = {key: value for key, value in repair.items() if key not in inner}
+        tables |= {f"repair.{key}": value for key, value in inner.items()}
+        return "\n".join(toml_table(name, values) for name, values in tables.items() if values)
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a log.toml; the file appears whole or not at all.
@@ -224,59 +217,13 @@ def _named_from(file: Path, folder: Path) -> str:
     return whole.relative_to(folder.resolve()).as_posix() if below else str(whole)
 
 
-def _texts(table: Table, *keys: str) -> dict[str, str]:
-    table.only(*keys)
-    return {key: table.text(key) for key in keys if key in table}
-
-
 def _signal(table: Table, name: str) -> Signal:
     """Return how a document says that a signal is read."""
-    table.only(*_SIGNAL_KEYS)
-    given: dict[str, Any] = {}
-    if isinstance(table.value("channel"), str):
-        given["channel"] = (table.text("channel"),)
-    else:
-        given["channel"] = table.texts("channel")
-    given |= {key: table.text(key) for key in ("unit", "sign") if key in table}
-    for key in ("factor", "offset", "ratio"):
-        if key in table:
-            given[key] = table.number(key)
-    if "table" in table:
-        pairs = table.array("table")
-        if pairs.ndim != 2 or pairs.shape[1] != 2:
-            table.refuse("table", "must be pairs [hand wheel, road wheel] in rad")
-        given["table"] = tuple((float(hand), float(road)) for hand, road in pairs)
+    given = table.record(Signal, alone=("channel",))
     try:
         return Signal(**given)
     except RecordingError as error:
         raise RecordingError(f"signals.{name}: {error}") from None
-
-
-def _signal_numbers(signal: Signal) -> dict[str, Any]:
-    """Return what is given of a signal, beyond what holds where nothing is."""
-    plain = Signal(channel=signal.channel)
-    declared = {
-        key: getattr(signal, key)
-        for key in _SIGNAL_KEYS[1:]
-        if getattr(signal, key) != getattr(plain, key)
-    }
-    channel = signal.channel[0] if len(signal.channel) == 1 else signal.channel
-    return {"channel": channel, **declared}
-
-
-def _block(name: str, values: Mapping[str, Any]) -> str:
-    lines = [f"{key} = {_value(value)}" for key, value in values.items()]
-    return "".join(f"{line}\n" for line in (f"[{name}]", *lines)) if lines else ""
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, tuple):
-        return f"[{', '.join(_value(one) for one in value)}]"
-    return repr(float(value))
 
 
 # Signals as a command line tells them: NAME=CHANNEL [UNIT] /RATIO.

@@ -12,15 +12,14 @@ from models.recordings.record import Recording
 from models.vehicle import GRAVITY
 
 SEGMENT = 20.0  # s of one, where a quarter of the samples are enough for that
-STEPS = 4  # beginnings that a segment may have in the time of one
-FEWEST = 4  # segments, so that there are some on both sides of a middle
-REST = 0.6  # s that the car stands at the end of a segment: a delay of that leaves the next alone
+_STEPS = 4  # beginnings that a segment may have in the time of one
+_FEWEST = 4  # segments, so that there are some on both sides of a middle
+_REST = 0.6  # s that the car stands at the end of a segment: a delay of that leaves the next alone
 _HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a drive
 
 
 class Portion(NamedTuple):
     """Segments of a recording, joined.
-
     recording : of them; at the end of each segment the car stands, so that a signal that is moved
     in time leaves the next alone.   samples : which samples of the whole they are (k,).
     """
@@ -45,20 +44,20 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     n = len(recording)
     if n <= LONG:
         return Portion(recording, np.arange(n))
-    step = min(round(SEGMENT / recording.dt), LONG // FEWEST) // STEPS
+    step = min(round(SEGMENT / recording.dt), LONG // _FEWEST) // _STEPS
     power = _power(recording, step)
-    count = LONG // (STEPS * step)
+    count = LONG // (_STEPS * step)
     if middle is None or not 0 < middle < n:
         sides = [(0, n, count)]
     else:
         sides = [(0, middle, count // 2), (middle, n, count // 2)]
     begins = [begin for side in sides for begin in _hardest(power, step, *side)]
-    samples = np.unique(np.add.outer(begins, np.arange(STEPS * step)))
+    samples = np.unique(np.add.outer(begins, np.arange(_STEPS * step)))
     samples = recording.without_scraps(samples[samples < n])
     taken = recording.taken(samples)
     ends = np.array([piece.stop for piece in taken.segments])
     v_x = taken.v_x.copy()
-    v_x[np.maximum(ends[:, None] - 1 - np.arange(round(REST / recording.dt)), 0)] = 0.0
+    v_x[np.maximum(ends[:, None] - 1 - np.arange(round(_REST / recording.dt)), 0)] = 0.0
     return Portion(replace(taken, v_x=v_x), samples)
 
 
@@ -74,11 +73,11 @@ def _power(recording: Recording, step: int) -> Array:
 
 def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list[int]:
     """Return where the hardest segment begins of each of `count` parts of samples."""
-    length = STEPS * step
+    length = _STEPS * step
     if last - first <= count * length:
         return list(range(first, last, length))
     begins = []
     for low, high in pairwise(np.linspace(first, last, count + 1).astype(int) // step):
-        turned = np.convolve(power[low:high], np.ones(STEPS), mode="valid")  # each beginning's
+        turned = np.convolve(power[low:high], np.ones(_STEPS), mode="valid")  # each beginning's
         begins.append(step * (int(low) + int(np.argmax(turned))))
     return begins

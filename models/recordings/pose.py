@@ -20,15 +20,15 @@ from models.logs.log import RecordingError
 from models.logs.signals import POSE, Signal
 
 _NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
-SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
-FEWEST = 30  # samples of a piece that is differentiated
+_SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
+_FEWEST = 30  # samples of a piece that is differentiated
 _STANDS = 0.05  # [m/s], a pose that never goes faster does not move
-MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
-ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
+_MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
+_ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
 _ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
-TURN = math.pi / 2.0
-LATEST, LATE = 0.3, 0.01  # [s] that a gyro may be late against a pose, that is taken out of it
-ALIKE = 0.9  # correlation of the two yaw rates from which that is known
+_TURN = math.pi / 2.0
+_LATEST, _LATE = 0.3, 0.01  # [s] that a gyro may be late against a pose, that is taken out of it
+_ALIKE = 0.9  # correlation of the two yaw rates from which that is known
 _STRENGTHS = np.geomspace(1e-3, 1e9, 49)  # λ [-]
 
 
@@ -45,7 +45,7 @@ def with_pose(
     pose = {name: parts[name][0] for name in POSE}
     if len(parts["heading"]) > 1:
         pose["heading"] = _of_quaternion(label, parts["heading"])
-    motion = motion_of(label, pose)
+    motion = _motion_of(label, pose)
     sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
     if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
         raise RecordingError(
@@ -54,13 +54,13 @@ def with_pose(
         )
     found = {name: raws for name, raws in parts.items() if name not in POSE}
     gyro = parts["r"][0] if "r" in parts else None
-    slow = typical_step(motion.r.t) > SLOW
+    slow = typical_step(motion.r.t) > _SLOW
     of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
     of_pose |= {} if slow and gyro is not None else {"r": motion.r}
     what = "vx, vy and r" if "r" in of_pose else "vx and vy"
     said = [f"{what} are taken from the pose{motion.said}"]
-    late = None if gyro is None else lateness(gyro, motion.r)
-    if gyro is not None and late is not None and abs(late) > LATE:
+    late = None if gyro is None else _lateness(gyro, motion.r)
+    if gyro is not None and late is not None and abs(late) > _LATE:
         box = [name for name in ("r", "a_y", "a_x") if name in found]
         for name in box:
             found[name] = [_earlier(raw, late, motion.r.t) for raw in found[name]]
@@ -78,7 +78,7 @@ def with_pose(
 def _earlier(raw: Raw, late: float, t: Array) -> Raw:
     """Return a channel as much earlier, on the clock of the pose (n,) where it has no gap."""
     moved = raw._replace(t=raw.t - late)
-    if gaps(moved.t, LONGEST_GAP).size or typical_step(raw.t) > SLOW:
+    if gaps(moved.t, LONGEST_GAP).size or typical_step(raw.t) > _SLOW:
         return moved
     inside = t[(t >= moved.t[0]) & (t <= moved.t[-1])]
     rows = raw.rows[np.minimum(np.searchsorted(moved.t, inside), raw.rows.size - 1)]
@@ -97,7 +97,7 @@ def _of_quaternion(label: str, parts: Sequence[Raw]) -> Raw:
     return parts[0]._replace(values=np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
 
 
-class Motion(NamedTuple):
+class _Motion(NamedTuple):
     """v_x, v_y [m/s] and r [rad/s] of a pose on its clock, and how it was read, in words."""
 
     v_x: Raw
@@ -106,14 +106,14 @@ class Motion(NamedTuple):
     said: str
 
 
-class Smooth(NamedTuple):
+class _Smooth(NamedTuple):
     """Smoothed columns (n, k), and the standard deviation of what was taken out."""
 
     values: Array
     noise: float
 
 
-def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
+def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
     """Return how a car moves by its pose.
     parts : by name of `POSE` on one clock or several, SI.
     """
@@ -123,11 +123,11 @@ def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
     cuts = [0, *gaps(t, LONGEST_GAP).tolist(), t.size]
     pieces = []
     for first, end in itertools.pairwise(cuts):
-        if end - first >= FEWEST:
+        if end - first >= _FEWEST:
             pieces.append(_piece(t[first:end], z[first:end], x.rows[first:end]))
     if not pieces:
         raise RecordingError(
-            f"{label}: the pose must have at least {FEWEST} samples without a gap, it has {t.size}"
+            f"{label}: the pose must have at least {_FEWEST} samples without a gap, it has {t.size}"
         )
     psi, turned = _heading(label, pieces)
     columns: list[list[Array]] = [[], [], []]
@@ -144,7 +144,7 @@ def motion_of(label: str, parts: Mapping[str, Raw]) -> Motion:
         f"{turned}; its position scatters by {noise[0]:.2g} m, its heading by "
         f"{math.degrees(noise[1]):.2g} deg"
     )
-    return Motion(v_x, v_y, r, said)
+    return _Motion(v_x, v_y, r, said)
 
 
 def _unwrapped(name: str, parts: Mapping[str, Raw]) -> Array:
@@ -171,12 +171,12 @@ def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
     even = t[0] + step * np.arange(t.size)
     even = t if np.abs(even - t).max() < 1e-6 * step else even
     z = np.column_stack([np.interp(even, t, column) for column in z.T])
-    place, heading = smoothed(z[:, :2]), smoothed(z[:, 2:])
+    place, heading = _smoothed(z[:, :2]), _smoothed(z[:, 2:])
     rates = np.gradient(place.values, step, axis=0, edge_order=2)
     return _Piece(even, rows, step, rates, heading.values[:, 0], (place.noise, heading.noise))
 
 
-def smoothed(z: Array) -> Smooth:
+def _smoothed(z: Array) -> _Smooth:
     """Return columns of one size, smoothed alike as strongly as they predict themselves best.
     z : (n, k), evenly sampled.
     """
@@ -201,7 +201,7 @@ def smoothed(z: Array) -> Smooth:
     values = np.asarray(solveh_banded(bands, z))
     freedom = float(np.sum(left[best])) * z.shape[1]
     noise = math.sqrt(float(np.sum((z - values) ** 2)) / max(freedom, 1.0))
-    return Smooth(values, noise)
+    return _Smooth(values, noise)
 
 
 def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
@@ -210,7 +210,7 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     most = max(float(speed.max()) for speed in speeds)
     if not most > _STANDS:
         raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
-    fast = MOVES * most
+    fast = _MOVES * most
     moving = [(piece, speed > fast) for piece, speed in zip(pieces, speeds, strict=True)]
     travel = np.concatenate([np.arctan2(p.rates[m, 1], p.rates[m, 0]) for p, m in moving])
     heading = np.concatenate([p.heading[m] for p, m in moving])
@@ -224,8 +224,8 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
             "not: another channel, or other axes?"
         )
     away = float(np.angle(mean))
-    whole = TURN * round(away / TURN)
-    shift = whole if abs(away - whole) < ALONG else away
+    whole = _TURN * round(away / _TURN)
+    shift = whole if abs(away - whole) < _ALONG else away
     said = ["its heading is clockwise"] if sign < 0 else []
     said += ["its heading is in degrees"] if unit != 1.0 else []
     said += [f"its heading lies {math.degrees(shift):.0f} deg off the travel"] if shift else []
@@ -233,22 +233,22 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     return [sign * unit * piece.heading + shift for piece in pieces], words
 
 
-def lateness(gyro: Raw, pose: Raw) -> float | None:
+def _lateness(gyro: Raw, pose: Raw) -> float | None:
     """Return by how much a gyro is late against the yaw rate of a pose [s]; None if not known."""
     dt = max(typical_step(gyro.t), typical_step(pose.t)) / 2.0
-    begin, end = max(gyro.t[0], pose.t[0]) + LATEST, min(gyro.t[-1], pose.t[-1]) - LATEST
-    if end - begin < 10.0 * LATEST:
+    begin, end = max(gyro.t[0], pose.t[0]) + _LATEST, min(gyro.t[-1], pose.t[-1]) - _LATEST
+    if end - begin < 10.0 * _LATEST:
         return None
     grid = np.arange(begin, end, dt)
     reference = np.interp(grid, pose.t, pose.values)
-    lags = dt * np.arange(-int(LATEST / dt), int(LATEST / dt) + 1)
+    lags = dt * np.arange(-int(_LATEST / dt), int(_LATEST / dt) + 1)
     if np.std(reference) == 0.0 or np.std(gyro.values) == 0.0:
         return None
     alike = np.array(
         [np.corrcoef(reference, np.interp(grid + lag, gyro.t, gyro.values))[0, 1] for lag in lags]
     )
     k = int(np.argmax(alike))
-    if alike[k] < ALIKE or not 0 < k < lags.size - 1:
+    if alike[k] < _ALIKE or not 0 < k < lags.size - 1:
         return None
     low, peak, high = alike[k - 1 : k + 2]
     return float(lags[k] + dt * 0.5 * (low - high) / (low - 2.0 * peak + high))

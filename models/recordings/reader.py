@@ -9,7 +9,7 @@ from typing import Any
 from codegen.escape import shown
 from models.logs.door import ENDINGS, open_log
 from models.logs.log import LogFile, RecordingError
-from models.logs.memory import ArrayLog
+from models.logs.memory import open_arrays
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.map import MEND, LogMap, given_channel, given_signals
@@ -18,19 +18,19 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
 
 _NO_NAMES: Mapping[str, str] = {}
-DT = 0.01  # [s], the sample time of every method
-GivenMap = LogMap | str | PathLike[str] | None
+_DT = 0.01  # [s], the sample time of every method
+_GivenMap = LogMap | str | PathLike[str] | None
 
 
 def read_recording(
     source: Any,
     run: str | None = None,
-    dt: float = DT,
+    dt: float = _DT,
     *,
     name: str = "",
     check: bool = True,
     columns: Mapping[str, str] = _NO_NAMES,
-    log_map: GivenMap = None,
+    log_map: _GivenMap = None,
 ) -> Recording:
     """Read one run of a log, a file or arrays in memory, and bring it to a uniform sample time.
 
@@ -70,7 +70,7 @@ def read_recording(
     given = with_columns(map_of(log_map), columns)
     if not isinstance(source, str | PathLike):
         name = name or "recording"
-        arrays = ArrayLog(
+        arrays = open_arrays(
             name,
             source,
             given.clock,
@@ -88,11 +88,11 @@ def read_repaired(
     path: str | Path,
     vehicle: Vehicle,
     run: str | None = None,
-    dt: float = DT,
+    dt: float = _DT,
     *,
     check: bool = True,
     columns: Mapping[str, str] = _NO_NAMES,
-    log_map: GivenMap = None,
+    log_map: _GivenMap = None,
 ) -> tuple[Recording, Vehicle]:
     """Read one run of a log and take out what the map's repair says, of the log and of the car.
 
@@ -101,11 +101,6 @@ def read_repaired(
     run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
     columns, log_map : as of `read_recording`.
-
-    Raises
-    ------
-    RecordingError
-        One line: file and run, column, rule, value, remedy.
     """
     given = with_columns(map_of(log_map), columns)
     given = replace(given, wheels=given.wheels.completed(given.repair.on(vehicle)))
@@ -131,7 +126,7 @@ def repair_text(repair: Repair) -> str:
     return ", ".join(words)
 
 
-def map_of(given: GivenMap) -> LogMap:
+def map_of(given: _GivenMap) -> LogMap:
     """Return a map that may be given as a path; an empty one where there is none.
     given : a map, the path of a log.toml, or None.
     """

@@ -25,13 +25,13 @@ from models.logs.log import RecordingError
 from models.rules import LARGEST_FORCE
 
 MINIMUM_SAMPLES = 10
-PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
-JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
+_PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
+_JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
 
 
 ALL = slice(None)
 _OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
-MISSING = {
+_MISSING = {
     "v_y": "so slip angles are not known; tireid identify estimates it from ay",
     "a_y": "which is needed where vy is not measured",
 }
@@ -106,7 +106,7 @@ class Recording:
                     f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
                     f"{max(min(piece.stop, n) - piece.start, 0)}"
                 )
-        for name in SIGNALS:
+        for name in _SIGNALS:
             value = getattr(self, name)
             if value is None:
                 if name in _OPTIONAL:
@@ -133,7 +133,7 @@ class Recording:
         step = self._step
         for piece in self.segments:
             off_grid = _off_grid(self.t[piece], step)
-            if not (step > 0.0 and off_grid <= JITTER * step):
+            if not (step > 0.0 and off_grid <= _JITTER * step):
                 raise RecordingError(
                     f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
                     f"largest departure {off_grid:.3g} s; read the log with read_recording"
@@ -191,7 +191,7 @@ class Recording:
         signal: Array | None = getattr(self, name)
         if signal is None:
             raise RecordingError(
-                f"{self.name}: there is no {name.replace('_', '')}, {MISSING[name]}"
+                f"{self.name}: there is no {name.replace('_', '')}, {_MISSING[name]}"
             )
         return signal
 
@@ -243,11 +243,6 @@ class Recording:
         ----------
         t0 : first time [s], on the recording's own clock.
         t1 : last time [s], included (to a millionth of a step).
-
-        Raises
-        ------
-        RecordingError
-            If fewer than 10 samples are left.
         """
         slack = 1e-6 * self.dt
         first = int(np.searchsorted(self.t, t0 - slack, side="left"))
@@ -312,7 +307,7 @@ class Recording:
         ends = np.cumsum([piece.stop - piece.start for piece in whole])
         cut: dict[str, Any] = {
             name: signal[kept] if isinstance(kept, slice) else _rows(signal, kept)
-            for name in SIGNALS
+            for name in _SIGNALS
             if (signal := getattr(self, name)) is not None
         }
         notes = self.notes
@@ -353,14 +348,14 @@ def peak(signal: Array) -> float:
 
 
 CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")  # what may be faulty, and repaired
-SIGNALS = ("t", *CHANNELS, "a_x", "axle_force")
+_SIGNALS = ("t", *CHANNELS, "a_x", "axle_force")
 
 
 def joined(recordings: Sequence[Recording], name: str | None = None) -> Recording:
     """Return several recordings as one drive in segments, in their order.
 
     Each keeps its own time where it begins after the one before; else its time is moved to begin
-    `PAUSE` after it. Signals that one lacks are left out of all.
+    `_PAUSE` after it. Signals that one lacks are left out of all.
     recordings : sampled alike; at least one.   name : of the drive; None takes all their names.
     """
     first = recordings[0]
@@ -371,13 +366,13 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     n, breaks, notes = len(first), list(first.breaks), list(first.notes)
     t[:n] = first.t
     for one in recordings[1:]:
-        if abs(one.dt - first.dt) > JITTER * first.dt / len(one):
+        if abs(one.dt - first.dt) > _JITTER * first.dt / len(one):
             raise RecordingError(
                 f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs that "
                 f"are used together need one sampling interval"
             )
         end = float(t[n - 1])
-        moved = 0.0 if one.t[0] > end + first.dt else end + PAUSE - float(one.t[0])
+        moved = 0.0 if one.t[0] > end + first.dt else end + _PAUSE - float(one.t[0])
         t[n : n + len(one)] = one.t
         if moved:
             t[n : n + len(one)] += moved
@@ -389,7 +384,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     t.setflags(write=False)
     signals: dict[str, Any] = {
         name: _in_a_row([getattr(one, name) for one in recordings])
-        for name in SIGNALS[1:]
+        for name in _SIGNALS[1:]
         if all(getattr(one, name) is not None for one in recordings)
     }
     for missing in ("v_y", "a_y", "a_x"):
@@ -519,8 +514,8 @@ def _packed(parts: Iterable[bytes]) -> Iterator[bytes]:
 # mean over one step about its instant: no phase, 1.6 % loss at a tenth of the sampling frequency,
 # zeros at its multiples. The ends keep the logged values.
 
-ON_GRID = 0.01  # share of a step within which time stamps are those of the grid, with jitter
-SAME = 1e-6  # share of a step within which they already are the grid, but for rounding
+_ON_GRID = 0.01  # share of a step within which time stamps are those of the grid, with jitter
+_SAME = 1e-6  # share of a step within which they already are the grid, but for rounding
 
 
 def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dict[str, Array]]:
@@ -532,8 +527,8 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     dt : step of the grid [s].
     """
     off = _off_grid(t, dt)
-    if off <= ON_GRID * dt:
-        return (t if off <= SAME * dt else _grid(t[0], dt, t.size)), columns
+    if off <= _ON_GRID * dt:
+        return (t if off <= _SAME * dt else _grid(t[0], dt, t.size)), columns
     count = int(np.floor((t[-1] - t[0]) / dt + 1e-6)) + 1
     grid = _grid(t[0], dt, count, t[-1])
     slower = float(np.median(np.diff(t[: LONG + 1]))) > dt / 1.5

@@ -17,11 +17,10 @@ from codegen.arrays import Array, blocks, filled, large
 from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
-from models.schema import Table
-from models.smoothing import without_low_pass
+from models.schema import Table, changed
 from models.vehicle import AREAS, BICYCLE, Vehicle
 
-SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
+_SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,36 +29,30 @@ class Repair:
 
     Parameters
     ----------
+    velocity_sensor_x : how far ahead of the center of gravity v_y is measured [m].
+    velocity_sensor_angle : by which that sensor is turned to the left [rad].
+    acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
+    sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
     factor : by channel, what the logged value is multiplied by [-].
     offset : by channel, what is then taken off, in its unit.
     delay : by channel, how late it is against the others [s]; negative where it is early. The
         repaired recording ends, or begins, where a channel has no sample any more.
     lag : by channel, time constant of a low pass of first order that it is behind [s].
-    velocity_sensor_x : how far ahead of the center of gravity v_y is measured [m].
-    velocity_sensor_angle : by which that sensor is turned to the left [rad].
-    acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
-    sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
     vehicle : numbers of the car in place of the declared ones, by their names in `Vehicle`.
-
-    Raises
-    ------
-    RecordingError
-        For an unknown channel or number of a car, for a value that is not finite, for a factor of
-        zero, a lag that is not positive, or a number of a car that is not, its downforce aside.
     """
 
-    factor: Mapping[str, float] = field(default_factory=dict)
-    offset: Mapping[str, float] = field(default_factory=dict)
-    delay: Mapping[str, float] = field(default_factory=dict)
-    lag: Mapping[str, float] = field(default_factory=dict)
     velocity_sensor_x: float = 0.0
     velocity_sensor_angle: float = 0.0
     acceleration_sensor_x: float = 0.0
     sideslip: bool = False
+    factor: Mapping[str, float] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
+    delay: Mapping[str, float] = field(default_factory=dict)
+    lag: Mapping[str, float] = field(default_factory=dict)
     vehicle: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in TABLES:
+        for name in _TABLES:
             known = (*BICYCLE, *AREAS) if name == "vehicle" else CHANNELS
             for key, value in getattr(self, name).items():
                 if key not in known:
@@ -71,7 +64,7 @@ class Repair:
                     raise RecordingError(f"repair: factor.{key} must not be 0")
                 if name in ("lag", "vehicle") and key not in AREAS and not value > 0.0:
                     raise RecordingError(f"repair: {name}.{key} must be positive, it is {value}")
-        for name in SCALARS:
+        for name in _SCALARS:
             _require_finite(name, getattr(self, name))
 
     def __bool__(self) -> bool:
@@ -87,7 +80,7 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
-        declared = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
+        declared = {name for name in _TABLES if name != "vehicle" for name in getattr(self, name)}
         if self.acceleration_sensor_x:
             declared.add("a_y")
         turned = self.velocity_sensor_angle or self.velocity_sensor_x
@@ -111,12 +104,12 @@ class Repair:
         for name, delay in self.delay.items():
             late = signals[name]
             signals[name] = _by_segments(recording, partial(_earlier, t, late, delay))
-        width = round(SMOOTHED * vehicle.froude_time / recording.dt)
+        width = round(_SMOOTHED * vehicle.froude_time / recording.dt)
         for name, lag in self.lag.items():
             low = signals[name]
             signals[name] = large((n,))
             for piece in recording.segments:
-                signals[name][piece] = without_low_pass(low[piece], lag, recording.dt, width)
+                signals[name][piece] = _without_low_pass(low[piece], lag, recording.dt, width)
         r = signals["r"]
         if turned:
             c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
@@ -182,7 +175,7 @@ class Repair:
         factor = dict(self.factor)
         for key, value in other.factor.items():
             factor[key] = factor.get(key, 1.0) * value
-        places = {name: getattr(self, name) + getattr(other, name) for name in SCALARS}
+        places = {name: getattr(self, name) + getattr(other, name) for name in _SCALARS}
         return Repair(
             factor=factor,
             sideslip=self.sideslip or other.sideslip,
@@ -234,33 +227,16 @@ class Repair:
 
     def tables(self) -> dict[str, Any]:
         """Return it as a document holds it: only what repairs something, tables after numbers."""
-        numbers = {name: value for name in SCALARS if (value := getattr(self, name))}
-        tables = {name: dict(value) for name in TABLES if (value := getattr(self, name))}
-        return {**numbers, **({"sideslip": True} if self.sideslip else {}), **tables}
+        return {k: dict(v) if isinstance(v, Mapping) else v for k, v in changed(self).items()}
 
     @classmethod
     def of_table(cls, table: Table) -> "Repair":
-        """Return it as a document says it.
-
-        Parameters
-        ----------
-        table : as `tables` returns it; what is missing repairs nothing.
-        """
-        table.only(*SCALARS, "sideslip", *TABLES)
-        given: dict[str, Any] = {name: table.number(name) for name in SCALARS if name in table}
-        if "sideslip" in table:
-            given["sideslip"] = table.value("sideslip")
-            if not isinstance(given["sideslip"], bool):
-                table.refuse("sideslip", "must be true or false")
-        for name in TABLES:
-            if name in table:
-                inner = table.table(name)
-                given[name] = {key: inner.number(key) for key in inner.data}
-        return cls(**given)
+        """Return it as a document says it.   table : as `tables` returns it."""
+        return cls(**table.record(cls))
 
 
-TABLES = ("factor", "offset", "delay", "lag", "vehicle")
-SCALARS = tuple(one.name for one in fields(Repair) if one.name not in (*TABLES, "sideslip"))
+_TABLES = ("factor", "offset", "delay", "lag", "vehicle")
+_SCALARS = tuple(one.name for one in fields(Repair) if one.name not in (*_TABLES, "sideslip"))
 
 
 def _require_finite(name: str, value: float) -> None:
@@ -274,7 +250,7 @@ def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, fl
 
 def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
     """Return values of samples that are computed of their segment alone, block by block (n,).
-    compute : returns the values of a part (k,) of a segment, told both.
+    compute : returns the values of a part (k,) of a segment, given both.
     """
     values = large((len(recording),))
     for whole in recording.segments:
@@ -282,6 +258,19 @@ def _by_segments(recording: Recording, compute: Callable[[slice, slice], Array])
             values[part] = compute(whole, part)
     values.setflags(write=False)
     return values
+
+
+def _without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:
+    """Return what went into a low pass, u = y + T ẏ, of y under a Hann window without phase (n,).
+    signal : y, what came out (n,).   lag : time constant T of the low pass [s].
+    half : samples on each side of the window, which takes noise off first; 0 for none.
+    """
+    if half > 0:
+        bell = np.hanning(2 * half + 3)[1:-1]
+        padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
+        signal = np.convolve(padded, bell / bell.sum(), "valid")
+    source: Array = signal + lag * np.gradient(signal, dt)
+    return source
 
 
 def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:

@@ -12,7 +12,7 @@ went. The step from sample to sample is compiled.
 """
 
 from collections.abc import Mapping, Sequence
-from functools import cache, reduce
+from functools import cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -24,14 +24,14 @@ from models.logs.log import RecordingError
 from models.logs.signals import AXLES, WHEELS
 from models.recordings.wheels import DRIVEN, Wheels
 
-SLIP, NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
-ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
-WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
-MEMORY = 0.15  # [s], over which that of the car is
-BRAKED, ROLLS_OUT = -1.0, -0.3  # [m/s²]: below the first wheels are braked, above the other driven
-UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
-PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
-SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
+_SLIP, _NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
+_ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
+_WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
+_MEMORY = 0.15  # [s], over which that of the car is
+_BRAKED, _ROLLS_OUT = -1.0, -0.3  # [m/s²]: wheels are braked below, driven above the second
+_UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
+_PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
+_SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
 class _Rolled(NamedTuple):
@@ -54,10 +54,10 @@ def rolled(
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
     n, v_x = r.size, large((r.size,))
-    span = max(1, round(WINDOW / dt))
+    span = max(1, round(_WINDOW / dt))
     free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
-    rule = np.array([dt, most, most + NOISE / (span * dt)])
-    scan, constants = trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
+    rule = np.array([dt, most, most + _NOISE / (span * dt)])
+    scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
     gated = held = 0
     trust: Array | None = None
     for part in blocks(n):
@@ -76,12 +76,12 @@ def rolled(
         trust = record["trust_final"]
         v_x[part] = record["v"].ravel()
         held += int(np.count_nonzero(record["held"] > 0.0))
-        agree = np.abs(rows - v_x[part, None]) <= NOISE + SLIP * np.abs(v_x[part, None])
+        agree = np.abs(rows - v_x[part, None]) <= _NOISE + _SLIP * np.abs(v_x[part, None])
         gated += int(np.count_nonzero(~agree.all(axis=1)))
     return _Rolled(v_x, gated, held)
 
 
-class Trust(NamedTuple):
+class _Trust(NamedTuple):
     """What is carried from sample to sample: the speed, its change, and since when none is known.
 
     v [m/s]; a [m/s²]; held: time since a wheel was trusted [s]; known: the speed then [m/s].
@@ -93,7 +93,7 @@ class Trust(NamedTuple):
     known: ca.SX
 
 
-class Rule(NamedTuple):
+class _Rule(NamedTuple):
     """What holds for all samples.
 
     dt [s]; most: acceleration of a car, steady: of a wheel that may be trusted [m/s²]; free: of
@@ -106,48 +106,45 @@ class Rule(NamedTuple):
     free: ca.SX
 
 
-def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
+def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     """Return the speed at the next sample.
     c : speed of the center of gravity by each wheel [m/s], (k,).
     rates : by which each changed lately [m/s²], (k,).
     """
     v, a, since, known = trust
     dt, most, limit, free = rule
-    wheels = range(c.numel())
     ahead, passed = v + a * dt, since + dt
-    near, alike = (NOISE + share * ca.fabs(ahead) for share in (SLIP, ALIKE))
+    near, alike = (_NOISE + share * ca.fabs(ahead) for share in (_SLIP, _ALIKE))
 
-    steady = [ca.fabs(rates[k]) <= limit for k in wheels]
-    agree = ca.logic_and(_most(c, wheels) - _least(c, wheels) <= near, _every(steady))
-    doubt = UNSURE * most * since
-    doubt = ca.if_else(agree, doubt * (1.0 + since / PATIENCE), doubt)
-    slow = ca.fmax(ca.fabs(ahead), _most(ca.fabs(c), wheels)) < SLOW
-    doubt = ca.if_else(slow, SLOW, doubt)
-    reached = [ca.fabs(c[k] - ahead) <= near + doubt for k in wheels]
-    likely = [ca.logic_and(ca.logic_or(slow, steady[k]), reached[k]) for k in wheels]
-    some = _any(likely)
+    steady = ca.fabs(rates) <= limit
+    agree = ca.logic_and(ca.mmax(c) - ca.mmin(c) <= near, ca.logic_all(steady))
+    doubt = _UNSURE * most * since
+    doubt = ca.if_else(agree, doubt * (1.0 + since / _PATIENCE), doubt)
+    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < _SLOW
+    doubt = ca.if_else(slow, _SLOW, doubt)
+    likely = ca.logic_and(ca.logic_or(slow, steady), ca.fabs(c - ahead) <= near + doubt)
+    some = ca.logic_any(likely)
 
     # Nobody is trusted: it goes on as it went, unless that leads away from all wheels.
-    astray = _every([(c[k] - ahead) * a < 0.0 for k in wheels])
+    astray = ca.logic_all((c - ahead) * a < 0.0)
     v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
 
     # Driven wheels run ahead of the car, however little.
-    likely = _rather(likely, ca.vertsplit(free), ca.logic_not(a > BRAKED))
-    as_before = [ca.fabs(rates[k] - a) <= UNSURE * most for k in wheels]
-    likely = _rather(likely, as_before, ca.SX(0.0))
+    likely = _rather(likely, free, ca.logic_not(a > _BRAKED))
+    likely = _rather(likely, ca.fabs(rates - a) <= _UNSURE * most, ca.SX(0.0))
     best = ca.if_else(
-        a > ROLLS_OUT,
+        a > _ROLLS_OUT,
         _lowest(c, likely),
-        ca.if_else(a < BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
+        ca.if_else(a < _BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
     )
-    kept = [ca.logic_and(likely[k], ca.fabs(c[k] - best) <= alike) for k in wheels]
+    kept = ca.logic_and(likely, ca.fabs(c - best) <= alike)
     reach = most * dt + doubt
     now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
     # After a while, what was trusted before says little of how it goes on.
-    slope = ca.if_else(since > MEMORY, _mean(rates, kept), (now - known) / passed)
+    slope = ca.if_else(since > _MEMORY, _mean(rates, kept), (now - known) / passed)
     slope = ca.fmin(ca.fmax(slope, -most), most)
-    a_now = a + (1.0 - ca.exp(-passed / MEMORY)) * (slope - a)
-    return Trust(
+    a_now = a + (1.0 - ca.exp(-passed / _MEMORY)) * (slope - a)
+    return _Trust(
         ca.if_else(some, now, v_held),
         ca.if_else(some, a_now, a_held),
         ca.if_else(some, 0.0, passed),
@@ -155,57 +152,40 @@ def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
     )
 
 
-def _most(c: ca.SX, wheels: Sequence[int]) -> ca.SX:
-    return -_least(-c, wheels)
+def _rather(likely: ca.SX, those: ca.SX, unless: ca.SX) -> ca.SX:
+    """Return those of the likely wheels (k,), where there are any of them, or else all."""
+    both = ca.logic_and(likely, those)
+    none = ca.logic_or(unless, ca.logic_not(ca.logic_any(both)))
+    return ca.logic_or(both, ca.logic_and(none, likely))
 
 
-def _least(c: ca.SX, wheels: Sequence[int]) -> ca.SX:
-    return _lowest(c, [ca.SX(1.0) for _ in wheels])
-
-
-def _every(conditions: Sequence[ca.SX]) -> ca.SX:
-    return reduce(ca.logic_and, conditions)
-
-
-def _any(conditions: Sequence[ca.SX]) -> ca.SX:
-    return reduce(ca.logic_or, conditions)
-
-
-def _rather(likely: Sequence[ca.SX], those: Sequence[ca.SX], unless: ca.SX) -> list[ca.SX]:
-    """Return those of the likely wheels, where there are any of them, or else all."""
-    both = [ca.logic_and(one, those[k]) for k, one in enumerate(likely)]
-    none = ca.logic_or(unless, ca.logic_not(_any(both)))
-    return [ca.logic_or(both[k], ca.logic_and(none, one)) for k, one in enumerate(likely)]
-
-
-def _lowest(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
+def _lowest(c: ca.SX, among: ca.SX) -> ca.SX:
     """Return the lowest number of some, infinite where there is none."""
-    return reduce(ca.fmin, (ca.if_else(one, c[k], ca.inf) for k, one in enumerate(among)))
+    return ca.mmin(ca.if_else(among, c, ca.inf))
 
 
-def _nearest(c: ca.SX, among: Sequence[ca.SX], to: ca.SX) -> ca.SX:
+def _nearest(c: ca.SX, among: ca.SX, to: ca.SX) -> ca.SX:
     """Return the number of some that is nearest to another, of several the first."""
     best, distance = ca.SX(0.0), ca.SX(ca.inf)
-    for k, one in enumerate(among):
+    for k in range(c.numel()):
         away = ca.fabs(c[k] - to)
-        nearer = ca.logic_and(one, away < distance)
+        nearer = ca.logic_and(among[k], away < distance)
         best, distance = ca.if_else(nearer, c[k], best), ca.if_else(nearer, away, distance)
     return best
 
 
-def _mean(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
+def _mean(c: ca.SX, among: ca.SX) -> ca.SX:
     """Return the mean of some, not a number where there is none."""
-    total = sum((ca.if_else(one, c[k], 0.0) for k, one in enumerate(among)), start=ca.SX(0.0))
-    return total / sum(among, start=ca.SX(0.0))
+    return ca.sum1(ca.if_else(among, c, 0.0)) / ca.sum1(among)
 
 
 @cache
-def trust_scan(k: int) -> Scan:
+def _trust_scan(k: int) -> Scan:
     """Return the compiled loop over samples."""
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
     rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)
-    after = trusted(
-        Trust(*(trust[i] for i in range(4))), row, rates, Rule(rule[0], rule[1], rule[2], free)
+    after = _trusted(
+        _Trust(*(trust[i] for i in range(4))), row, rates, _Rule(rule[0], rule[1], rule[2], free)
     )
     step = ca.Function(
         f"rolled_{k}",

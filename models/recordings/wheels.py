@@ -1,16 +1,25 @@
-"""What wheels are, by which speed is made of theirs: radii, tracks, and which are driven."""
+"""What wheels are, by which speed is made of theirs: radii, tracks, and which are driven.
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+How they roll is learnt where the speed over ground is logged beside them.
+"""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.clock import Raw
 from models.logs.log import RecordingError
-from models.logs.signals import AXLES, WHEELS
+from models.logs.signals import AXLES, QUANTITIES, WHEELS, Signal, quantity_of
+from models.logs.units import SPEED, is_given
 from models.rules import require_within
-from models.schema import Table
+from models.schema import Table, changed
 from models.vehicle import Vehicle
 
-RADII = (0.01, 2.0)  # of a wheel [m], of model cars to dump trucks
+_RADII = (0.01, 2.0)  # of a wheel [m], of model cars to dump trucks
 _LENGTHS = (0.05, 20.0)  # of a track and a wheelbase [m]
 _ACCELERATIONS = (0.5, 100.0)  # [m/s²]
 DRIVEN: Mapping[str, tuple[str, ...]] = {
@@ -34,11 +43,6 @@ class Wheels:
     wheelbase : L [m]; None where it is not known: then front wheels are taken to roll without slip.
     driven : "front", "rear", "all" or "none"; empty where it is not known.
     acceleration : the largest along the car, either way [m/s²].
-
-    Raises
-    ------
-    RecordingError
-        For a number that no wheel, axle or car has, or another word.
     """
 
     radius: tuple[float, ...] = ()
@@ -55,7 +59,7 @@ class Wheels:
             given = getattr(self, name)
             if len(given) not in sizes:
                 raise RecordingError(f"wheels: {name} must be {words}, not {len(given)} numbers")
-        for name, ends in (("radius", RADII), ("track", _LENGTHS)):
+        for name, ends in (("radius", _RADII), ("track", _LENGTHS)):
             for one in getattr(self, name):
                 require_within(RecordingError, *ends, **{f"wheels: {name}": one})
         if self.wheelbase is not None:
@@ -88,34 +92,137 @@ class Wheels:
 
     def table(self) -> dict[str, Any]:
         """Return it as a document holds it: what differs from the defaults."""
-        declared = {one.name: getattr(self, one.name) for one in fields(self)}
-        plain = {one.name: one.default for one in fields(self)}
-        changed = {name: value for name, value in declared.items() if value != plain[name]}
         return {
             name: value[0] if isinstance(value, tuple) and len(value) == 1 else value
-            for name, value in changed.items()
+            for name, value in changed(self).items()
         }
 
     @classmethod
     def of_table(cls, table: Table) -> "Wheels":
-        """Return it as a document says it.
+        """Return it as a document says it.   table : as `table` returns it."""
+        return cls(**table.record(cls, alone=("radius", "track")))
 
-        Parameters
-        ----------
-        table : as `table` returns it.
-        """
-        table.only(*(one.name for one in fields(cls)))
-        given: dict[str, Any] = {}
-        for name in ("radius", "track"):
-            if name in table:
-                several = table.array(name) if isinstance(table.value(name), list) else None
-                if several is not None and several.ndim != 1:
-                    table.refuse(name, "must be a number or a list of numbers")
-                one = (table.number(name),) if several is None else tuple(map(float, several))
-                given[name] = one
-        for name in ("wheelbase", "acceleration"):
-            if name in table:
-                given[name] = table.number(name)
-        if "driven" in table:
-            given["driven"] = table.text("driven")
-        return cls(**given)
+
+# How they roll, by the speed over ground.
+
+_STRAIGHT = 0.05  # [rad/s], largest yaw rate
+_EVEN = 0.5  # [m/s²], largest acceleration
+_FAST = 0.3  # of the speed that 5 % of the samples exceed: slower ones do not count
+_LONG_ENOUGH = 2.0  # [s] of such driving, at least
+_AGREES = 0.02  # of the median: farther off, a wheel slips
+_SPREAD = 0.05  # between quartiles, as a share of the median, beyond which nothing is learnt
+_SPEEDS = (0.8, 1.25)  # speed over ground per speed of a wheel, of one that shows a speed
+_MOST = 200_000  # samples that are looked at
+
+
+class Scale(NamedTuple):
+    """Speed over ground per what a wheel shows.
+    value : radius [m] of one that shows turns, factor [-] of one that shows a speed.
+    """
+
+    value: float
+    turns: bool
+    seconds: float
+
+
+def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
+    """Return what a wheel in SI, turns or a speed, is multiplied by to be a speed.
+
+    Where no unit is written, a radius that is given says that the numbers are turns.
+    """
+    radius = wheels.radius_of(name)
+    if not is_given(unit):
+        return 1.0 if radius is None else radius
+    if quantity_of(name, unit) == SPEED:
+        return 1.0
+    if radius is None:
+        raise RecordingError(
+            f"{what} is in {unit.strip()}, a rate of turns: give the radius of the wheels, in m, "
+            "by [wheels] radius in a log.toml (--log FILE)"
+        )
+    return radius
+
+
+def identified_scales(
+    parts: Mapping[str, Sequence[Raw]], signals: Mapping[str, Signal], units: Mapping[str, str]
+) -> dict[str, Scale]:
+    """Return the scale of each wheel that v_x tells, by name.
+    parts : by signal its channels in SI; v_x, wheels, and r where it is there.
+    """
+    t = parts["v_x"][0].t
+    t = t[:: -(-t.size // _MOST)]
+
+    def at(name: str) -> Array:
+        one_clock = [np.interp(t, one.t, one.values) for one in parts[name]]
+        return signals[name].value(one_clock, QUANTITIES[name])
+
+    v_x, r = at("v_x"), at("r") if "r" in parts else np.zeros(t.size)
+    found = {}
+    for name in WHEELS:
+        if name not in parts:
+            continue
+        given = _identified_scale(t, v_x, r, at(name))
+        if given is None:
+            continue
+        value, seconds = given
+        unit, (low, high) = units[name], _SPEEDS
+        speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
+        turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
+        if speed or (turns and _RADII[0] <= value <= _RADII[1]):
+            found[name] = Scale(value, turns, seconds)
+    return found
+
+
+def _identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[float, float] | None:
+    """Return the speed over ground per what a wheel shows, and the seconds that tell it.
+
+    None where straight and even driving is too short, or does not agree on one number.
+    t : time [s], (n,), rising.   v_x : speed over ground [m/s], (n,).   r : yaw rate [rad/s], (n,).
+    wheel : what the wheel shows [rad/s or m/s], (n,).
+    """
+    step = float(np.median(np.diff(t)))
+    half = max(1, round(0.25 / step))
+    k = np.arange(t.size)
+    low, high = np.maximum(k - half, 0), np.minimum(k + half, t.size - 1)
+    even: NDArray[np.bool_] = np.abs(v_x[high] - v_x[low]) <= _EVEN * (t[high] - t[low])
+    fast = np.abs(v_x) > _FAST * float(np.percentile(np.abs(v_x), 95))
+    kept = even & fast & (np.abs(r) <= _STRAIGHT) & np.isfinite(wheel) & (wheel != 0.0)
+    if np.count_nonzero(kept) * step < _LONG_ENOUGH:
+        return None
+    v, w = v_x[kept], wheel[kept]
+    quarter, middle, other = np.percentile(v / w, [25, 50, 75])
+    if abs(other - quarter) > _SPREAD * abs(middle):
+        return None
+    rolls = np.abs(v / w - middle) <= _AGREES * abs(middle)
+    v, w = v[rolls], w[rolls]
+    seconds = float(w.size * step)
+    return (float(v @ w) / float(w @ w), seconds) if seconds >= _LONG_ENOUGH else None
+
+
+def scale_text(scales: Mapping[str, Scale]) -> str:
+    """Return in words what v_x says of wheels; empty where it says nothing."""
+    if not scales:
+        return ""
+    given = ", ".join(
+        f"{name} {one.value:.4g} m" if one.turns else f"{name} {one.value:.4g} times its speed"
+        for name, one in scales.items()
+    )
+    seconds = min(one.seconds for one in scales.values())
+    return f"wheels roll by vx, over {seconds:.0f} s of straight driving: {given}"
+
+
+def with_scales(
+    wheels: Wheels, signals: Mapping[str, Signal], scales: Mapping[str, Scale]
+) -> tuple[Wheels, dict[str, Signal]]:
+    """Return what a log.toml says of wheels by what was learnt: radii, and factors of speeds."""
+    found = dict(signals)
+    for name, one in scales.items():
+        if not one.turns:
+            found[name] = replace(found[name], factor=found[name].factor * one.value)
+    radii = {name: one.value for name, one in scales.items() if one.turns}
+    if not radii:
+        return wheels, found
+    mean = sum(radii.values()) / len(radii)
+    corners = tuple(radii.get(name, wheels.radius_of(name) or mean) for name in WHEELS[:4])
+    one_for_all = set(radii) == {WHEELS[-1]}
+    return replace(wheels, radius=(mean,) if one_for_all else corners), found

@@ -94,7 +94,7 @@ class Slips(NamedTuple):
     rolling: Expression
 
 
-def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
+def _slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
     """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
     alpha : slip angle, paper's sign [rad].
     kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
@@ -152,6 +152,6 @@ def brush_forces(
     gamma : camber [rad]; without effect.
     """
     del gamma
-    s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+    s = _slips(alpha, kappa, self.C_alpha, self.C_kappa)
     per_demand = self.per_demand(s, F_z, mu)
     return TireForces(s.p_x * per_demand, s.p_y * per_demand)

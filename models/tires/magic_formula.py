@@ -56,7 +56,7 @@ def _magic_slope(
     return D * ca.cos(C * ca.atan(inner)) * C * inner_slope / (1.0 + inner**2)
 
 
-def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expression) -> Expression:
+def _weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expression) -> Expression:
     """Share of the pure-slip force left by the other slip: 1 at s = 0, never negative.
 
     G = cos(C atan(B s_S - E (B s_S - atan B s_S))) over the same at S_H, with s_S = s + S_H.
@@ -105,7 +105,7 @@ def _lateral_curvature(
     return ca.fmin((c.PEY1 + c.PEY2 * df_z) * (1.0 - asymmetry) * c.LEY, 1.0)  # (4.E24)
 
 
-def pure_lateral(
+def _pure_lateral(
     c: Coefficients, alpha: Expression, gamma: Expression, F_z: Expression, mu: Expression
 ) -> Expression:
     """F_y0 [N] of a wheel that rolls freely, (4.E19)."""
@@ -115,7 +115,7 @@ def pure_lateral(
     return _magic_curve(alpha_y, B_y, C_y, D_y, E_y) + S_Vy  # (4.E19)
 
 
-def combined_lateral(
+def _combined_lateral(
     c: Coefficients,
     alpha: Expression,
     kappa: Expression,
@@ -129,12 +129,12 @@ def combined_lateral(
     C_yk = c.RCY1  # (4.E63)
     E_yk = ca.fmin(c.REY1 + c.REY2 * df_z, 1.0)  # (4.E64)
     S_Hyk = c.RHY1 + c.RHY2 * df_z  # (4.E65)
-    G_yk = weight(kappa, S_Hyk, B_yk, C_yk, E_yk)  # (4.E59)-(4.E61)
+    G_yk = _weight(kappa, S_Hyk, B_yk, C_yk, E_yk)  # (4.E59)-(4.E61)
     mu_F_z = _lateral_shape(c, gamma, F_z, mu).D  # μ_y F_z, camber included
     D_Vyk = mu_F_z * (c.RVY1 + c.RVY2 * df_z + c.RVY3 * gamma)
     D_Vyk = D_Vyk * ca.cos(ca.atan(c.RVY4 * alpha))  # (4.E67)
     S_Vyk = D_Vyk * ca.sin(c.RVY5 * ca.atan(c.RVY6 * kappa)) * c.LVYKA  # (4.E66)
-    return G_yk * pure_lateral(c, alpha, gamma, F_z, mu) + S_Vyk  # (4.E58)
+    return G_yk * _pure_lateral(c, alpha, gamma, F_z, mu) + S_Vyk  # (4.E58)
 
 
 def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
@@ -193,13 +193,13 @@ def _combined_longitudinal(
     F_z: Expression,
     mu: Expression,
 ) -> Expression:
-    """F_x [N] at any slip, (4.E50); arguments are those of `combined_lateral`."""
+    """F_x [N] at any slip, (4.E50); arguments are those of `_combined_lateral`."""
     df_z = c.load_increment(F_z)
     B_xa = c.RBX1 * ca.cos(ca.atan(c.RBX2 * kappa)) * c.LXAL  # (4.E54)
     C_xa = c.RCX1  # (4.E55)
     E_xa = ca.fmin(c.REX1 + c.REX2 * df_z, 1.0)  # (4.E56)
     S_Hxa = c.RHX1  # (4.E57)
-    G_xa = weight(alpha, S_Hxa, B_xa, C_xa, E_xa)  # (4.E51)-(4.E53)
+    G_xa = _weight(alpha, S_Hxa, B_xa, C_xa, E_xa)  # (4.E51)-(4.E53)
     return G_xa * _pure_longitudinal(c, kappa, gamma, F_z, mu)  # (4.E50)
 
 
@@ -250,7 +250,7 @@ class MagicFormula:
         alpha_iso = -folded(alpha)  # the file and its equations have the ISO sign
         return TireForces(
             _combined_longitudinal(c, alpha_iso, kappa, gamma, load, mu),
-            combined_lateral(c, alpha_iso, kappa, gamma, load, mu),
+            _combined_lateral(c, alpha_iso, kappa, gamma, load, mu),
         )
 
     def slip_stiffness(self, F_z: Expression) -> Expression:

@@ -14,8 +14,8 @@ from models.tires.forces import Expression
 ESSENTIAL = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 # Conicity and ply-steer: these change sign when the tire is mounted on the other side
 _ASYMMETRIC = ("PHY1", "PHY2", "PVY1", "PVY2", "PEY3", "RHX1", "RBY3", "RVY1", "RVY2")
-LARGEST = 1e5  # of a coefficient: those of real tires reach about 100
-MOST = {"FNOMIN": 1e7, "PDX1": 100.0, "PDY1": 100.0}  # N, and frictions
+_LARGEST = 1e5  # of a coefficient: those of real tires reach about 100
+_MOST = {"FNOMIN": 1e7, "PDX1": 100.0, "PDY1": 100.0}  # N, and frictions
 _POSITIVE = ("FNOMIN", "LFZO", "PKY2", "PDX1", "PDY1", "PKX1")
 _POSITIVE_SCALES = ("LCX", "LMUX", "LKX", "LCY", "LMUY", "LKY")
 
@@ -113,7 +113,7 @@ class Coefficients:
         for field in fields(self):
             if not math.isfinite(getattr(self, field.name)):
                 raise ValueError(f"{field.name} must be finite, it is {getattr(self, field.name)}")
-            most = MOST.get(field.name, LARGEST)
+            most = _MOST.get(field.name, _LARGEST)
             require_within(ValueError, -most, most, **{field.name: getattr(self, field.name)})
         for name in (*_POSITIVE, "PCX1", "PCY1", *_POSITIVE_SCALES):
             if not getattr(self, name) > 0.0:

@@ -8,9 +8,10 @@ section, but units count in [UNITS] only. Unknown keys are kept and do nothing.
 import codecs
 import math
 import re
+import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from math import inf, pi
+from math import inf
 from os import PathLike
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -25,51 +26,9 @@ from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 # Only the keys of `_DIMENSIONS` are converted. The coefficients of the Magic Formula (P.., R..,
 # Q.., L..) are dimensionless or in radian whatever [UNITS] says: their equations are in SI.
 
-_DIMENSIONS: Mapping[str, Mapping[str, int]] = {
-    "FNOMIN": {"FORCE": 1}, "FZMIN": {"FORCE": 1}, "FZMAX": {"FORCE": 1},
-    "UNLOADED_RADIUS": {"LENGTH": 1}, "WIDTH": {"LENGTH": 1}, "RIM_RADIUS": {"LENGTH": 1},
-    "RIM_WIDTH": {"LENGTH": 1}, "ALPMIN": {"ANGLE": 1}, "ALPMAX": {"ANGLE": 1},
-    "CAMMIN": {"ANGLE": 1}, "CAMMAX": {"ANGLE": 1}, "LONGVL": {"LENGTH": 1, "TIME": -1},
-    "VXLOW": {"LENGTH": 1, "TIME": -1}, "VERTICAL_STIFFNESS": {"FORCE": 1, "LENGTH": -1},
-    "VERTICAL_DAMPING": {"FORCE": 1, "TIME": 1, "LENGTH": -1}, "MBELT": {"MASS": 1},
-}  # fmt: skip
-
-_POUND = 0.45359237  # kg
-_GRAVITY = 9.80665  # m/s², standard
-_INCH = 0.0254  # m
-
-UNITS: Mapping[str, Mapping[str, float]] = {
-    "LENGTH": {
-        "m": 1.0, "meter": 1.0, "metre": 1.0,
-        "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3,
-        "cm": 1e-2, "centimeter": 1e-2, "centimetre": 1e-2,
-        "km": 1e3, "kilometer": 1e3, "kilometre": 1e3,
-        "in": _INCH, "inch": _INCH, "inche": _INCH,
-        "ft": 12.0 * _INCH, "foot": 12.0 * _INCH, "feet": 12.0 * _INCH,
-        "mile": 63360.0 * _INCH,
-    },
-    "FORCE": {
-        "n": 1.0, "newton": 1.0,
-        "kn": 1e3, "knewton": 1e3, "kilonewton": 1e3, "kilo_newton": 1e3,
-        "mn": 1e-3, "millinewton": 1e-3, "cn": 1e-2, "centinewton": 1e-2,
-        "kgf": _GRAVITY, "kilogram_force": _GRAVITY, "kg_force": _GRAVITY,
-        "lbf": _POUND * _GRAVITY, "pound_force": _POUND * _GRAVITY,
-        "klbf": 1e3 * _POUND * _GRAVITY, "kpound_force": 1e3 * _POUND * _GRAVITY,
-        "ounce_force": _POUND * _GRAVITY / 16.0, "dyne": 1e-5,
-    },
-    "ANGLE": {"rad": 1.0, "radian": 1.0, "deg": pi / 180.0, "degree": pi / 180.0},
-    "MASS": {
-        "kg": 1.0, "kilogram": 1.0, "g": 1e-3, "gram": 1e-3,
-        "tonne": 1e3, "megagram": 1e3,
-        "lbm": _POUND, "pound_mass": _POUND, "kpound_mass": 1e3 * _POUND,
-        "ounce_mass": _POUND / 16.0, "slug": _POUND * _GRAVITY / (12.0 * _INCH),
-    },
-    "TIME": {
-        "s": 1.0, "sec": 1.0, "second": 1.0,
-        "ms": 1e-3, "milli": 1e-3, "millisecond": 1e-3,
-        "min": 60.0, "minute": 60.0, "h": 3600.0, "hour": 3600.0,
-    },
-}  # fmt: skip
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_DIMENSIONS: Mapping[str, Mapping[str, int]] = _TABLES["dimensions"]
+_UNITS: Mapping[str, Mapping[str, float]] = _TABLES["units"]
 
 
 def _unit_in_si(dimension: str, unit: str) -> float:
@@ -79,7 +38,7 @@ def _unit_in_si(dimension: str, unit: str) -> float:
     because some programs cut names after twelve letters.
     dimension : "LENGTH", "FORCE", "ANGLE", "MASS" or "TIME".
     """
-    known = UNITS[dimension]
+    known = _UNITS[dimension]
     word = unit.strip().lower().replace(" ", "_").replace("-", "_")
     for candidate in (word, word.removesuffix("s")):
         if candidate in known:
@@ -90,8 +49,8 @@ def _unit_in_si(dimension: str, unit: str) -> float:
     raise ValueError(f"[UNITS] {dimension} = {unit!r} is not one of {', '.join(known)}")
 
 
-LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
-SOME = 10  # lines in a message
+_LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
+_SOME = 10  # lines in a message
 _KEY = re.compile(r"[A-Za-z_]\w*")
 _SECTION = re.compile(r"\[(.*?)\]")
 _LINE_END = re.compile(r"\r\n|\r|\n")  # alone: str.splitlines also ends a comment at cp1252's "..."
@@ -102,7 +61,7 @@ class TirError(TireidError, ValueError):
     """A tire property file cannot be used; one line naming the file and the reason."""
 
 
-class Entry(NamedTuple):
+class _Entry(NamedTuple):
     """One `KEY = value` line.
     value : text without quotes and comment.   line : its number, from 1.
     section : the section it stands in, in capitals; empty before the first.
@@ -121,8 +80,8 @@ class TirFile:
     """
 
     path: Path
-    entries: Mapping[str, tuple[Entry, ...]]
-    without_sign: Mapping[str, tuple[Entry, ...]]
+    entries: Mapping[str, tuple[_Entry, ...]]
+    without_sign: Mapping[str, tuple[_Entry, ...]]
 
     def __contains__(self, key: str) -> bool:
         return key in self.entries
@@ -147,11 +106,11 @@ class TirFile:
     def error(self, reason: str) -> TirError:
         return TirError(f"{self.path}: {reason}")
 
-    def _parsed(self, key: str, entry: Entry) -> float:
+    def _parsed(self, key: str, entry: _Entry) -> float:
         if _NUMBER.fullmatch(entry.value):
             value = float(entry.value.upper().replace("D", "E"))
-            if LARGEST < abs(value) < math.inf:
-                raise self.error(f"line {entry.line}: {key} must be below {LARGEST:g}, is {value}")
+            if _LARGEST < abs(value) < math.inf:
+                raise self.error(f"line {entry.line}: {key} must be below {_LARGEST:g}, is {value}")
             if math.isfinite(value):
                 return value
         raise self.error(
@@ -159,7 +118,7 @@ class TirFile:
         )
 
     def _text(
-        self, key: str, default: str, entries: Sequence[Entry], without_sign: Sequence[Entry]
+        self, key: str, default: str, entries: Sequence[_Entry], without_sign: Sequence[_Entry]
     ) -> str:
         if not entries:
             self._require_sign(key, without_sign)
@@ -167,13 +126,13 @@ class TirFile:
         self._require_one(key, {entry.value.upper(): entry.line for entry in entries}.values())
         return entries[-1].value or default
 
-    def _require_sign(self, key: str, without_sign: Sequence[Entry]) -> None:
+    def _require_sign(self, key: str, without_sign: Sequence[_Entry]) -> None:
         if without_sign:
             raise self.error(f'line {without_sign[-1].line}: {key} has no "="')
 
     def _require_one(self, key: str, lines: Collection[int]) -> None:
         if len(lines) > 1:
-            some = ", ".join(str(line) for line in list(lines)[:SOME])
+            some = ", ".join(str(line) for line in list(lines)[:_SOME])
             raise self.error(f"{key} has different values in lines {some}")
 
     def _unit(self, key: str) -> float:
@@ -195,8 +154,8 @@ class TirFile:
 def read_tir(path: str | PathLike[str]) -> TirFile:
     """Read a tire property file without judging what it describes.   path : the `.tir` file."""
     path = Path(path)
-    entries: dict[str, list[Entry]] = {}
-    without_sign: dict[str, list[Entry]] = {}
+    entries: dict[str, list[_Entry]] = {}
+    without_sign: dict[str, list[_Entry]] = {}
     section = ""
     lines = _LINE_END.split(_decoded(read_bytes(path, TirError)))
     for number, raw in enumerate(lines, start=1):
@@ -205,10 +164,10 @@ def read_tir(path: str | PathLike[str]) -> TirFile:
         if header := _SECTION.match(line):
             section = header.group(1).strip().upper()
         elif sign and _KEY.fullmatch(key):
-            entry = Entry(_unquoted(value), number, section)
+            entry = _Entry(_unquoted(value), number, section)
             entries.setdefault(key.upper(), []).append(entry)
         elif word := _KEY.match(line):
-            entry = Entry("", number, section)
+            entry = _Entry("", number, section)
             without_sign.setdefault(word.group().upper(), []).append(entry)
     return TirFile(
         path=path,
@@ -254,8 +213,8 @@ def _unquoted(value: str) -> str:
 # files often keep an old label. So a file is judged by its coefficients as well as by its labels.
 
 _FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
-FORMATS = ("PAC2002", "MF05", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
-PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
+_FORMATS = ("PAC2002", "MF05", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
+_PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
 # No equation of 5.2 has these. Zero is how programs that list all names say "not used": a tire of
 # 6.1 is not hidden by it, with PKY4 = 0 it would have no cornering stiffness.
 _MARKS_OF_OTHERS = (
@@ -325,14 +284,15 @@ def _require_mf52(tir: TirFile) -> None:
             f"FITTYP = {fittyp:g} is {what}; its equations differ, only MF 5.2 and PAC2002 are read"
         )
     plain = re.sub(r"[^A-Z0-9]", "", model.upper())
-    if model and plain not in FORMATS:
+    if model and plain not in _FORMATS:
         raise tir.error(
             f"PROPERTY_FILE_FORMAT = {model!r} is another tire model; only PAC2002, MF_05 and "
             "MF 5.2 (MF-TYRE or USER with FITTYP 5, 6, 21 or 52) are read"
         )
     found = {key: value for key in _MARKS_OF_OTHERS if (value := tir.number(key))}
     if "PHY3" in tir and (model or fittyp is not None):
-        found = {key: value for key, value in found.items() if not _changes_nothing(key, value)}
+        same = {*_PRESSURES_OF_OTHERS, *(["PKY4"] if found.get("PKY4") == _PKY4_OF_52 else [])}
+        found = {key: value for key, value in found.items() if key not in same}
     if marks := [f"{key} = {value:g}" for key, value in found.items()]:
         label = f"it calls itself {model}" if model else "it has no PROPERTY_FILE_FORMAT"
         label += "" if fittyp is None else f", FITTYP {fittyp:g}"
@@ -340,11 +300,6 @@ def _require_mf52(tir: TirFile) -> None:
             f"{', '.join(marks)} belong to Magic Formula 6.x or MF-MCTyre, whose equations differ, "
             f"although {label}; only MF 5.2 and PAC2002 are read"
         )
-
-
-def _changes_nothing(key: str, value: float) -> bool:
-    """Whether a coefficient of 6.x leaves the equations of 5.2 as they are."""
-    return key in _PRESSURES_OF_OTHERS or (key == "PKY4" and value == _PKY4_OF_52)
 
 
 def _coefficients(tir: TirFile) -> Coefficients:
@@ -375,7 +330,7 @@ def _inflated(c: Coefficients, tir: TirFile) -> Coefficients:
         raise tir.error(f"{' and '.join(names)} must be positive, they are {p:g} and {p_0:g}")
     scale = tir.number("LIP")
     dp = ((1.0 if scale is None else scale) * p - p_0) / p_0
-    PPX1, PPX2, PPX3, PPX4, PPY1, PPY2, PPY3, PPY4 = (tir.number(name) or 0.0 for name in PRESSURE)
+    PPX1, PPX2, PPX3, PPX4, PPY1, PPY2, PPY3, PPY4 = (tir.number(name) or 0.0 for name in _PRESSURE)
     K_x = 1.0 + PPX1 * dp + PPX2 * dp**2
     mu_x = 1.0 + PPX3 * dp + PPX4 * dp**2
     mu_y = 1.0 + PPY3 * dp + PPY4 * dp**2

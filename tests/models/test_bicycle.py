@@ -103,22 +103,6 @@ def test_matrices_are_the_jacobians_of_newton_and_euler(case):
         assert relative(numbers(matrix) - jacobian, jacobian) < RESIDUAL
 
 
-def test_matrices_agree_with_finite_differences(case):
-    p, v_x, s = case
-    x, u, f = s[:2], s[2:4], s[4:]
-    zero = newton_euler(p, v_x, 0 * x, 0 * u, 0 * f)
-    model = bicycle(p, v_x)
-    for i in range(2):
-        e = np.eye(2)[i]  # the model is linear: a difference of any width is the derivative
-        for matrix, moved in (
-            (model.A, newton_euler(p, v_x, e, 0 * u, 0 * f)),
-            (model.B, newton_euler(p, v_x, 0 * x, e, 0 * f)),
-            (model.K, newton_euler(p, v_x, 0 * x, 0 * u, e)),
-        ):
-            column = moved - zero
-            assert relative(numbers(matrix)[:, i] - column, column) < RESIDUAL
-
-
 def test_symbols_and_numbers_give_the_same_matrices(case):
     p, v_x, _ = case
     symbols = BicycleParameters(*(ca.SX.sym(name) for name in p._fields))

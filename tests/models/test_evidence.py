@@ -11,7 +11,7 @@ from models.recordings.evidence import STRIDE, WINDOW, correlation, least_square
 DT = 0.01
 
 
-def overlapping_means(noise: np.ndarray) -> np.ndarray:
+def overlapping_means(noise):
     """Means over windows that overlap as those of a recording do."""
     width, stride = round(WINDOW / DT), round(STRIDE / DT)
     total = np.concatenate([[0.0], np.cumsum(noise)])
@@ -50,7 +50,7 @@ def test_correlation_is_the_cosine_between_signals(rng):
     assert correlation(a, 0.0 * a) == 0.0
 
 
-def turning(dt: float = DT, v_y: float = 0.3, rear: float = 0.0) -> Recording:
+def turning(dt=DT, v_y=0.3, rear=0.0):
     """A car that turns as a sine, with sideslip in proportion."""
     t = np.arange(0.0, 20.0, dt)
     r = 0.5 * np.sin(2.0 * t)
@@ -87,7 +87,7 @@ def test_standing_is_left_out_of_the_windows():
     assert (windows(moving).r.size - w.r.size) * STRIDE == pytest.approx(4.0 + WINDOW, abs=0.1)
 
 
-def vars_of(recording: Recording) -> dict[str, object]:
+def vars_of(recording):
     names = ("name", "t", "v_x", "v_y", "r", "delta_f", "delta_r")
     return {name: getattr(recording, name) for name in names}
 

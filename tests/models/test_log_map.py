@@ -22,7 +22,7 @@ names = st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1, max_
 
 
 @st.composite
-def signals(draw) -> dict[str, Signal]:
+def signals(draw):
     found = {}
     chosen = draw(st.sets(st.sampled_from(["v_x", "r", "delta_f", "a_y", "v_y", "wheel_rl"])))
     for name in sorted(chosen):
@@ -64,7 +64,7 @@ def signals(draw) -> dict[str, Signal]:
 )
 def test_what_is_written_reads_back_bit_for_bit(
     tmp_path_factory, told, axes, words, gap, low_pass, wheels, repair
-) -> None:
+):
     made = LogMap(
         signals=told,
         axes=axes,
@@ -84,9 +84,7 @@ def test_what_is_written_reads_back_bit_for_bit(
 
 
 @pytest.mark.parametrize("other", ["there", "there/below", "."])
-def test_a_map_that_is_written_to_another_folder_finds_its_database(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, other: str
-) -> None:
+def test_a_map_that_is_written_to_another_folder_finds_its_database(tmp_path, monkeypatch, other):
     (tmp_path / "there" / "below").mkdir(parents=True)
     (tmp_path / "there" / "car.dbc").write_text("")
     (tmp_path / "there" / "log.toml").write_text('[file]\ndbc = "car.dbc"\n')
@@ -102,7 +100,7 @@ def test_a_map_that_is_written_to_another_folder_finds_its_database(
     assert below.get(other, str(tmp_path / "there" / "car.dbc")) in named
 
 
-def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
+def test_an_empty_map_is_an_empty_file(tmp_path):
     LogMap().to_toml(tmp_path / "log.toml")
     assert (tmp_path / "log.toml").read_text() == ""
     assert LogMap.from_toml(tmp_path / "log.toml") == LogMap()
@@ -116,7 +114,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
         ("[file]\naxes = 'NED'\n", "axes must be one of ISO, SAE, not 'NED'"),
         ("[signals.vy]\nchannel = 'a'\n", "signals.vy is unknown, known are v_x, v_y, beta"),
         ("[signals.v_y]\nunit = 'm/s'\n", "signals.v_y.channel is missing"),
-        ("[signals.v_y]\nchannel = 3\n", "signals.v_y.channel must be a list, it is 3"),
+        ("[signals.v_y]\nchannel = 3\n", "signals.v_y.channel must be a text, it is 3"),
         ("[signals.v_y]\nchannel = []\n", "signals.v_y: channel must name at least one"),
         ("[signals.v_y]\nchannel = ['a', 'a']\n", "signals.v_y: channel must name each once"),
         ("[signals.v_y]\nchannel = 'a'\nscale = 2\n", "signals.v_y.scale is unknown"),
@@ -128,7 +126,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
         ("[signals.delta_f]\nchannel = 'a'\nratio = -14\n", "ratio must be hand wheel over road"),
         ("[signals.delta_f]\nchannel = 'a'\nratio = 2\ntable = [[0, 0], [1, 1]]\n", "give one of"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [[0, 0], [1, -1]]\n", "that rise"),
-        ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "table must be pairs"),
+        ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "table must be a list, it is 1"),
         ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),
@@ -139,7 +137,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
         ("[file", "cannot be read as TOML"),
     ],
 )
-def test_what_is_no_map_is_refused_in_one_line(tmp_path: Path, text: str, rule: str) -> None:
+def test_what_is_no_map_is_refused_in_one_line(tmp_path, text, rule):
     path = tmp_path / "log.toml"
     path.write_text(text)
     with pytest.raises(RecordingError) as caught:
@@ -167,7 +165,7 @@ def test_what_is_no_map_is_refused_in_one_line(tmp_path: Path, text: str, rule: 
         ("beta=Slip-Angle", "beta", Signal(channel=("Slip-Angle",))),
     ],
 )
-def test_a_word_of_the_command_line_tells_a_signal(word: str, name: str, signal: Signal) -> None:
+def test_a_word_of_the_command_line_tells_a_signal(word, name, signal):
     assert given_signals([word]) == {name: signal}
 
 
@@ -184,12 +182,12 @@ def test_a_word_of_the_command_line_tells_a_signal(word: str, name: str, signal:
         (["r=a *0"], "factor must be finite and not zero"),
     ],
 )
-def test_a_word_that_tells_none_is_refused(words: list[str], rule: str) -> None:
+def test_a_word_that_tells_none_is_refused(words, rule):
     with pytest.raises(RecordingError, match=re.escape(rule)):
         given_signals(words)
 
 
-def test_what_is_told_later_replaces_and_sideslip_takes_the_place_of_lateral_velocity() -> None:
+def test_what_is_told_later_replaces_and_sideslip_takes_the_place_of_lateral_velocity():
     first = LogMap(signals=given_signals(["vy=a", "r=b"]))
     second = first.with_signals(given_signals(["beta=c", "r=d"]))
     assert set(second.signals) == {"beta", "r"} and second.signals["r"].channel == ("d",)
@@ -198,7 +196,7 @@ def test_what_is_told_later_replaces_and_sideslip_takes_the_place_of_lateral_vel
     assert first.with_signals(given_signals(["vx=u", "delta_f=s"])).is_complete
 
 
-def test_a_hand_wheel_becomes_road_wheels_by_ratio_or_table() -> None:
+def test_a_hand_wheel_becomes_road_wheels_by_ratio_or_table():
     hand = np.array([-4.0, -1.0, 0.0, 1.0, 3.0])
     assert np.allclose(Signal(channel=("a",), ratio=16.0).value([hand], "angle"), hand / 16.0)
     table = ((-2.0, -0.2), (0.0, 0.0), (2.0, 0.1))
@@ -206,7 +204,7 @@ def test_a_hand_wheel_becomes_road_wheels_by_ratio_or_table() -> None:
     assert np.allclose(road, [-0.4, -0.1, 0.0, 0.05, 0.15])
 
 
-def test_of_several_channels_forces_are_added_and_angles_averaged() -> None:
+def test_of_several_channels_forces_are_added_and_angles_averaged():
     left, right = np.array([1.0, 2.0]), np.array([3.0, 6.0])
     both = Signal(channel=("l", "r"), factor=2.0, offset=1.0)
     assert both.value([left, right], QUANTITIES["Fyf"]).tolist() == [7.0, 15.0]

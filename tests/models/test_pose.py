@@ -12,7 +12,7 @@ from models.logs.names import propose
 from models.logs.signals import Signal
 from models.recordings import LogMap, read_recording
 from models.recordings.map import given_signals
-from models.recordings.pose import lateness, motion_of, smoothed, with_pose
+from models.recordings.pose import _lateness, _motion_of, _smoothed, with_pose
 
 T = 0.01 * np.arange(3000)
 V_X = 2.0 + 0.5 * np.sin(0.5 * T)
@@ -55,14 +55,14 @@ def misses(motion, t=T):
 
 
 def test_a_pose_without_noise_is_the_motion():
-    assert max(misses(motion_of("log", posed())).values()) < 2e-3
+    assert max(misses(_motion_of("log", posed())).values()) < 2e-3
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pose_with_noise_tells_the_motion_and_its_noise(seed):
     x, y = noisy(X, 0.005, seed), noisy(Y, 0.005, seed + 50)
     psi = noisy(PSI, np.radians(0.5), seed + 99)
-    motion = motion_of("log", posed(x, y, psi))
+    motion = _motion_of("log", posed(x, y, psi))
     found = misses(motion)
     assert found["v_y"] < 0.035 and found["v_x"] < 0.035 and found["r"] < 0.03
     position, heading = re.findall(r"by ([\d.]+) (?:m|deg)", motion.said)
@@ -74,7 +74,7 @@ def test_a_pose_with_noise_tells_the_motion_and_its_noise(seed):
 
 def test_smoothing_is_as_strong_as_the_noise_asks():
     wave = np.sin(0.1 * np.arange(800.0))[:, None]
-    weak, strong = (smoothed(noisy(wave[:, 0], size, 1)[:, None]) for size in (0.01, 0.3))
+    weak, strong = (_smoothed(noisy(wave[:, 0], size, 1)[:, None]) for size in (0.01, 0.3))
     assert weak.noise == pytest.approx(0.01, rel=0.1) and strong.noise == pytest.approx(
         0.3, rel=0.1
     )
@@ -92,29 +92,29 @@ HEADINGS = {
 
 @pytest.mark.parametrize("kind", HEADINGS)
 def test_a_heading_is_understood_however_it_counts(kind):
-    found = misses(motion_of("log", posed(psi=HEADINGS[kind](PSI))))
+    found = misses(_motion_of("log", posed(psi=HEADINGS[kind](PSI))))
     assert max(found.values()) < 5e-3, found
 
 
 def test_a_heading_of_something_else_is_refused():
     with pytest.raises(RecordingError, match="must go along with the direction of travel"):
-        motion_of("log", posed(psi=3.0 * np.sin(T)))
+        _motion_of("log", posed(psi=3.0 * np.sin(T)))
 
 
 def test_gaps_of_a_pose_are_not_bridged():
     there = (T < 10.0) | (T > 11.0)
-    motion = motion_of("log", posed(X[there], Y[there], PSI[there], T[there]))
+    motion = _motion_of("log", posed(X[there], Y[there], PSI[there], T[there]))
     np.testing.assert_array_equal(motion.v_y.t, T[there])
     assert np.diff(motion.v_y.t).max() > 0.9
     with pytest.raises(RecordingError, match="at least 30 samples without a gap, it has 20"):
-        motion_of("log", posed(X[:20], Y[:20], PSI[:20], T[:20]))
+        _motion_of("log", posed(X[:20], Y[:20], PSI[:20], T[:20]))
 
 
 @pytest.mark.parametrize("late", [-0.04, 0.0, 0.013, 0.09])
 def test_how_late_a_gyro_is_is_found_to_a_millisecond(late):
     gyro = raw(noisy(np.interp(T - late, T, 1.1 * R + 0.02), 0.05, 3))
-    assert lateness(gyro, raw(R)) == pytest.approx(late, abs=2e-3)
-    assert lateness(raw(noisy(0 * T, 0.1, 1)), raw(R)) is None
+    assert _lateness(gyro, raw(R)) == pytest.approx(late, abs=2e-3)
+    assert _lateness(raw(noisy(0 * T, 0.1, 1)), raw(R)) is None
 
 
 COLUMNS = {
@@ -256,7 +256,7 @@ def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
 def test_a_pose_that_stands_is_refused(place):
     still = np.full(T.size, place)
     with pytest.raises(RecordingError, match="the pose must move"):
-        motion_of("log", posed(x=still, y=still))
+        _motion_of("log", posed(x=still, y=still))
 
 
 def test_notes_of_a_pose_name_what_is_taken_from_it(tmp_path):

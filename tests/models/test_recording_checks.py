@@ -1,9 +1,7 @@
 """Physics: right recordings of many cars pass, and every planted error rings its own alarm."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,15 +32,7 @@ SEDAN_AXLES = SimpleNamespace(l_f=1.25, l_r=1.45, mass=1600.0)
 SPEEDS = {"sedan": 20.0, "truck": 12.0, "formula": 45.0, "tenth": 2.2, "forty-third": 1.5}
 
 
-def drive(
-    car: str = "sedan",
-    peak: float = 3.0,
-    speed: float | None = None,
-    grip: float = 0.9,
-    steering: Callable[[Array], Array] | None = None,
-    duration: float = 12.0,
-    every: int = 10,
-) -> Recording:
+def drive(car="sedan", peak=3.0, speed=None, grip=0.9, steering=None, duration=12.0, every=10):
     """Single-track car, tires saturate as tanh; `peak` [m/s^2] scales its multi-sine steering.
 
     Sampled `every` so many milliseconds.
@@ -52,14 +42,7 @@ def drive(
 
 
 @cache
-def finely(
-    car: str,
-    peak: float,
-    speed: float | None,
-    grip: float,
-    steering: Callable[[Array], Array] | None,
-    duration: float,
-) -> dict[str, Array]:
+def finely(car, peak, speed, grip, steering, duration):
     """`drive` every millisecond; many tests ask for the same."""
     m, I_z, l_f, l_r, C_f, C_r = CARS[car]
     L, v = l_f + l_r, SPEEDS[car] if speed is None else speed
@@ -89,11 +72,11 @@ def finely(
 
 
 @pytest.fixture(scope="module")
-def driven() -> dict[str, Recording]:
+def driven():
     return {car: drive(car) for car in CARS}
 
 
-def refusal(recording: Recording) -> str:
+def refusal(recording):
     with pytest.raises(RecordingError) as caught:
         check_physics(recording)
     message = str(caught.value)
@@ -102,11 +85,11 @@ def refusal(recording: Recording) -> str:
     return message.removeprefix(recording.name + ": ")
 
 
-def scaled(**factors: float) -> Callable[[Recording], Recording]:
+def scaled(**factors):
     """Multiply signals; `bare=1` takes a_y and forces away, `silent=1` only a_y."""
     bare, silent = factors.pop("bare", 0), factors.pop("silent", 0)
 
-    def plant(recording: Recording) -> Recording:
+    def plant(recording):
         change = {k: getattr(recording, k) * f for k, f in factors.items()}
         if bare or silent:
             change["a_y"] = None
@@ -117,8 +100,8 @@ def scaled(**factors: float) -> Callable[[Recording], Recording]:
     return plant
 
 
-def forces(front: float, rear: float, order: int = 1) -> Callable[[Recording], Recording]:
-    def plant(recording: Recording) -> Recording:
+def forces(front, rear, order=1):
+    def plant(recording):
         assert recording.axle_force is not None
         return replace(recording, axle_force=recording.axle_force[:, ::order] * [front, rear])
 
@@ -160,9 +143,7 @@ ALL = ON_MOTION | ON_V_Y | ON_FORCE
 
 @pytest.mark.parametrize("error", ALL)
 @pytest.mark.parametrize("car", CARS)
-def test_every_planted_error_rings_its_own_alarm(
-    driven: dict[str, Recording], car: str, error: str
-) -> None:
+def test_every_planted_error_rings_its_own_alarm(driven, car, error):
     plant, start, remedy = ALL[error]
     if car == "formula" and "km/h" in error:
         start = ("vx must be in m/s",)  # 162 km/h: refused by its peak already
@@ -173,7 +154,7 @@ def test_every_planted_error_rings_its_own_alarm(
 
 @pytest.mark.parametrize("car", CARS)
 @pytest.mark.parametrize("peak", [1.0, 3.0, 6.0])
-def test_a_right_recording_passes(car: str, peak: float) -> None:
+def test_a_right_recording_passes(car, peak):
     made = drive(car, peak)
     check_physics(made)
     check_physics(replace(made, a_y=None, axle_force=None))
@@ -184,7 +165,7 @@ def test_a_right_recording_passes(car: str, peak: float) -> None:
 
 
 @pytest.mark.parametrize("every", [2, 20, 50, 90])
-def test_at_every_rate_above_ten_hertz_a_right_recording_passes_and_errors_ring(every: int) -> None:
+def test_at_every_rate_above_ten_hertz_a_right_recording_passes_and_errors_ring(every):
     made = drive(every=every)
     check_physics(made)
     check_against_vehicle(made, SEDAN_AXLES)
@@ -195,7 +176,7 @@ def test_at_every_rate_above_ten_hertz_a_right_recording_passes_and_errors_ring(
 
 
 @pytest.mark.parametrize("every", [2, 10, 40])
-def test_windows_are_as_long_and_as_far_apart_at_every_rate(every: int) -> None:
+def test_windows_are_as_long_and_as_far_apart_at_every_rate(every):
     """Means over 0.2 s every 0.05 s of a parabola, whose differences are known."""
     made = drive(every=every)
     t = made.t
@@ -208,7 +189,7 @@ def test_windows_are_as_long_and_as_far_apart_at_every_rate(every: int) -> None:
     np.testing.assert_allclose(found.r_dot, 0.1, atol=1e-9)
 
 
-def test_one_degree_of_steering_in_degrees_is_found_without_acceleration() -> None:
+def test_one_degree_of_steering_in_degrees_is_found_without_acceleration():
     made = drive("sedan", speed=25.0)
     small = made.delta_f / np.abs(made.delta_f).max() / DEGREES
     made = drive("sedan", speed=25.0, steering=lambda t: np.interp(t, made.t, small))
@@ -218,7 +199,7 @@ def test_one_degree_of_steering_in_degrees_is_found_without_acceleration() -> No
 
 @pytest.mark.parametrize("grip", [0.1, 0.3, 0.8])
 @pytest.mark.parametrize("speed", [8.0, 15.0, 25.0])
-def test_a_car_that_plows_over_its_front_wheels_passes(grip: float, speed: float) -> None:
+def test_a_car_that_plows_over_its_front_wheels_passes(grip, speed):
     """0.3 rad of steering on ice: the effective wheelbase is tens of meters, and true."""
     check_physics(
         drive(grip=grip, speed=speed, steering=lambda t: np.clip(0.1 * (t - 1.0), 0.0, 0.3))
@@ -226,7 +207,7 @@ def test_a_car_that_plows_over_its_front_wheels_passes(grip: float, speed: float
     check_physics(drive(grip=grip, speed=speed, steering=lambda t: 0.2 * np.sin(0.8 * t)))
 
 
-def test_a_drift_with_opposite_lock_passes() -> None:
+def test_a_drift_with_opposite_lock_passes():
     """Steady: r > 0, sideslip -0.5 rad, wheels turned 0.2 rad to the right."""
     t, v, r, beta = 0.01 * np.arange(1200), 12.0, 0.5, -0.5
     wobble = 1.0 + 0.05 * np.sin(2.0 * t)
@@ -244,7 +225,7 @@ def test_a_drift_with_opposite_lock_passes() -> None:
     check_physics(made)
 
 
-def test_noise_bias_bank_and_roll_do_not_ring(rng: np.random.Generator) -> None:
+def test_noise_bias_bank_and_roll_do_not_ring(rng):
     made = drive(peak=4.0)
     n = len(made)
     assert made.a_y is not None
@@ -261,7 +242,7 @@ def test_noise_bias_bank_and_roll_do_not_ring(rng: np.random.Generator) -> None:
         check_physics(replace(noisy, a_y=None))
 
 
-def test_a_vibrating_sensor_on_a_steady_circle_does_not_ring(rng: np.random.Generator) -> None:
+def test_a_vibrating_sensor_on_a_steady_circle_does_not_ring(rng):
     made = drive("tenth", steering=lambda t: 0.15 + 0.002 * np.sin(t))
     part = made.between(4.0, 8.0)
     assert part.a_y is not None
@@ -271,9 +252,7 @@ def test_a_vibrating_sensor_on_a_steady_circle_does_not_ring(rng: np.random.Gene
     assert "sign of ay" in refusal(replace(part, a_y=-part.a_y))
 
 
-def test_straight_short_and_standing_runs_pass_even_with_wrong_signs(
-    rng: np.random.Generator,
-) -> None:
+def test_straight_short_and_standing_runs_pass_even_with_wrong_signs(rng):
     straight = drive(peak=0.0)
     noise = {k: 0.002 * rng.normal(size=len(straight)) for k in ("r", "delta_f", "v_y", "a_y")}
     check_physics(replace(straight, **noise))
@@ -283,7 +262,7 @@ def test_straight_short_and_standing_runs_pass_even_with_wrong_signs(
         check_physics(replace(straight, delta_r=np.full(len(straight), 3.0)))
 
 
-def test_a_mirrored_log_cannot_be_told_from_a_right_one() -> None:
+def test_a_mirrored_log_cannot_be_told_from_a_right_one():
     """SAE or NED axes (y to the right, all signs turned) obey the same laws; documented."""
     names = dict.fromkeys(("v_y", "r", "delta_f", "a_y", "axle_force"), -1.0)
     check_physics(scaled(**names)(drive()))
@@ -299,15 +278,13 @@ def test_a_mirrored_log_cannot_be_told_from_a_right_one() -> None:
         (forces(-1, 1), "Fyf must rise"),
     ],
 )
-def test_the_vehicle_tells_slip_and_force_signs(
-    plant: Callable[[Recording], Recording], start: str | tuple[str, ...]
-) -> None:
+def test_the_vehicle_tells_slip_and_force_signs(plant, start):
     with pytest.raises(RecordingError) as caught:
         check_against_vehicle(plant(drive()), SEDAN_AXLES)
     assert str(caught.value).removeprefix("made: ").startswith(start)
 
 
-def test_the_vehicle_tells_the_sign_of_v_y_at_speed_without_forces() -> None:
+def test_the_vehicle_tells_the_sign_of_v_y_at_speed_without_forces():
     fast = drive(speed=40.0)
     made = scaled(v_y=-1.0, bare=1)(fast)
     check_against_vehicle(fast, SEDAN_AXLES)
@@ -315,7 +292,7 @@ def test_the_vehicle_tells_the_sign_of_v_y_at_speed_without_forces() -> None:
         check_against_vehicle(made, SEDAN_AXLES)
 
 
-def test_a_mass_in_another_unit_is_told_by_the_forces() -> None:
+def test_a_mass_in_another_unit_is_told_by_the_forces():
     for factor in (1e-3, 1e3):
         wrong = SimpleNamespace(l_f=1.25, l_r=1.45, mass=factor * SEDAN_AXLES.mass)
         with pytest.raises(RecordingError, match="check the unit of mass"):
@@ -324,13 +301,13 @@ def test_a_mass_in_another_unit_is_told_by_the_forces() -> None:
     check_against_vehicle(drive(), nearly)
 
 
-def test_the_vehicle_of_another_scale_is_refused() -> None:
+def test_the_vehicle_of_another_scale_is_refused():
     with pytest.raises(RecordingError, match=r"wheelbase 0\.17 m"):
         check_against_vehicle(drive(speed=6.0), SimpleNamespace(l_f=0.08, l_r=0.09, mass=1.5))
 
 
 @pytest.mark.parametrize("file", ["carmaker.csv.gz", "dart.csv.gz"])
-def test_real_runs_pass_and_their_corruptions_ring(shared_data: Path, file: str) -> None:
+def test_real_runs_pass_and_their_corruptions_ring(shared_data, file):
     path = shared_data / file
     l_f, l_r, mass = (0.924, 1.626, 2027.0) if file.startswith("car") else (0.0805, 0.093, 1.58)
     axles = SimpleNamespace(l_f=l_f, l_r=l_r, mass=mass)
@@ -348,7 +325,7 @@ def test_real_runs_pass_and_their_corruptions_ring(shared_data: Path, file: str)
                     assert remedy in message
 
 
-def test_of_the_wrong_car_it_is_not_the_sign_of_v_y_that_is_to_blame() -> None:
+def test_of_the_wrong_car_it_is_not_the_sign_of_v_y_that_is_to_blame():
     """At low speed v_y is l_r r: with a shorter l_r the rear slips the other way, with -v_y too."""
     slow, short = drive(speed=8.0), SimpleNamespace(l_f=0.8, l_r=0.2, mass=1600.0)
     check_against_vehicle(slow, SEDAN_AXLES)
@@ -363,7 +340,7 @@ def test_of_the_wrong_car_it_is_not_the_sign_of_v_y_that_is_to_blame() -> None:
 
 
 @pytest.mark.parametrize("column", ["r", "delta_f"])
-def test_an_amount_whose_sign_is_elsewhere_is_refused(column: str) -> None:
+def test_an_amount_whose_sign_is_elsewhere_is_refused(column):
     made = drive()
     amount = replace(made, **{column: np.abs(getattr(made, column))})
     with pytest.raises(RecordingError, match=f"{column} must be negative to the right, it never"):
@@ -373,7 +350,7 @@ def test_an_amount_whose_sign_is_elsewhere_is_refused(column: str) -> None:
             check_physics(replace(amount, a_y=None))
 
 
-def test_a_car_that_turns_to_one_side_alone_has_no_amounts() -> None:
+def test_a_car_that_turns_to_one_side_alone_has_no_amounts():
     left = drive(steering=lambda t: 0.02 + 0.01 * np.sin(2.0 * t))
     check_physics(left)
     noise = 4.0 * np.random.default_rng(3).standard_normal(left.t.size)
@@ -388,13 +365,13 @@ BEND = 3.0  # s
 NOISE = {"v_x": 0.03, "v_y": 0.02, "r": 0.002, "delta_f": 0.0005, "a_y": 0.05}
 
 
-def everyday(car: str, seed: int, *, every: float = 15.0, noisy: float = 1.0) -> Recording:
+def everyday(car, seed, *, every=15.0, noisy=1.0):
     """A bend to either side in turn, of 1 m/s², with rest between them; noise in proportion."""
     l_f, l_r = CARS[car][2:4]
     v, L = EVERYDAY_SPEEDS[car], l_f + l_r
     size = (L / v**2 + 0.002 * (v > 5.0)) * 1.0
 
-    def steering(t: Array) -> Array:
+    def steering(t):
         k, s = np.divmod(t - 2.0, every)
         bend = np.sin(np.pi * np.clip(s / BEND, 0.0, 1.0)) * ((s < BEND) & (k >= 0))
         return size * bend * np.where(k % 2 == 0, 1.0, -1.0)
@@ -424,7 +401,7 @@ EVERYDAY = {
 
 @pytest.mark.parametrize("car", EVERYDAY_SPEEDS)
 @pytest.mark.parametrize("lack", WITHOUT)
-def test_a_right_everyday_drive_passes(car: str, lack: str) -> None:
+def test_a_right_everyday_drive_passes(car, lack):
     for seed, noisy in ((0, 1.0), (1, 1.0), (2, 0.0)):
         made = replace(everyday(car, seed, noisy=noisy), **WITHOUT[lack])
         check_physics(made)
@@ -445,7 +422,7 @@ def test_a_right_everyday_drive_passes(car: str, lack: str) -> None:
         if (car, error) != ("tenth", "a hand wheel")  # it has none
     ],
 )
-def test_an_error_of_an_everyday_drive_rings(car: str, error: str) -> None:
+def test_an_error_of_an_everyday_drive_rings(car, error):
     plant, start, remedy = EVERYDAY[error]
     for v_y in (True, False):
         made = everyday(car, 3)
@@ -455,18 +432,18 @@ def test_an_error_of_an_everyday_drive_rings(car: str, error: str) -> None:
 
 
 @pytest.mark.parametrize("every", [15.0, 28.0])
-def test_a_long_straight_hides_no_sign(every: float) -> None:
+def test_a_long_straight_hides_no_sign(every):
     made = replace(everyday("sedan", 4, every=every), v_y=None)
     assert refusal(replace(made, delta_f=-made.delta_f)).startswith("delta_f must turn")
 
 
-def test_a_gyro_that_holds_noise_is_named(rng: np.random.Generator) -> None:
+def test_a_gyro_that_holds_noise_is_named(rng):
     made = everyday("sedan", 5)
     noise = 0.002 * rng.standard_normal(len(made))
     assert refusal(replace(made, r=noise)).startswith("r must be the yaw rate")
 
 
-def test_an_a_y_without_v_x_r_is_not_turned() -> None:
+def test_an_a_y_without_v_x_r_is_not_turned():
     made = drive(peak=5.0)
     lacking = np.gradient(made.v_y, made.t)
     for part in (replace(made, a_y=lacking), replace(made, a_y=lacking, v_y=None)):
@@ -475,7 +452,7 @@ def test_an_a_y_without_v_x_r_is_not_turned() -> None:
         assert "change the sign" not in message
 
 
-def test_an_a_y_that_is_the_yaw_rate_is_named() -> None:
+def test_an_a_y_that_is_the_yaw_rate_is_named():
     made = replace(drive(peak=1.0), axle_force=None)
     for factor in (1.0, 57.3, -1.0):
         assert "a copy of the yaw rate? leave it out" in refusal(replace(made, a_y=factor * made.r))
@@ -483,7 +460,7 @@ def test_an_a_y_that_is_the_yaw_rate_is_named() -> None:
 
 @pytest.mark.parametrize("axes", ["east-north", "north-east", "begun at 120 degrees"])
 @pytest.mark.parametrize("peak", [1.5, 5.0])
-def test_velocities_of_the_world_are_named(axes: str, peak: float) -> None:
+def test_velocities_of_the_world_are_named(axes, peak):
     made = drive(peak=peak, duration=30.0)
     begin = np.radians(120.0) if axes.startswith("begun") else 0.0
     heading = begin + np.concatenate([[0.0], np.cumsum(made.r[:-1])]) * made.dt
@@ -495,7 +472,7 @@ def test_velocities_of_the_world_are_named(axes: str, peak: float) -> None:
     assert "of the world's axes" in refusal(world)
 
 
-def test_a_log_without_any_motion_sideways_is_judged_without_a_warning() -> None:
+def test_a_log_without_any_motion_sideways_is_judged_without_a_warning():
     made, nothing = drive(peak=0.0), np.zeros(1200)
     names = ("v_y", "r", "delta_f", "a_y")
     check_physics(replace(made, axle_force=None, **dict.fromkeys(names, nothing)))

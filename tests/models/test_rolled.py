@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from models.recordings.rolled import (
-    ALIKE,
-    BRAKED,
-    MEMORY,
-    NOISE,
-    PATIENCE,
-    ROLLS_OUT,
-    SLIP,
-    SLOW,
-    UNSURE,
-    trust_scan,
+    _ALIKE,
+    _BRAKED,
+    _MEMORY,
+    _NOISE,
+    _PATIENCE,
+    _ROLLS_OUT,
+    _SLIP,
+    _SLOW,
+    _UNSURE,
+    _trust_scan,
 )
 
 DT, MOST, LIMIT = 0.01, 12.0, 13.0
@@ -25,25 +25,25 @@ def by_hand(state, row, rates, dt, most, limit, free):
     """The speed at the next sample, wheel by wheel in Python: of [v, a, held, known]."""
     v, a, since, known = state
     ahead = v + a * dt
-    near, alike = (NOISE + share * abs(ahead) for share in (SLIP, ALIKE))
-    doubt = UNSURE * most * since
+    near, alike = (_NOISE + share * abs(ahead) for share in (_SLIP, _ALIKE))
+    doubt = _UNSURE * most * since
     steady = [abs(rate) <= limit for rate in rates]
     if max(row) - min(row) <= near and all(steady):
-        doubt *= 1.0 + since / PATIENCE
-    if max(abs(ahead), *map(abs, row)) < SLOW:
-        doubt, steady = SLOW, [True] * len(row)
+        doubt *= 1.0 + since / _PATIENCE
+    if max(abs(ahead), *map(abs, row)) < _SLOW:
+        doubt, steady = _SLOW, [True] * len(row)
     likely = [k for k, c in enumerate(row) if steady[k] and abs(c - ahead) <= near + doubt]
     if not likely:
         if all((c - ahead) * a < 0.0 for c in row):
             return (v, 0.0, since + dt, known)  # what it went on by leads away from all
         return (ahead, a, since + dt, known)
-    if a > BRAKED:  # driven wheels run ahead of the car, however little
+    if a > _BRAKED:  # driven wheels run ahead of the car, however little
         likely = [k for k in likely if free[k]] or likely
-    likely = [k for k in likely if abs(rates[k] - a) <= UNSURE * most] or likely
+    likely = [k for k in likely if abs(rates[k] - a) <= _UNSURE * most] or likely
     speeds = [row[k] for k in likely]
-    if a > ROLLS_OUT:
+    if a > _ROLLS_OUT:
         best = min(speeds)
-    elif a < BRAKED:
+    elif a < _BRAKED:
         best = max(speeds)
     else:
         best = min(speeds, key=lambda c: abs(c - ahead))
@@ -52,10 +52,10 @@ def by_hand(state, row, rates, dt, most, limit, free):
     now = min(max(sum(row[k] for k in kept) / len(kept), ahead - reach), ahead + reach)
     passed = since + dt
     slope = (now - known) / passed
-    if since > MEMORY:  # what was trusted before says little of how it goes on
+    if since > _MEMORY:  # what was trusted before says little of how it goes on
         slope = sum(rates[k] for k in kept) / len(kept)
     slope = min(max(slope, -most), most)
-    a += (1.0 - math.exp(-passed / MEMORY)) * (slope - a)
+    a += (1.0 - math.exp(-passed / _MEMORY)) * (slope - a)
     return (now, a, 0.0, now)
 
 
@@ -78,7 +78,7 @@ def test_every_sample_has_the_bits_of_plain_python(k, seed):
     rows, rates = drive(rng, k)
     free = rng.random(k) < rng.choice([0.0, 0.5, 1.0])
     state = (float(rows[0, 0]), 0.0, 0.0, float(rows[0, 0]))
-    record = trust_scan(k)(
+    record = _trust_scan(k)(
         len(rows),
         {
             "trust": np.array(state), "row": rows, "rates": rates,

@@ -20,7 +20,7 @@ class Staircase:
     angles: tuple[float, ...]
 
     @property
-    def duration(self) -> float:
+    def duration(self):
         return PERIOD * len(self.angles)
 
     def steering(self, t):
@@ -33,7 +33,7 @@ def wanted(k):
 
 
 @pytest.fixture(scope="module")
-def angles() -> tuple[float, ...]:
+def angles():
     generator = np.random.default_rng(1)
     return tuple(np.cumsum(generator.normal(0.0, 0.004, PERIODS)))
 

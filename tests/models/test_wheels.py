@@ -9,8 +9,7 @@ from models.logs.log import RecordingError
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings.rolled import rolled
-from models.recordings.wheel_scale import identified_scale
-from models.recordings.wheels import Wheels
+from models.recordings.wheels import Wheels, _identified_scale
 from models.vehicle import sedan
 from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, rolling, shown, spin
 
@@ -228,14 +227,14 @@ def test_straight_driving_tells_the_radius_and_slip_does_not(run):
     slips = slipping(run, REAR, spin(run.t, 8.0, 3.0, 0.3))
     speeds = shown(run, slips, np.random.default_rng(0), noise=0.03)
     gnss = run.v_x + 0.05 * np.random.default_rng(1).standard_normal(run.t.size)
-    value, seconds = identified_scale(run.t, gnss, run.r, speeds["wheel_rl"] / 0.317)
+    value, seconds = _identified_scale(run.t, gnss, run.r, speeds["wheel_rl"] / 0.317)
     assert value == pytest.approx(0.317, rel=2e-3)
     assert 2.0 < seconds < 30.0
 
 
 def test_where_nothing_is_straight_or_nothing_agrees_no_radius_is_told(run):
     speeds = shown(run, gentle_slip(run))
-    assert identified_scale(run.t, run.v_x, run.r + 0.3, speeds["wheel_rl"]) is None
+    assert _identified_scale(run.t, run.v_x, run.r + 0.3, speeds["wheel_rl"]) is None
     unlike = 20.0 + 5.0 * np.random.default_rng(0).standard_normal(run.t.size)
-    assert identified_scale(run.t, run.v_x, run.r, unlike) is None
-    assert identified_scale(run.t, run.v_x, run.r, np.zeros(run.t.size)) is None
+    assert _identified_scale(run.t, run.v_x, run.r, unlike) is None
+    assert _identified_scale(run.t, run.v_x, run.r, np.zeros(run.t.size)) is None

@@ -336,7 +336,7 @@ def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
     np.testing.assert_allclose(told.t, plain.t, atol=1e-9)
     np.testing.assert_allclose(told.r, plain.r, atol=1e-9)
     stamped["t"][7] = "NaT"
-    with pytest.raises(RecordingError, match=r"1 of .* are empty, .* the first in index 7"):
+    with pytest.raises(RecordingError, match="t must be a time in every row, index 7 has none"):
         ti.read_recording(stamped)
 
 

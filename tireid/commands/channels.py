@@ -19,7 +19,7 @@ from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
-from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
+from models.recordings.wheels import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, given_map, require_toml
 from tireid.output import require_free, text_table

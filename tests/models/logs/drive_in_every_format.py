@@ -14,7 +14,7 @@ FIRST_NS = 1_700_000_000_000_000_000  # of a bag: ns since 1970
 MAT73_HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: then HDF5 schema 1.00 ."
 
 
-def write_mat5(path: Path, t: np.ndarray, columns: Columns) -> Path:
+def write_mat5(path, t, columns):
     """Vectors and their time, as `save` writes them."""
     import scipy.io
 
@@ -24,7 +24,7 @@ def write_mat5(path: Path, t: np.ndarray, columns: Columns) -> Path:
     return path
 
 
-def write_mat73(path: Path, tree: Mapping) -> Path:
+def write_mat73(path, tree):
     """Structs of vectors, as `save -v7.3` writes them: HDF5 behind a header of 512 bytes."""
     import h5py
 
@@ -35,7 +35,7 @@ def write_mat73(path: Path, tree: Mapping) -> Path:
     return path
 
 
-def _fill(group, tree: Mapping) -> None:
+def _fill(group, tree):
     for name, value in tree.items():
         if isinstance(value, Mapping):
             inner = group.create_group(name)
@@ -55,7 +55,7 @@ def _fill(group, tree: Mapping) -> None:
             )
 
 
-def _fill_cell(group, name: str, cells: list) -> None:
+def _fill_cell(group, name, cells):
     """A cell array: references to what lies in #refs#."""
     import h5py
 
@@ -69,7 +69,7 @@ def _fill_cell(group, name: str, cells: list) -> None:
     group[name].attrs["MATLAB_class"] = np.bytes_("cell")
 
 
-def write_mdf(path: Path, t: np.ndarray, columns: Columns, version: str = "4.10") -> Path:
+def write_mdf(path, t, columns, version="4.10"):
     """One group of channels."""
     from asammdf import MDF, Signal
 
@@ -83,7 +83,7 @@ def write_mdf(path: Path, t: np.ndarray, columns: Columns, version: str = "4.10"
     return path
 
 
-def write_bag(path: Path, t: np.ndarray, columns: Columns, storage: str = "sqlite3") -> Path:
+def write_bag(path, t, columns, storage="sqlite3"):
     """Odometry, an IMU and a steering angle; in a folder, by "sqlite3" or "mcap"."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
@@ -123,12 +123,12 @@ IN_BAG = {
 }
 
 
-def _header(store, ns: int, frame: str = "base_link"):
+def _header(store, ns, frame="base_link"):
     time = store.types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
     return store.types["std_msgs/msg/Header"](time, frame)
 
 
-def _vector(store, x: float = 0.0, y: float = 0.0, z: float = 0.0):
+def _vector(store, x=0.0, y=0.0, z=0.0):
     return store.types["geometry_msgs/msg/Vector3"](x, y, z)
 
 
@@ -164,7 +164,7 @@ DBC = 'VERSION ""\n\nBU_: Car\n' + "".join(
 DBC += "".join(f"\nSIG_VALTYPE_ {256 + k} {name} : 2;" for k, name in enumerate(UNITS)) + "\n"
 
 
-def write_can(path: Path, t: np.ndarray, columns: Columns) -> Path:
+def write_can(path, t, columns):
     """One frame a column and sample; ".asc", ".blf", ".log" (candump) or ".trc". The DBC: `DBC`."""
     import struct
 
@@ -186,7 +186,7 @@ def write_can(path: Path, t: np.ndarray, columns: Columns) -> Path:
     return path
 
 
-def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns, apart: bool = False) -> Path:
+def write_mdf_bus(path, t, columns, apart=False):
     """The same frames as MDF4 that logs a bus; apart: later ones first, and remote frames."""
     from asammdf import MDF, Source
 
@@ -219,7 +219,7 @@ def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns, apart: bool = Fal
     return path
 
 
-def _append(file, frames: np.ndarray, t: np.ndarray, name: str, bus) -> None:
+def _append(file, frames, t, name, bus):
     """One group of frames of a bus."""
     from asammdf import Signal
 
@@ -239,24 +239,21 @@ class Written(NamedTuple):
 
 
 # By format: how a drive is written, into a folder. All of them hold the same doubles.
-def _same(columns: Columns) -> dict[str, str]:
-    return {name: name for name in columns}
+def _named(path, columns, pattern="{}", dbc=False):
+    names = {name: pattern.format(name) for name in columns}
+    return Written(path, path.with_suffix(".dbc") if dbc else None, names)
 
 
-def _bus(columns: Columns) -> dict[str, str]:
-    return {name: f"Frame_{name}.{name}" for name in columns}
-
-
-def _csv(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+def _csv(folder, t, columns):
     rows = np.column_stack([t, *columns.values()]).tolist()
     text = ",".join(["t", *columns]) + "\n"
     text += "".join(",".join(map(repr, row)) + "\n" for row in rows)
     path = folder / "drive.csv"
     path.write_text(text)
-    return Written(path, None, _same(columns))
+    return _named(path, columns)
 
 
-def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+def _parquet(folder, t, columns):
     import pyarrow
     import pyarrow.parquet
 
@@ -267,74 +264,40 @@ def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     ]
     table = pyarrow.table([t, *columns.values()], schema=pyarrow.schema(fields))
     pyarrow.parquet.write_table(table, path)
-    return Written(path, None, _same(columns))
+    return _named(path, columns)
 
 
-def _mat5(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mat5(folder / "drive.mat", t, columns), None, _same(columns))
-
-
-def _mat73(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    tree = {"log": {"t": t, **columns, "units": UNITS}}
-    names = {name: f"log.{name}" for name in columns}
-    return Written(write_mat73(folder / "drive.mat", tree), None, names)
-
-
-def _mdf4(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mdf(folder / "drive.mf4", t, columns), None, _same(columns))
-
-
-def _mdf3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mdf(folder / "drive.mdf", t, columns, "3.30"), None, _same(columns))
-
-
-def _bag(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "drive", t, columns)
+def _in_bag(path, columns):
     return Written(path, None, {name: IN_BAG[name] for name in columns})
 
 
-def _db3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "drive", t, columns) / "drive.db3"
-    return Written(path, None, {name: IN_BAG[name] for name in columns})
-
-
-def _mcap(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "drive", t, columns, "mcap") / "drive.mcap"
-    return Written(path, None, {name: IN_BAG[name] for name in columns})
-
-
-def _frames(ending: str) -> Callable[[Path, np.ndarray, Columns], Written]:
-    def write(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-        path = write_can(folder / f"drive.{ending}", t, columns)
-        return Written(path, path.with_suffix(".dbc"), _bus(columns))
-
-    return write
-
-
-def _mdf_bus(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_mdf_bus(folder / "drive.mf4", t, columns)
-    return Written(path, path.with_suffix(".dbc"), _bus(columns))
+def _frames(ending):
+    return lambda f, t, c: _named(write_can(f / f"drive.{ending}", t, c), c, "Frame_{0}.{0}", True)
 
 
 FORMATS: dict[str, Callable[[Path, np.ndarray, Columns], Written]] = {
     "CSV": _csv,
     "Parquet": _parquet,
-    "MATLAB": _mat5,
-    "MATLAB 7.3": _mat73,
-    "MDF4": _mdf4,
-    "MDF3": _mdf3,
-    "ROS 2 bag": _bag,
-    "db3": _db3,
-    "MCAP": _mcap,
+    "MATLAB": lambda f, t, c: _named(write_mat5(f / "drive.mat", t, c), c),
+    "MATLAB 7.3": lambda f, t, c: _named(
+        write_mat73(f / "drive.mat", {"log": {"t": t, **c, "units": UNITS}}), c, "log.{}"
+    ),
+    "MDF4": lambda f, t, c: _named(write_mdf(f / "drive.mf4", t, c), c),
+    "MDF3": lambda f, t, c: _named(write_mdf(f / "drive.mdf", t, c, "3.30"), c),
+    "ROS 2 bag": lambda f, t, c: _in_bag(write_bag(f / "drive", t, c), c),
+    "db3": lambda f, t, c: _in_bag(write_bag(f / "drive", t, c) / "drive.db3", c),
+    "MCAP": lambda f, t, c: _in_bag(write_bag(f / "drive", t, c, "mcap") / "drive.mcap", c),
     "CAN ASC": _frames("asc"),
     "CAN BLF": _frames("blf"),
     "CAN candump": _frames("log"),
     "CAN TRC": _frames("trc"),
-    "CAN MDF4": _mdf_bus,
+    "CAN MDF4": lambda f, t, c: _named(
+        write_mdf_bus(f / "drive.mf4", t, c), c, "Frame_{0}.{0}", True
+    ),
 }
 
 
-def write(format: str, folder: Path, t: np.ndarray, columns: Columns) -> Written:
+def write(format, folder, t, columns):
     """A drive in a format; what the libraries that write warn of is theirs."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

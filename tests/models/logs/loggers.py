@@ -2,7 +2,6 @@
 
 import datetime
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ class Drive(NamedTuple):
     steer: np.ndarray  # deg
 
 
-def drive(n: int = N) -> Drive:
+def drive(n=N):
     """A slalom, to three digits, as files hold it."""
     t = np.round(DT * np.arange(n), 3)
     wave = np.sin(2.0 * t)
@@ -29,11 +28,11 @@ def drive(n: int = N) -> Drive:
     )
 
 
-def number(value: float, decimal: str = ".", digits: int = 3) -> str:
+def number(value, decimal=".", digits=3):
     return f"{value:.{digits}f}".replace(".", decimal)
 
 
-def table(rows, delimiter=",", decimal=".", end="\n", quoted=False, trailing=False) -> str:
+def table(rows, delimiter=",", decimal=".", end="\n", quoted=False, trailing=False):
     lines = []
     for row in rows:
         cells = [number(one, decimal) for one in row]
@@ -42,20 +41,20 @@ def table(rows, delimiter=",", decimal=".", end="\n", quoted=False, trailing=Fal
     return end.join(lines) + end
 
 
-def plain(delimiter: str = ",", decimal: str = ".", **how) -> str:
+def plain(delimiter=",", decimal=".", **how):
     header = delimiter.join(
         ["Time [s]", "Speed [km/h]", "vy [m/s]", "Yaw Rate [deg/s]", "Steering [deg]"]
     )
     return header + "\n" + table(zip(*drive(), strict=True), delimiter, decimal, **how)
 
 
-def units_row(delimiter: str = ";", decimal: str = ",") -> str:
+def units_row(delimiter=";", decimal=","):
     lines = [delimiter.join(["Time", "Speed", "vy", "Yaw Rate", "Steering"])]
     lines += [delimiter.join(["s", "km/h", "m/s", "°/s", "°"])]
     return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), delimiter, decimal)
 
 
-def motec() -> str:
+def motec():
     """MoTeC i2: every cell quoted, a preamble of pairs, names, units, a blank line."""
     lines = [
         '"Format","MoTeC CSV File",,,"Workbook","Circuit"',
@@ -81,7 +80,7 @@ def motec() -> str:
     return "\r\n".join(lines) + "\r\n" + body
 
 
-def aim() -> str:
+def aim():
     """AiM Race Studio: pairs, names, units, and each a line of its own."""
     lines = [
         '"Format","AiM CSV File"',
@@ -105,7 +104,7 @@ def aim() -> str:
     return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), quoted=True)
 
 
-def carmaker_dat() -> str:
+def carmaker_dat():
     """IPG CarMaker: columns apart by blanks, names and units in comments."""
     lines = ["#INFOFILE1.1 - Do not remove this line!", "## Testrun: Slalom", "#"]
     lines += ["# Time Car.v Car.vy Car.YawRate Steer.WhlAng", "# s km/h m/s deg/s deg"]
@@ -113,19 +112,19 @@ def carmaker_dat() -> str:
     return "\n".join(lines + rows) + "\n"
 
 
-def carmaker_csv() -> str:
+def carmaker_csv():
     header = "#Time;Car.v [km/h];Car.vy [m/s];Car.YawRate [deg/s];Steer.WhlAng [deg]"
     return header + "\n" + table(zip(*drive(), strict=True), ";")
 
 
-def two_d() -> str:
+def two_d():
     """2D datarecording: a title, names, units in brackets, decimal commas, tabs."""
     lines = ["2D Datarecording WinARace export", "Event:\tTest", ""]
     lines += ["Time\tV_GPS\tVy\tGyro_Z\tSteer", "[s]\t[km/h]\t[m/s]\t[°/s]\t[°]"]
     return "\r\n".join(lines) + "\r\n" + table(zip(*drive(), strict=True), "\t", ",", end="\r\n")
 
 
-def vbox() -> str:
+def vbox():
     """Racelogic VBOX: sections; time is hhmmss.ss."""
     lines = [
         "File created on 20/05/2023 at 14:31:00",
@@ -158,13 +157,13 @@ def vbox() -> str:
     return "\r\n".join(lines + rows) + "\r\n"
 
 
-def clock(t: float, start: float = 14 * 3600 + 31 * 60 + 59.5) -> str:
+def clock(t, start=14 * 3600 + 31 * 60 + 59.5):
     """Time of day as hh:mm:ss.sss; a minute passes in the middle of the drive."""
     at = round((start + t) * 1000) % 86_400_000
     return f"{at // 3600000:02d}:{at // 60000 % 60:02d}:{at // 1000 % 60:02d}.{at % 1000:03d}"
 
 
-def stamped(stamp: Callable[[float], str], name: str = "Time") -> str:
+def stamped(stamp, name="Time"):
     """The table with another clock."""
     lines = [f"{name},Speed [km/h],vy [m/s],Yaw Rate [deg/s],Steering [deg]"]
     one = drive()
@@ -173,14 +172,14 @@ def stamped(stamp: Callable[[float], str], name: str = "Time") -> str:
     return "\n".join(lines) + "\n"
 
 
-def iso(t: float) -> str:
+def iso(t):
     start = datetime.datetime(2023, 12, 31, 23, 59, 59, 500_000)
     return (start + datetime.timedelta(milliseconds=round(1000 * t))).isoformat(
         timespec="milliseconds"
     )
 
 
-def rounded(t: float, tick: float) -> str:
+def rounded(t, tick):
     """A stamp that is cut to a tick."""
     return f"{math.floor(round(t / tick, 6)) * tick:.3f}"
 

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from models.logs.axes import GRAVITY, triads
-from models.logs.names import words_of
+from models.logs.axes import _GRAVITY, triads
+from models.logs.names import _words_of
 from tests.models.logs.test_names import proposed
 
 T = 0.01 * np.arange(3000)
@@ -23,7 +23,7 @@ def noise(size, seed):
     return size * np.random.default_rng(seed).normal(size=T.size)
 
 
-def box(axes, gravity=GRAVITY, unit="m/s^2", rate="rad/s", names=("AccX", "GyroX"), seed=1):
+def box(axes, gravity=_GRAVITY, unit="m/s^2", rate="rad/s", names=("AccX", "GyroX"), seed=1):
     """The accelerations and rates of a box whose x, y and z are some axes of the car."""
     found = []
     for k, (letter, word) in enumerate(zip("XYZ", axes, strict=True)):
@@ -31,7 +31,7 @@ def box(axes, gravity=GRAVITY, unit="m/s^2", rate="rad/s", names=("AccX", "GyroX
         _, a, w = CAR[axis]
         a = sign * (a + gravity * (axis == "up")) + noise(0.2, seed + k)
         w = np.degrees(sign * w) if rate == "deg/s" else sign * w
-        a = a / GRAVITY if unit in ("g", "") else a
+        a = a / _GRAVITY if unit in ("g", "") else a
         found += [(names[0].replace("X", letter), unit, a)]
         found += [(names[1].replace("X", letter), rate, w + noise(0.01, seed + 10 + k))]
     return found
@@ -111,7 +111,7 @@ def test_velocities_of_games_and_cameras_have_z_forward(name, right):
     found = proposed(
         *velocities(named, (sign * V_Y, noise(0.02, 3), V)),
         ("Yaw Rate", "rad/s", R),
-        ("Lateral Acceleration", "g", A_Y / GRAVITY + noise(0.01, 4)),
+        ("Lateral Acceleration", "g", A_Y / _GRAVITY + noise(0.01, 4)),
     )
     assert found.guesses["v_x"].channel == (named("Z"),) and found.is_sure("v_x")
     assert found.guesses["v_y"].channel == (named("X"),)
@@ -153,6 +153,6 @@ def test_axes_as_letters_have_them_and_velocities_of_the_world_are_left_alone():
 def test_triads_are_channels_alike_but_for_a_letter():
     forms = ("Acc{}", "G({})", "/imu/angular_velocity.{}", "Mag{}")
     names = [one.format(x) for one in forms for x in "xyz"] + ["ax", "ay"]
-    found = triads({one: words_of(one) for one in names}, dict.fromkeys(names, ""))
+    found = triads({one: _words_of(one) for one in names}, dict.fromkeys(names, ""))
     assert [one.quantity for one in found] == ["acceleration", "acceleration", "yaw rate"]
     assert found[0].names == {"x": "Accx", "y": "Accy", "z": "Accz"}

@@ -5,7 +5,7 @@ import sqlite3
 import numpy as np
 import pytest
 
-from models.logs.bag import KNOWN
+from models.logs.bag import _KNOWN
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from tests.models.logs.drive_in_every_format import FIRST_NS, write_bag
@@ -19,7 +19,7 @@ STORAGES = {"sqlite3": rosbag2.StoragePlugin.SQLITE3, "mcap": rosbag2.StoragePlu
 def store_of(**types):
     """Types of a distribution, those that cars use, and more by their definitions."""
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    for kind, text in {**KNOWN, **types}.items():
+    for kind, text in {**_KNOWN, **types}.items():
         store.register(typesys.get_types_from_msg(text, kind))
     return store
 
@@ -29,28 +29,19 @@ def header(store, ns, frame="base_link"):
     return store.types["std_msgs/msg/Header"](time, frame)
 
 
-def write(path, store, topics, storage="sqlite3"):
+def write(path, store, topics, storage="sqlite3", mode=None):
     """Topics: name -> (type, [(received in ns, message)]); in the order of their times."""
-    with rosbag2.Writer(path, version=9, storage_plugin=STORAGES[storage]) as bag:
-        _fill(bag, store, topics)
-    return path
-
-
-def write_compressed(path, store, topics, mode, storage="sqlite3"):
     bag = rosbag2.Writer(path, version=9, storage_plugin=STORAGES[storage])
-    bag.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    if mode is not None:
+        bag.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
     with bag:
-        _fill(bag, store, topics)
+        rows = []
+        for name, (kind, messages) in topics.items():
+            connection = bag.add_connection(name, kind, typestore=store)
+            rows += [(time, connection, store.serialize_cdr(one, kind)) for time, one in messages]
+        for time, connection, raw in sorted(rows, key=lambda row: row[0]):
+            bag.write(connection, time, raw)
     return path
-
-
-def _fill(bag, store, topics):
-    rows = []
-    for name, (kind, messages) in topics.items():
-        connection = bag.add_connection(name, kind, typestore=store)
-        rows += [(time, connection, store.serialize_cdr(one, kind)) for time, one in messages]
-    for time, connection, raw in sorted(rows, key=lambda row: row[0]):
-        bag.write(connection, time, raw)
 
 
 def refusal(path):
@@ -285,25 +276,16 @@ def test_stamps_that_were_not_set_give_way_to_the_time_of_the_bag(tmp_path):
     assert np.array_equal(log.read(["/velocity/heading_rate"])[0].t, np.arange(50) / 100)
 
 
-def test_the_stamp_is_the_clock_and_not_when_the_bag_received_the_message(tmp_path):
+@pytest.mark.parametrize("of", ["a drive", "a simulation"])
+def test_the_stamp_is_the_clock_and_not_when_the_bag_received_the_message(of, tmp_path):
     store = store_of()
-    topics = car_topics(store)
-    late = [
-        (time + 7_000_000 + k % 3 * 10**6, one) for k, (time, one) in enumerate(topics["/twist"][1])
-    ]
-    topics = {"/twist": (topics["/twist"][0], late), "/plain": topics["/plain"]}
-    log = open_log(write(tmp_path / "bag", store, topics))
-    twist, plain = log.read(["/twist/twist.linear.x", "/plain/speed"])
-    assert np.array_equal(twist.t, np.arange(50) / 100)
-    assert np.array_equal(plain.t, np.arange(50) / 100)
-
-
-def test_stamps_of_a_simulation_keep_their_digits(tmp_path):
-    store = store_of()
-    topics = car_topics(store)
-    for k, (_, message) in enumerate(topics["/twist"][1]):
-        message.header.stamp.sec, message.header.stamp.nanosec = 5 + k // 100, k % 100 * STEP
-    topics = {name: topics[name] for name in ("/twist", "/plain")}
+    topics = {name: car_topics(store)[name] for name in ("/twist", "/plain")}
+    late = []
+    for k, (time, one) in enumerate(topics["/twist"][1]):
+        if of == "a simulation":
+            one.header.stamp.sec, one.header.stamp.nanosec = 5 + k // 100, k % 100 * STEP
+        late.append((time + 7_000_000 + k % 3 * 10**6, one))
+    topics["/twist"] = topics["/twist"][0], late
     log = open_log(write(tmp_path / "bag", store, topics))
     twist, plain = log.read(["/twist/twist.linear.x", "/plain/speed"])
     assert np.array_equal(twist.t, np.arange(50) / 100)
@@ -315,9 +297,8 @@ def test_compressed_bags_are_read_and_unpack_no_further_than_allowed(mode, tmp_p
     store = store_of()
     topics = {"/velocity": car_topics(store)["/velocity"]}
     storage = "mcap" if mode == "STORAGE" else "sqlite3"
-    path = write_compressed(
-        tmp_path / "bag", store, topics, getattr(rosbag2.CompressionMode, mode), storage
-    )
+    compression = getattr(rosbag2.CompressionMode, mode)
+    path = write(tmp_path / "bag", store, topics, storage, compression)
     values = open_log(path).read(["/velocity/longitudinal_velocity"])[0].values
     assert np.array_equal(values, np.arange(50.0))
     small = {"FILE": "megabytes=0.001", "MESSAGE": "block=0.00002", "STORAGE": "block=0.001"}
@@ -351,24 +332,28 @@ def test_metadata_does_not_lead_out_of_the_folder(tmp_path, drive):
     assert "missing" in refusal(path)
 
 
-def test_a_database_that_computes_its_messages_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        (
+            [
+                "CREATE TABLE topics(id, name, type, serialization_format)",
+                "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 "
+                "FROM n) SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n",
+            ],
+            "missing tables",
+        ),
+        (["CREATE TABLE songs(id, name)"], "is not a ROS 2 bag"),
+    ],
+    ids=["computes its messages", "of something else"],
+)
+def test_another_database_is_refused(tables, said, tmp_path):
     path = tmp_path / "bag.db3"
     with sqlite3.connect(path) as base:
-        base.execute("CREATE TABLE topics(id, name, type, serialization_format)")
-        base.execute(
-            "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) "
-            "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n"
-        )
+        for one in tables:
+            base.execute(one)
     base.close()
-    assert "missing tables" in refusal(path)
-
-
-def test_a_database_of_something_else_is_refused(tmp_path):
-    path = tmp_path / "bag.db3"
-    with sqlite3.connect(path) as base:
-        base.execute("CREATE TABLE songs(id, name)")
-    base.close()
-    assert "is not a ROS 2 bag" in refusal(path)
+    assert said in refusal(path)
 
 
 @pytest.mark.parametrize("storage", STORAGES)

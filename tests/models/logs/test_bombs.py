@@ -12,7 +12,7 @@ import pytest
 
 from models.logs.door import open_log
 from models.logs.log import RecordingError
-from models.schema import SWELLS
+from models.schema import _SWELLS
 
 MANY = 100_000_000  # samples of a channel that the limits allow
 ROOM = 700_000_000  # bytes beyond what the readers themselves take
@@ -112,7 +112,8 @@ def test_what_swells_in_memory_is_refused_before_it_does(tmp_path):
         (matlab(tmp_path / "s.mat", struct_of(b"s", MANY)), r"holds no signal"),
         (
             matlab(tmp_path / "several.mat", *(struct_of(b"s%d" % k, MANY) for k in range(3))),
-            rf"structs and cells must be a log, they swell to \d+ times their size, above {SWELLS}",
+            "structs and cells must be a log, they swell to "
+            rf"\d+ times their size, above {_SWELLS}",
         ),
         (parquet(tmp_path / "text.parquet", note=["x" * 3_000_000]), "read"),
         (parquet(tmp_path / "time.parquet", time=["1" * 3_000_000]), "read"),
@@ -173,9 +174,9 @@ def test_what_a_file_unpacks_to_is_told_by_it_and_judged_first(
     written, words, tmp_path, monkeypatch
 ):
     path = written(tmp_path / "log")
-    monkeypatch.setattr("models.schema.SWOLLEN_FROM", 10_000_000)
+    monkeypatch.setattr("models.schema._SWOLLEN_FROM", 10_000_000)
     with contextlib.suppress(RecordingError):  # such as that nothing rises
         open_log(path).listed()
-    monkeypatch.setattr("models.schema.SWOLLEN_FROM", 100_000)
+    monkeypatch.setattr("models.schema._SWOLLEN_FROM", 100_000)
     with pytest.raises(RecordingError, match=words):
         open_log(path)

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from models.logs.can import raw_values, values_of
+from models.logs.can import _group_of, _raw_values, _values_of
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from tests.models.logs.drive_in_every_format import DBC, write_can, write_mdf_bus
@@ -38,17 +38,8 @@ VAL_ 100 Angle 32767 "SNA" 32766 "Init_Error" 1 "one step" ;
 def write(path, messages):
     with can.Logger(str(path)) as log:
         for time, identifier, data, more in messages:
-            log.on_message_received(
-                can.Message(
-                    **{
-                        "timestamp": time,
-                        "arbitration_id": identifier,
-                        "is_extended_id": identifier > 0x7FF,
-                        "data": data,
-                        **more,
-                    }
-                )
-            )
+            about = {"timestamp": time, "arbitration_id": identifier, "data": data, **more}
+            log.on_message_received(can.Message(is_extended_id=identifier > 0x7FF, **about))
     return path
 
 
@@ -88,13 +79,13 @@ def test_signals_of_any_place_and_kind_are_those_that_cantools_decodes():
     for message in base.messages:
         (signal,) = message.signals
         there = [message.decode(bytes(row), scaling=False)["S"] for row in data]
-        ours = raw_values(data, signal)
+        ours = _raw_values(data, signal)
         for one, other in zip(ours.tolist(), there, strict=True):
             assert one == other or (np.isnan(one) and np.isnan(other)), signal
         scaled = [float(message.decode(bytes(row))["S"]) for row in data]
         # Integers of 64 bits lose their last digits on the way to a double.
         with np.errstate(invalid="ignore"):  # floats of any bits
-            values = values_of(data, signal)
+            values = _values_of(data, signal)
         assert np.allclose(values, scaled, rtol=1e-14, atol=1e-14, equal_nan=True)
 
 
@@ -179,19 +170,21 @@ def test_frames_of_can_fd_are_read(tmp_path):
     assert np.array_equal(log.read(["Long.V"])[0].values, np.arange(20) / 3)
 
 
-def test_frames_of_a_bus_in_mdf_are_told_apart_from_channels(tmp_path, drive):
+def bus(folder, *drive, **more):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        path = write_mdf_bus(tmp_path / "log.mf4", *drive)
+        return write_mdf_bus(folder / "log.mf4", *drive, **more)
+
+
+def test_frames_of_a_bus_in_mdf_are_told_apart_from_channels(tmp_path, drive):
+    path = bus(tmp_path, *drive)
     assert 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"' in refusal(path)
     assert open_log(path, path.with_suffix(".dbc")).format == "CAN MDF4"
 
 
 def test_frames_of_several_groups_are_in_order_and_those_without_data_counted(tmp_path, drive):
     t, columns = drive
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        path = write_mdf_bus(tmp_path / "log.mf4", t, columns, apart=True)
+    path = bus(tmp_path, t, columns, apart=True)
     log = open_log(path, path.with_suffix(".dbc"))
     (r,) = log.read(["Frame_r.r"])
     assert np.array_equal(r.t, t) and np.array_equal(r.values, columns["r"])
@@ -202,9 +195,7 @@ def test_frames_of_several_groups_are_in_order_and_those_without_data_counted(tm
 
 
 def test_frames_of_a_bus_in_mdf_lie_on_disk_where_they_are_many(tmp_path, drive, monkeypatch):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        path = write_mdf_bus(tmp_path / "log.mf4", *drive)
+    path = bus(tmp_path, *drive)
     monkeypatch.setattr("models.logs.growing.LONGEST_IN_MEMORY", 200)
     log = open_log(path, path.with_suffix(".dbc"))
     for _, (group, _, _) in log.channels:
@@ -231,12 +222,7 @@ def test_a_dbc_that_is_none_is_refused(content, tmp_path, drive):
     path = write_can(tmp_path / "log.blf", *drive)
     base = tmp_path / "bad.dbc"
     base.write_bytes(content)
-    text = refusal(path, base)
-    assert text.startswith(f"{base}: is not a DBC file")
-
-
-def test_a_dbc_that_is_not_there_is_named(tmp_path, drive):
-    path = write_can(tmp_path / "log.blf", *drive)
+    assert refusal(path, base).startswith(f"{base}: is not a DBC file")
     assert refusal(path, tmp_path / "no.dbc") == f"{tmp_path / 'no.dbc'}: there is no such file"
 
 
@@ -256,13 +242,6 @@ def test_a_blf_that_was_cut_off_is_refused(tmp_path, drive):
     path = write_can(tmp_path / "log.blf", *drive)
     path.write_bytes(path.read_bytes()[:-10])
     assert "is cut off, it has" in refusal(path, path.with_suffix(".dbc"))
-
-
-def test_a_container_that_inflates_beyond_the_limit_is_refused(tmp_path, monkeypatch):
-    frames = ((0.001 * k, 100, bytes(8), {}) for k in range(4000))
-    path = write(tmp_path / "log.blf", frames)
-    monkeypatch.setenv("TIREID_LIMITS", "block=0.1")
-    assert "megabytes of a block must be at most 0.1" in refusal(path, dbc(tmp_path))
 
 
 @pytest.mark.parametrize("level", [0, 6])
@@ -339,10 +318,8 @@ def test_frames_of_j1939_are_known_by_their_parameter_group(senders, told, tmp_p
 
 
 def test_a_parameter_group_with_a_receiver_is_known_whoever_receives():
-    from models.logs.frames import group_of
-
-    assert group_of(0x18EA0BFE) == group_of(0x0CEAFF21) == 0xEA00
-    assert group_of(0x18F0093E) == 0xF009 and group_of(0x19F0093E) == 0x1F009
+    assert _group_of(0x18EA0BFE) == _group_of(0x0CEAFF21) == 0xEA00
+    assert _group_of(0x18F0093E) == 0xF009 and _group_of(0x19F0093E) == 0x1F009
 
 
 def test_a_long_identifier_of_no_j1939_is_not_taken_for_another(tmp_path):

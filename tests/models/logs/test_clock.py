@@ -22,7 +22,7 @@ from models.logs.log import Channel
 DT = 0.01
 
 
-def raw(t, values) -> Raw:
+def raw(t, values):
     t = np.asarray(t, dtype=np.float64)
     return Raw(t, np.asarray(values, dtype=np.float64), "sample", np.arange(t.size))
 
@@ -37,7 +37,7 @@ def wave(t):
     cut=st.floats(0.3, 1.4),
     seed=st.integers(0, 2**31),
 )
-def test_what_is_logged_later_changes_nothing(rate: float, cut: float, seed: int) -> None:
+def test_what_is_logged_later_changes_nothing(rate, cut, seed):
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 2.0, 1.0 / rate)
     grid = t[0] + DT * np.arange(180)
@@ -51,7 +51,7 @@ def test_what_is_logged_later_changes_nothing(rate: float, cut: float, seed: int
     assert not np.allclose(before[rest], after[rest])  # the test can fail
 
 
-def test_a_straight_line_is_followed_without_delay() -> None:
+def test_a_straight_line_is_followed_without_delay():
     t = np.arange(0.0, 2.0, 0.1)
     grid = DT * np.arange(190)
     got = sampled(raw(t, 3.0 + 2.0 * t), grid, DT)
@@ -59,30 +59,30 @@ def test_a_straight_line_is_followed_without_delay() -> None:
     assert np.all(got[:10] == 3.0)  # one sample has no slope
 
 
-def test_a_slow_channel_goes_on_for_one_interval_at_most() -> None:
+def test_a_slow_channel_goes_on_for_one_interval_at_most():
     got = sampled(raw([0.0, 0.1, 0.2], [0.0, 1.0, 2.0]), np.array([0.2, 0.25, 0.3, 0.35, 0.5]), DT)
     assert np.allclose(got, [2.0, 2.5, 3.0, 3.0, 3.0])
 
 
-def test_a_channel_on_the_clock_keeps_its_bits() -> None:
+def test_a_channel_on_the_clock_keeps_its_bits():
     t, values = DT * np.arange(300), np.random.default_rng(0).normal(size=300)
     assert np.array_equal(sampled(raw(t, values), t, DT), values)
 
 
-def test_a_fast_channel_is_the_mean_since_the_instant_before() -> None:
+def test_a_fast_channel_is_the_mean_since_the_instant_before():
     t = 0.001 * np.arange(500)
     got = sampled(raw(t, np.arange(500.0)), DT * np.arange(40), DT)
     assert got[0] == 0.0
     assert np.allclose(got[1:], 10.0 * np.arange(1, 40) - 4.5)
 
 
-def test_noise_above_the_clock_is_not_folded_into_the_drive() -> None:
+def test_noise_above_the_clock_is_not_folded_into_the_drive():
     t = 0.001 * np.arange(2000)
     tone = np.sin(2 * np.pi * 102.0 * t)
     assert np.abs(sampled(raw(t, tone), DT * np.arange(1, 190), DT)).max() < 0.03
 
 
-def test_the_clock_is_that_of_the_channel_nearest_to_it() -> None:
+def test_the_clock_is_that_of_the_channel_nearest_to_it():
     t = 0.003 + DT * np.arange(400)
     slow = np.arange(0.0, 4.0, 0.1)
     (one,) = on_one_clock({"r": raw(t, wave(t)), "v_x": raw(slow, slow)}, DT, LONGEST_GAP)
@@ -91,7 +91,7 @@ def test_the_clock_is_that_of_the_channel_nearest_to_it() -> None:
     assert np.allclose(one.signals["v_x"][100:], one.t[100:])
 
 
-def test_a_gap_of_any_channel_ends_a_segment_of_all() -> None:
+def test_a_gap_of_any_channel_ends_a_segment_of_all():
     t = DT * np.arange(1000)
     hole = (t < 3.0) | (t >= 5.0)
     slow = np.arange(0.0, 10.0, 0.1)
@@ -103,7 +103,7 @@ def test_a_gap_of_any_channel_ends_a_segment_of_all() -> None:
         assert np.allclose(one.signals["v_y"], wave(one.t), atol=1e-9)
 
 
-def test_clocks_of_the_calendar_are_compared_to_the_microsecond() -> None:
+def test_clocks_of_the_calendar_are_compared_to_the_microsecond():
     t, slow, late = DT * np.arange(1000), 0.003 + 0.1 * np.arange(100), 1.7e9
     hole = (t < 3.0) | (t >= 5.0)
     channels = {"r": (t, wave(t)), "v_y": (t[hole], wave(t[hole])), "v_x": (slow, wave(slow))}
@@ -116,23 +116,23 @@ def test_clocks_of_the_calendar_are_compared_to_the_microsecond() -> None:
             assert np.allclose(other.signals[name], values, rtol=0, atol=1e-12)
 
 
-def test_channels_that_never_overlap_have_no_segment() -> None:
+def test_channels_that_never_overlap_have_no_segment():
     t = DT * np.arange(100)
     assert on_one_clock({"a": raw(t, t), "b": raw(t + 5.0, t)}, DT, LONGEST_GAP) == []
 
 
-def test_slow_channels_have_no_gap_between_their_samples() -> None:
+def test_slow_channels_have_no_gap_between_their_samples():
     assert gaps(np.arange(0.0, 3.0, 0.1), LONGEST_GAP).size == 0
     assert gaps(np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.7]), LONGEST_GAP).tolist() == [3]
     assert gaps(np.array([0.0, 0.01, 0.02, 0.12, 0.13]), LONGEST_GAP).size == 0
     assert gaps(np.array([0.0, 0.01, 0.02, 0.13, 0.14]), LONGEST_GAP).tolist() == [3]
 
 
-def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are() -> None:
+def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are():
     t = DT * np.arange(100)
     every_tenth = np.where(np.arange(100) % 10 == 0, t, np.nan)
 
-    def channel(values) -> Channel:
+    def channel(values):
         rows = np.arange(100)
         return Channel(name="v", unit="", t=t, values=values, place="line", rows=rows)
 
@@ -147,7 +147,7 @@ def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are() -> N
     assert cut.t.size == 90 and np.array_equal(cut.values, cut.t) and cut.rows[0] == 1
 
 
-def test_clocks_are_one_where_their_numbers_are() -> None:
+def test_clocks_are_one_where_their_numbers_are():
     t = DT * np.arange(10)
     assert are_one_clock([raw(t, t), raw(t.copy(), t)])
     assert not are_one_clock([raw(t, t), raw(t + 1e-9, t)])

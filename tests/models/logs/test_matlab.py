@@ -123,30 +123,32 @@ def test_files_of_another_byte_order_are_read(tmp_path):
     assert np.array_equal(open_log(path).read(["v"])[0].values, A[:40])
 
 
-@pytest.mark.parametrize("version", WRITERS)
-def test_a_matrix_with_the_names_of_its_columns_is_named_by_them(version, tmp_path):
-    tree = {"log": {"t": T, "data": np.column_stack([A, B]), "names": ["yaw rate", "steer"]}}
-    tree["log"]["units"] = ["deg/s", "deg"]
-    listed = open_log(WRITERS[version](tmp_path / "log.mat", tree)).listed()
-    assert [(one.name, one.unit) for one in listed] == [("yaw rate", "deg/s"), ("steer", "deg")]
+SHAPES = {  # what is written, names and units of its channels, of which the last one is B
+    "a matrix with names of its columns": (
+        {"log": {"t": T, "data": np.column_stack([A, B]), "names": ["yaw rate", "steer"],
+                 "units": ["deg/s", "deg"]}},
+        [("yaw rate", "deg/s"), ("steer", "deg")],
+    ),
+    "dSPACE, with its clock in X": (
+        {"rec": {"X": {"Name": "clock", "Data": T}, "Y": [
+            {"Name": "v_x", "Data": A, "Unit": "m/s"}, {"Name": "r", "Data": B, "Unit": "1/s"},
+        ]}},
+        [("v_x", "m/s"), ("r", "1/s")],
+    ),
+    "rows of a To File block": (
+        {"ans": np.vstack([T, A, B])}, [("ans(2,:)", ""), ("ans(3,:)", "")],
+    ),
+}  # fmt: skip
 
 
+@pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("version", WRITERS)
-def test_a_record_of_a_dspace_rapid_prototype_has_its_clock_in_x(version, tmp_path):
-    signals = [{"Name": "v_x", "Data": A, "Unit": "m/s"}, {"Name": "r", "Data": B, "Unit": "1/s"}]
-    tree = {"rec": {"X": {"Name": "clock", "Data": T}, "Y": signals}}
+def test_signals_of_a_matrix_or_of_structs_are_named_and_timed(version, shape, tmp_path):
+    tree, names = SHAPES[shape]
     log = open_log(WRITERS[version](tmp_path / "log.mat", tree))
-    assert [(one.name, one.unit) for one in log.listed()] == [("v_x", "m/s"), ("r", "1/s")]
-    assert np.array_equal(log.read(["r"])[0].values, B)
-    assert np.array_equal(log.read(["r"])[0].t, T)
-
-
-@pytest.mark.parametrize("version", WRITERS)
-def test_rows_with_a_rising_first_one_are_the_signals_of_a_to_file_block(version, tmp_path):
-    log = open_log(WRITERS[version](tmp_path / "log.mat", {"ans": np.vstack([T, A, B])}))
-    assert [one.name for one in log.listed()] == ["ans(2,:)", "ans(3,:)"]
-    assert np.array_equal(log.read(["ans(3,:)"])[0].values, B)
-    assert np.array_equal(log.read(["ans(3,:)"])[0].t, T)
+    assert [(one.name, one.unit) for one in log.listed()] == names
+    (last,) = log.read([names[-1][0]])
+    assert np.array_equal(last.values, B) and np.array_equal(last.t, T)
 
 
 @pytest.mark.parametrize("version", WRITERS)
@@ -182,6 +184,12 @@ def opaque(name, kind):
 
 def test_tables_and_other_objects_are_named_with_what_to_do(tmp_path):
     path = tmp_path / "log.mat"
+    write_5(path, {"t": T, "v": A})
+    path.write_bytes(path.read_bytes() + opaque(b"tab", b"table"))
+    log = open_log(path)
+    assert [one.name for one in log.listed()] == ["v"]
+    assert log.notes == ("not read: tab (a table, timeseries or other object)",)
+
     write_5(path, {"n": np.ones((1, 1))})
     path.write_bytes(path.read_bytes() + opaque(b"tab", b"table"))
     text = refusal(path)
@@ -194,14 +202,6 @@ def test_tables_and_other_objects_are_named_with_what_to_do(tmp_path):
         file["tab"].attrs["MATLAB_class"] = np.bytes_("timetable")
         file["tab"].attrs["MATLAB_object_decode"] = 3
     assert "not read: tab (timetable); save vectors and their time" in refusal(path)
-
-
-def test_what_is_beside_an_object_is_read_all_the_same(tmp_path):
-    path = write_5(tmp_path / "log.mat", {"t": T, "v": A})
-    path.write_bytes(path.read_bytes() + opaque(b"tab", b"table"))
-    log = open_log(path)
-    assert [one.name for one in log.listed()] == ["v"]
-    assert log.notes == ("not read: tab (a table, timeseries or other object)",)
 
 
 def nested(depth):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.logs.log import Channel, Listed
-from models.logs.names import HAND, RULES, SURE, Guess, name_confidence, propose, words_of
+from models.logs.names import _HAND, _RULES, _SURE, Guess, _name_confidence, _words_of, propose
 from models.logs.spelling import unit_in_name, without_ending
 
 CALLED = {
@@ -32,7 +32,7 @@ CALLED = {
     "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
                 "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel",
                 "roadwheelAngle", "Delta_Wheel"],
-    HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
+    _HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
            "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle",
            "handwheelAngle", "carState.steeringAngle", "/steering_angle/data", "Angle volant",
            "Angolo volante", "ángulo_volante", "delta_h", "Steering Pos", "Steer_SW",
@@ -65,41 +65,41 @@ NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target"
 
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
-def test_a_name_of_a_logger_is_that_signal_before_any_other(signal: str, name: str) -> None:
-    found = {one: name_confidence(one, name) for one in RULES}
-    assert found[signal] >= SURE
+def test_a_name_of_a_logger_is_that_signal_before_any_other(signal, name):
+    found = {one: _name_confidence(one, name) for one in _RULES}
+    assert found[signal] >= _SURE
     assert all(value < found[signal] for one, value in found.items() if one != signal)
 
 
 @pytest.mark.parametrize("name", NO_SIGNAL)
-def test_a_name_of_something_else_is_no_signal(name: str) -> None:
-    assert not any(name_confidence(one, name) for one in RULES)
+def test_a_name_of_something_else_is_no_signal(name):
+    assert not any(_name_confidence(one, name) for one in _RULES)
 
 
-def test_names_are_cut_into_words() -> None:
-    assert words_of("Car.YawRate") == ("car", "yaw", "rate")
-    assert words_of("IMU01_gyro_z [deg/s]") == ("imu", "01", "gyro", "z")
-    assert words_of("Längsgeschw.") == ("laengsgeschw",)
-    assert words_of("Accélération") == ("acceleration",)
-    assert words_of("LÄNGS") == words_of("LA\u0308NGS") == ("laengs",)
+def test_names_are_cut_into_words():
+    assert _words_of("Car.YawRate") == ("car", "yaw", "rate")
+    assert _words_of("IMU01_gyro_z [deg/s]") == ("imu", "01", "gyro", "z")
+    assert _words_of("Längsgeschw.") == ("laengsgeschw",)
+    assert _words_of("Accélération") == ("acceleration",)
+    assert _words_of("LÄNGS") == _words_of("LA\u0308NGS") == ("laengs",)
 
 
 class Log:
     """Channels in memory, each with a unit: name, unit, values."""
 
-    def __init__(self, *channels: tuple[str, str, np.ndarray]) -> None:
+    def __init__(self, *channels):
         self.channels = {name: (unit, np.asarray(values)) for name, unit, values in channels}
 
-    def listed(self) -> tuple[Listed, ...]:
+    def listed(self):
         return tuple(
             Listed(name=name, unit=unit, samples=values.size, rate=100.0)
             for name, (unit, values) in self.channels.items()
         )
 
-    def runs(self) -> tuple[str, ...]:
+    def runs(self):
         return ()
 
-    def read(self, names, run=None) -> tuple[Channel, ...]:
+    def read(self, names, run=None):
         return tuple(
             Channel(
                 name=name,
@@ -121,7 +121,7 @@ def proposed(*channels):
     return propose(log, log.listed())
 
 
-def test_a_log_with_units_is_proposed_whole() -> None:
+def test_a_log_with_units_is_proposed_whole():
     found = proposed(
         ("Ground Speed", "km/h", 70 + WAVE),
         ("Vel Lat", "km/h", WAVE),
@@ -135,7 +135,7 @@ def test_a_log_with_units_is_proposed_whole() -> None:
     assert set(signals) == {"v_x", "v_y", "r", "delta_f", "a_y"}
 
 
-def test_units_at_the_end_of_names_hide_no_signal() -> None:
+def test_units_at_the_end_of_names_hide_no_signal():
     found = proposed(
         ("vehicle_speed_mps", "m/s", 20 + WAVE),
         ("vy_mps", "m/s", WAVE),
@@ -149,7 +149,7 @@ def test_units_at_the_end_of_names_hide_no_signal() -> None:
     }
 
 
-def test_of_two_that_are_equal_none_is_taken() -> None:
+def test_of_two_that_are_equal_none_is_taken():
     found = proposed(("GPS Speed", "km/h", WAVE), ("Ground Speed", "km/h", WAVE))
     assert not found.is_sure("v_x") and "v_x" in found.unsure()
     assert {one.channel[0] for one in found.rivals["v_x"]} == {"GPS Speed", "Ground Speed"}
@@ -157,7 +157,7 @@ def test_of_two_that_are_equal_none_is_taken() -> None:
     assert better.is_sure("v_x") and better.guesses["v_x"].channel == ("Velocity Forward",)
 
 
-def test_of_two_that_are_equal_the_one_with_more_samples_per_second_is_named_first() -> None:
+def test_of_two_that_are_equal_the_one_with_more_samples_per_second_is_named_first():
     class Rates(Log):
         def read(self, names, run=None):
             steps = {"Ground Speed": 0.01, "GPS Speed": 0.1}
@@ -172,24 +172,24 @@ def test_of_two_that_are_equal_the_one_with_more_samples_per_second_is_named_fir
         assert found.guesses["v_x"].channel == ("Ground Speed",)
 
 
-def test_a_unit_of_something_else_takes_a_channel_out() -> None:
+def test_a_unit_of_something_else_takes_a_channel_out():
     found = proposed(("Yaw Rate", "bar", WAVE), ("Gyro Z", "deg/s", WAVE))
     assert found.guesses["r"].channel == ("Gyro Z",) and found.is_sure("r")
     assert proposed(("Yaw Rate", "bar", WAVE)).guesses.get("r") is None
 
 
-def test_without_a_unit_nothing_but_our_own_names_is_sure() -> None:
+def test_without_a_unit_nothing_but_our_own_names_is_sure():
     assert not proposed(("Yaw Rate", "", WAVE)).is_sure("r")
     assert proposed(("Yaw Rate", "", WAVE)).guesses["r"].why == "no unit in the file"
     assert proposed(("r", "", WAVE)).is_sure("r")
 
 
-def test_a_channel_that_never_changes_gives_way() -> None:
+def test_a_channel_that_never_changes_gives_way():
     found = proposed(("Yaw Rate", "deg/s", 0 * WAVE), ("ESP_YawRate", "deg/s", WAVE))
     assert found.guesses["r"].channel == ("ESP_YawRate",)
 
 
-def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel() -> None:
+def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel():
     far = proposed(("RoadWheelAngle", "deg", 400 * WAVE)).guesses["delta_f"]
     assert far.hand and "hand wheel" in far.why
     near = proposed(("RoadWheelAngle", "deg", 20 * WAVE)).guesses["delta_f"]
@@ -198,7 +198,7 @@ def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel()
     assert named.guesses["delta_f"].hand and not named.is_sure("delta_f")
 
 
-def test_two_wheels_of_an_axle_are_taken_together() -> None:
+def test_two_wheels_of_an_axle_are_taken_together():
     found = proposed(
         ("Car.SteerAngleFL", "rad", 0.1 * WAVE), ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
         ("FyFL", "N", WAVE), ("FyFR", "N", WAVE), ("FyRL", "N", WAVE), ("FyRR", "N", WAVE),
@@ -209,14 +209,14 @@ def test_two_wheels_of_an_axle_are_taken_together() -> None:
     assert {"Fyf", "Fyr"} <= set(found.signals())
 
 
-def test_sideslip_stands_in_for_lateral_velocity_where_there_is_none() -> None:
+def test_sideslip_stands_in_for_lateral_velocity_where_there_is_none():
     beta = ("Schwimmwinkel", "deg", WAVE)
     assert "beta" in proposed(beta).signals() and proposed(beta).beta_stands_in
     both = proposed(beta, ("Vel Lat", "km/h", WAVE))
     assert "beta" not in both.signals() and not both.beta_stands_in
 
 
-def test_a_guess_that_cannot_be_read_is_none() -> None:
+def test_a_guess_that_cannot_be_read_is_none():
     class Broken(Log):
         def read(self, names, run=None):
             from models.logs.log import RecordingError
@@ -249,12 +249,12 @@ def test_a_guess_that_cannot_be_read_is_none() -> None:
         ("dampsDeg2", "dampsDeg2", ""),
     ],
 )
-def test_units_stand_at_the_end_of_names_in_any_spelling(name: str, bare: str, unit: str) -> None:
+def test_units_stand_at_the_end_of_names_in_any_spelling(name, bare, unit):
     assert unit_in_name(name) == unit
     assert without_ending(name, unit) == bare
 
 
-def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none() -> None:
+def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none():
     found = proposed(("yawRateDegPs", "", 20 * WAVE), ("roadwheelAngleDeg", "", 4 * WAVE))
     assert found.signals()["r"].unit == "deg/s" and found.signals()["delta_f"].unit == "deg"
 
@@ -272,16 +272,16 @@ def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none() 
     ],
 )  # fmt: skip
 def test_without_a_unit_that_is_proposed_which_the_range_allows_and_none_is_sure(
-    signal: str, name: str, size: float, unit: str
-) -> None:
+    signal, name, size, unit
+):
     guess = proposed((name, "", size * WAVE)).guesses[signal]
-    assert guess.unit == unit and guess.confidence < SURE
+    assert guess.unit == unit and guess.confidence < _SURE
     assert "no unit in the file" in guess.why
     if unit and signal != "a_y":
         assert f"goes to {size:.3g}, " in guess.why
 
 
-def test_one_spike_does_not_change_a_unit() -> None:
+def test_one_spike_does_not_change_a_unit():
     wave = 2.0 * np.sin(np.arange(5000.0))
     wave[7] = 400.0
     assert proposed(("YawRate", "", wave)).guesses["r"].unit == ""
@@ -289,19 +289,19 @@ def test_one_spike_does_not_change_a_unit() -> None:
 
 @pytest.mark.parametrize("rate", ["", "deg/s"])
 @pytest.mark.parametrize("lateral", ["", "g"])
-def test_r_and_a_y_without_units_have_those_in_which_a_y_is_v_x_r(rate: str, lateral: str) -> None:
+def test_r_and_a_y_without_units_have_those_in_which_a_y_is_v_x_r(rate, lateral):
     r = 0.06 * np.sin(0.03 * np.arange(2000.0))  # [rad/s], on a slippery road
     a_y = 20.0 * r
     r, a_y = (np.degrees(r) if rate else r), (a_y / 9.80665 if lateral else a_y)
     speed = ("Speed", "km/h", 72.0 + 0.1 * np.cos(np.arange(2000.0)))
     found = proposed(speed, ("YawRate", "", r), ("Lat_Acc", "", a_y)).guesses
     assert (found["r"].unit, found["a_y"].unit) == (rate, lateral)
-    assert found["r"].confidence < SURE and found["a_y"].confidence < SURE
+    assert found["r"].confidence < _SURE and found["a_y"].confidence < _SURE
 
 
-def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_allows() -> None:
+def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_allows():
     near = proposed(("log.steer", "", 0.107 * WAVE)).guesses["delta_f"]
-    assert not near.hand and near.confidence < SURE and "as road wheels do in rad" in near.why
+    assert not near.hand and near.confidence < _SURE and "as road wheels do in rad" in near.why
     far = proposed(("log.steer", "", 80.0 * WAVE)).guesses["delta_f"]
     assert far.hand and far.unit == "deg"
     named = proposed(("SteeringWheelAngle", "", 0.107 * WAVE)).guesses["delta_f"]
@@ -310,24 +310,24 @@ def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_al
     assert told.hand
 
 
-def test_a_road_wheel_without_a_unit_that_goes_too_far_is_a_hand_wheel_in_degrees() -> None:
+def test_a_road_wheel_without_a_unit_that_goes_too_far_is_a_hand_wheel_in_degrees():
     far = proposed(("RoadWheelAngle", "", 400 * WAVE)).guesses["delta_f"]
     assert far.hand and far.unit == "deg" and "as a hand wheel does in deg" in far.why
 
 
-def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second() -> None:
+def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second():
     guess = proposed(("Yaw Rate", "deg", 20 * WAVE)).guesses["r"]
-    assert guess.unit == "deg/s" and guess.confidence < SURE
+    assert guess.unit == "deg/s" and guess.confidence < _SURE
 
 
-def test_a_filtered_duplicate_stands_back_for_what_was_filtered() -> None:
+def test_a_filtered_duplicate_stands_back_for_what_was_filtered():
     found = proposed(("LatAcc_filtered", "g", WAVE), ("ESP_AccLat", "g", WAVE))
     assert found.is_sure("a_y") and found.guesses["a_y"].channel == ("ESP_AccLat",)
     alone = proposed(("LatAcc_filtered", "g", WAVE))
     assert alone.is_sure("a_y")
 
 
-def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken() -> None:
+def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken():
     found = proposed(("Seitwärts", "km/h", WAVE), ("Slip", "deg", WAVE))
     assert found.guesses["v_y"].channel == ("Seitwärts",) and not found.is_sure("v_y")
     assert found.guesses["beta"].channel == ("Slip",) and not found.is_sure("beta")
@@ -337,7 +337,7 @@ def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken() -> 
     assert not any({"v_y", "beta"} & set(proposed(one).guesses) for one in none)
 
 
-def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
+def test_the_programs_of_stanford_are_understood_but_for_the_ratio():
     found = proposed(
         ("vxCG", "m/s", 20 + WAVE), ("vyCG", "m/s", WAVE), ("ayCG", "m/s2", WAVE),
         ("axCG", "m/s2", WAVE), ("yawRate", "deg/s", WAVE), ("sideSlip", "deg", WAVE),
@@ -348,10 +348,10 @@ def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
     )
 
 
-def test_a_side_and_the_number_of_an_axle_are_a_corner() -> None:
+def test_a_side_and_the_number_of_an_axle_are_a_corner():
     """CarSim's R1 is the right wheel of the front axle, and none of the rear."""
-    assert words_of("Steer_R1") == ("steer", "fr") and words_of("Fy_L2") == ("fy", "rl")
-    assert words_of("IMU_L12") == words_of("IMU_l12") == ("imu", "l", "12")
+    assert _words_of("Steer_R1") == ("steer", "fr") and _words_of("Fy_L2") == ("fy", "rl")
+    assert _words_of("IMU_L12") == _words_of("IMU_l12") == ("imu", "l", "12")
     found = proposed(
         *((f"Steer_{place}", "deg", 5 * WAVE) for place in ("L1", "R1")),
         *((f"Fy_{place}", "N", 2e3 * WAVE) for place in ("L1", "R1", "L2", "R2")),
@@ -363,7 +363,7 @@ def test_a_side_and_the_number_of_an_axle_are_a_corner() -> None:
     assert found.guesses["Fyr"].channel == ("Fy_L2", "Fy_R2")
 
 
-def test_a_channel_that_is_there_in_two_units_is_one() -> None:
+def test_a_channel_that_is_there_in_two_units_is_one():
     speed = 70 + WAVE
     found = proposed(("SPEED_KPH", "", speed), ("SPEED_MPH", "", np.round(speed / 1.609344, 2)))
     assert found.is_sure("v_x") and "v_x" not in found.rivals
@@ -373,12 +373,12 @@ def test_a_channel_that_is_there_in_two_units_is_one() -> None:
     assert not others.is_sure("v_x") and len(others.rivals["v_x"]) == 2
 
 
-def test_omega_is_a_yaw_rate_where_it_is_no_faster_than_a_car_turns() -> None:
+def test_omega_is_a_yaw_rate_where_it_is_no_faster_than_a_car_turns():
     assert proposed(("omega", "rad/s", 0.5 * WAVE)).is_sure("r")
     assert "r" not in proposed(("omega", "rad/s", 60 + WAVE)).guesses
 
 
-def test_a_speed_without_a_unit_is_told_by_how_the_car_turns() -> None:
+def test_a_speed_without_a_unit_is_told_by_how_the_car_turns():
     """v_x r = a_y: at 20 m/s and 0.4 rad/s 0.82 g."""
     turn = (("Gyro Z", "", 0.4 * 57.3 * WAVE), ("GForceY", "", 0.82 * WAVE))
     found = proposed(("Speed", "", 72.0 + WAVE), ("Vy", "", 3.6 * WAVE), *turn)
@@ -389,20 +389,20 @@ def test_a_speed_without_a_unit_is_told_by_how_the_car_turns() -> None:
     assert slow.guesses["v_x"].unit == slow.guesses["v_y"].unit == ""
 
 
-def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken() -> None:
+def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken():
     found = proposed(("Yaw", "deg/s", 20 * WAVE), ("SteerXyz", "deg", 90 * WAVE))
     assert found.guesses["r"].channel == ("Yaw",) and not found.is_sure("r")
-    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < SURE
+    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < _SURE
     assert "r" not in proposed(("Yaw", "deg", 20 * WAVE)).guesses
 
 
-def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it() -> None:
+def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it():
     assert without_ending("steering_deg", "°") == "steering"
     assert without_ending("speed_kmh", "kph") == "speed"
     assert without_ending("speed_kmh", "mph") == "speed_kmh"
 
 
-def test_the_carriers_of_carmaker_are_road_wheels() -> None:
+def test_the_carriers_of_carmaker_are_road_wheels():
     places = ("CFL", "CFR", "CRL", "CRR")
     found = proposed(
         *((f"Car.{place}.rz", "rad", 0.1 * WAVE) for place in places),
@@ -423,21 +423,21 @@ UNIT = {"v_x": "m/s", "r": "deg/s", "delta_f": "deg", "a_y": "m/s^2", "a_x": "m/
 
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in PUBLIC.items() for n in all_])
-def test_names_of_public_logs_are_proposed(signal: str, name: str) -> None:
+def test_names_of_public_logs_are_proposed(signal, name):
     unit = unit_in_name(name) or UNIT[signal]
     found = proposed((name, unit, 20.0 * WAVE))
     assert found.guesses[signal].channel == (name,)
     assert found.is_sure(signal) or found.guesses[signal].hand
-    assert not any(found.is_sure(one) for one in RULES if one != signal)
+    assert not any(found.is_sure(one) for one in _RULES if one != signal)
 
 
 @pytest.mark.parametrize("name", ["EffMt_D2_R", "M_Mtr_D2_R", "Damper_R", "Batt_V", "p_Brk_R"])
-def test_a_letter_behind_a_name_is_a_side_and_no_signal(name: str) -> None:
-    assert not any(name_confidence(one, name) for one in RULES)
-    assert name_confidence("r", "log.r") > 0.0
+def test_a_letter_behind_a_name_is_a_side_and_no_signal(name):
+    assert not any(_name_confidence(one, name) for one in _RULES)
+    assert _name_confidence("r", "log.r") > 0.0
 
 
-def test_a_wheel_of_carsim_turns() -> None:
+def test_a_wheel_of_carsim_turns():
     found = proposed(*((f"AVy_{place}", "rpm", 600.0 + WAVE) for place in ("L1", "R1", "L2", "R2")))
     assert all(found.is_sure(one) for one in ("wheel_fl", "wheel_fr", "wheel_rl", "wheel_rr"))
     assert not found.is_sure("r") and not found.is_sure("v_y")

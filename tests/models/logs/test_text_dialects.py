@@ -54,21 +54,6 @@ def test_a_drive_is_the_same_in_every_dialect(tmp_path, dialect, packed):
     assert units[0] in ("km/h", "kmh")
 
 
-@pytest.mark.parametrize("dialect", [name for name in DIALECTS if "epoch" not in name])
-def test_the_recording_is_the_same_to_the_bit_in_every_dialect(tmp_path, dialect):
-    def recorded(data):
-        path = written(tmp_path, data)
-        speed, lateral, yaw, steer = [one.name for one in open_log(path).listed()]
-        told = {"vx": speed, "vy": lateral, "r": yaw, "delta_f": f"{steer} [deg] /15"}
-        return read_recording(path, check=False, columns=told)
-
-    first, other = recorded(DIALECTS["commas"]), recorded(DIALECTS[dialect])
-    for name in ("v_x", "v_y", "r", "delta_f"):
-        np.testing.assert_array_equal(getattr(other, name), getattr(first, name))
-    np.testing.assert_array_equal(other.t - other.t[0], first.t)
-    assert other.delta_f[40] == pytest.approx(np.radians(drive().steer[40]) / 15.0, rel=1e-12)
-
-
 def test_what_was_detected_is_said(tmp_path):
     said = open_log(written(tmp_path, DIALECTS["MoTeC"])).dialect
     assert "MoTeC i2 export" in said
@@ -353,7 +338,7 @@ def test_a_clock_that_a_map_names_knows_the_units_that_a_clock_of_the_file_knows
     np.testing.assert_allclose(read_recording(alone, check=False).t, named.t, rtol=0, atol=1e-9)
 
 
-def lines_at_random(count: int) -> list[str]:
+def lines_at_random(count):
     """Lines of few characters, so that numbers, quotes, ones and blanks meet often."""
     rng = np.random.default_rng(5)
     parts = ["1", "1", "0.5", "-2,5", "1.234,5", "e3", "m/s", "[s]", "nan", '"', " ", "\t", "#", ""]
@@ -377,7 +362,7 @@ def test_a_line_is_data_or_not_whether_seen_at_once_or_cell_by_cell(monkeypatch)
     cases = [
         (preamble._Line(1, line, delimiter), way)
         for line in lines_at_random(3000)
-        for delimiter in preamble.DELIMITERS
+        for delimiter in preamble._DELIMITERS
         for way in (preamble._Way(delimiter, sign, "", 3, 1.0) for sign in ".,")
         if way.decimal != delimiter
     ]

@@ -12,13 +12,12 @@ the force by up to 9.1 N (MagicFormula52_Parameters) and 4.6 N (HMMWV).
 import csv
 from dataclasses import replace
 from math import degrees, log10, radians
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from models.tires import MagicFormula
-from models.tires.magic_formula import combined_lateral, pure_lateral
+from models.tires.magic_formula import _combined_lateral, _pure_lateral
 
 FILES = ("Sedan_Pac02Tire", "HMMWV_Pac02Tire", "MagicFormula52_Parameters")
 
@@ -32,11 +31,11 @@ class Row(NamedTuple):
     F_y: str
 
 
-def printed_like(value: float) -> str:
+def printed_like(value):
     return f"{value:.10g}"
 
 
-def rows(folder: Path, tire: MagicFormula) -> list[Row]:
+def rows(folder, tire):
     F_z0 = tire.coefficients.FNOMIN * tire.coefficients.LFZO
     with (folder / "golden_mf52.csv").open() as file:
         lines = [line for line in csv.DictReader(file) if line["tir"] == tire.name]
@@ -54,15 +53,15 @@ def rows(folder: Path, tire: MagicFormula) -> list[Row]:
 
 
 @pytest.fixture(scope="module", params=FILES)
-def tire(request: pytest.FixtureRequest, shared_data: Path) -> MagicFormula:
+def tire(request, shared_data):
     return MagicFormula.from_tir(shared_data / "tires" / f"{request.param}.tir")
 
 
-def test_forces_agree_with_every_printed_digit(tire: MagicFormula, shared_data: Path) -> None:
+def test_forces_agree_with_every_printed_digit(tire, shared_data):
     golden = rows(shared_data / "tires", tire)
     assert len(golden) == 120
     for row in golden:
-        pure = pure_lateral(tire.coefficients, row.alpha_iso, row.gamma, row.F_z, 1.0)
+        pure = _pure_lateral(tire.coefficients, row.alpha_iso, row.gamma, row.F_z, 1.0)
         combined = tire.forces(-row.alpha_iso, row.kappa, row.gamma, row.F_z).F_y
         for ours, theirs in ((pure, row.F_y0), (combined, row.F_y)):
             digit = 10.0 ** (int(log10(abs(float(theirs)))) - 9)
@@ -70,7 +69,7 @@ def test_forces_agree_with_every_printed_digit(tire: MagicFormula, shared_data: 
             assert abs(float(printed_like(ours)) - float(theirs)) < 1e-6, row
 
 
-def test_the_wrong_sign_of_alpha_is_noticed(tire: MagicFormula, shared_data: Path) -> None:
+def test_the_wrong_sign_of_alpha_is_noticed(tire, shared_data):
     wrong = [
         abs(tire.forces(row.alpha_iso, row.kappa, row.gamma, row.F_z).F_y - float(row.F_y))
         for row in rows(shared_data / "tires", tire)
@@ -79,7 +78,7 @@ def test_the_wrong_sign_of_alpha_is_noticed(tire: MagicFormula, shared_data: Pat
     assert min(wrong) > 100.0
 
 
-def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data: Path) -> None:
+def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data):
     """Golden values tell the two readings apart: without the term they are missed by newtons."""
     tire = MagicFormula.from_tir(shared_data / "tires" / "MagicFormula52_Parameters.tir")
     c = tire.coefficients
@@ -87,12 +86,12 @@ def test_friction_of_the_slip_induced_side_force_has_its_camber_term(shared_data
     for row in rows(shared_data / "tires", tire):
         S_Vyk = side_force_due_to_slip(tire, row)
         without = S_Vyk / (1.0 - c.PDY3 * row.gamma**2)
-        F_y = combined_lateral(c, row.alpha_iso, row.kappa, row.gamma, row.F_z, 1.0)
+        F_y = _combined_lateral(c, row.alpha_iso, row.kappa, row.gamma, row.F_z, 1.0)
         gaps.append(abs(F_y - S_Vyk + without - float(row.F_y)))
     assert 9.0 < max(gaps) < 9.2
 
 
-def side_force_due_to_slip(tire: MagicFormula, row: Row) -> float:
+def side_force_due_to_slip(tire, row):
     """S_Vyk alone: nothing else is proportional to LVYKA."""
 
     off = replace(tire, coefficients=replace(tire.coefficients, LVYKA=0.0))

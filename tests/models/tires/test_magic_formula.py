@@ -3,7 +3,6 @@
 from dataclasses import replace
 from math import atan, cos, exp, inf, isfinite, nan, pi, radians, sin
 from pathlib import Path
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -31,17 +30,17 @@ angles, slips = st.floats(-7.0, 7.0), st.floats(-3.0, 30.0)
 cambers, loads = st.floats(-0.3, 0.3), st.floats(-1e4, 5e4)
 
 
-def sgn(x: float) -> float:
+def sgn(x):
     return float(np.sign(x))
 
 
-def textbook(p: Any, a: float, k: float, g: float, F_z: float, mu: float) -> tuple[float, float]:
+def textbook(p, a, k, g, F_z, mu):
     """MF 5.2 retyped from the book in one piece, ISO sign of a."""
     c = {name: getattr(p, name) for name in p.__dataclass_fields__}
     F0 = c["LFZO"] * c["FNOMIN"]
     d = F_z / F0 - 1
 
-    def curve(x: float, B: float, C: float, D: float, E: float, trig: Any = sin) -> Any:
+    def curve(x, B, C, D, E, trig=sin):
         return D * trig(C * atan((1 - E) * B * x + E * atan(B * x)))
 
     gx, gy = g * c["LGAX"], g * c["LGAY"]
@@ -72,7 +71,7 @@ def textbook(p: Any, a: float, k: float, g: float, F_z: float, mu: float) -> tup
     return Fx, G * Fy0 + Dv * sin(c["RVY5"] * atan(c["RVY6"] * k)) * c["LVYKA"]
 
 
-def test_every_term_and_scaling_factor_is_that_of_the_textbook(rng: np.random.Generator) -> None:
+def test_every_term_and_scaling_factor_is_that_of_the_textbook(rng):
     for _ in range(300):
         a, k, g = rng.uniform(-0.5, 0.5), rng.uniform(-1.0, 1.0), rng.uniform(-0.1, 0.1)
         F_z, mu = rng.uniform(200.0, 9000.0), rng.uniform(0.2, 1.2)
@@ -82,7 +81,7 @@ def test_every_term_and_scaling_factor_is_that_of_the_textbook(rng: np.random.Ge
 
 @pytest.mark.parametrize("tire", [SEDAN, LOPSIDED, LOPSIDED.mirrored()])
 @pytest.mark.parametrize("F_z", [-100.0, 0.0, 1e-9, 300.0, 4000.0, 9000.0])
-def test_stiffnesses_are_the_derivatives_of_the_forces(tire: MagicFormula, F_z: float) -> None:
+def test_stiffnesses_are_the_derivatives_of_the_forces(tire, F_z):
     alpha, kappa = ca.SX.sym("alpha"), ca.SX.sym("kappa")
     F = tire.forces(alpha, kappa, 0.0, F_z)
     slopes = ca.Function(
@@ -93,14 +92,14 @@ def test_stiffnesses_are_the_derivatives_of_the_forces(tire: MagicFormula, F_z: 
     assert tire.cornering_stiffness(F_z) == pytest.approx(F_y_alpha, rel=1e-9, abs=1e-12)
 
 
-def test_force_grows_with_the_slip_angle_of_the_paper() -> None:
+def test_force_grows_with_the_slip_angle_of_the_paper():
     assert SEDAN.forces(0.02, 0.0, 0.0, 4000.0).F_y > 1000.0  # ISO would be negative
     assert SEDAN.forces(0.0, 0.02, 0.0, 4000.0).F_x > 1000.0
     assert SEDAN.forces(0.0, 0.0, 0.05, 4000.0).F_y < -50.0  # leans right, pulls right
     assert SEDAN.cornering_stiffness(4000.0) > 0.0 < SEDAN.slip_stiffness(4000.0)
 
 
-def test_peak_of_the_curve_is_D() -> None:
+def test_peak_of_the_curve_is_D():
     """Peak friction PDY1 + PDY2 df_z and PDX1 + PDX2 df_z, found by search."""
     for F_z, mu in ((2000.0, 1.0), (4000.0, 0.5), (8000.0, 1.0)):
         d = F_z / 4000.0 - 1.0
@@ -112,15 +111,13 @@ def test_peak_of_the_curve_is_D() -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(angles, slips, cambers, loads)
-def test_the_mirrored_tire_answers_the_mirrored_wheel(
-    alpha: float, kappa: float, gamma: float, F_z: float
-) -> None:
+def test_the_mirrored_tire_answers_the_mirrored_wheel(alpha, kappa, gamma, F_z):
     left = LOPSIDED.forces(alpha, kappa, gamma, F_z)
     right = LOPSIDED.mirrored().forces(-alpha, kappa, -gamma, F_z)
     assert (right.F_x, -right.F_y) == pytest.approx(left, abs=1e-6)
 
 
-def test_left_and_right_cancel_on_a_straight_road_only_when_one_is_mirrored() -> None:
+def test_left_and_right_cancel_on_a_straight_road_only_when_one_is_mirrored():
     left, right = LOPSIDED.mounted("left"), LOPSIDED.mounted("right")
     pull = [tire.forces(0.0, 0.01, 0.0, 4000.0).F_y for tire in (left, right)]
     assert left is LOPSIDED
@@ -131,23 +128,21 @@ def test_left_and_right_cancel_on_a_straight_road_only_when_one_is_mirrored() ->
     assert sum(pull) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_sedan_tire_is_symmetric() -> None:
+def test_the_sedan_tire_is_symmetric():
     assert SEDAN.mirrored().coefficients == SEDAN.coefficients
     assert SEDAN.forces(0.0, 0.0, 0.0, 4000.0) == (0.0, 0.0)
 
 
 @settings(max_examples=300, deadline=None)
 @given(angles, slips, cambers, loads, st.floats(0.0, 2.0))
-def test_forces_are_finite_everywhere_and_zero_in_the_air(
-    alpha: float, kappa: float, gamma: float, F_z: float, mu: float
-) -> None:
+def test_forces_are_finite_everywhere_and_zero_in_the_air(alpha, kappa, gamma, F_z, mu):
     F = LOPSIDED.forces(alpha, kappa, gamma, F_z, mu)
     assert all(isinstance(f, float) and isfinite(f) for f in F)
     if F_z <= 0.0 or mu == 0.0:
         assert F == (0.0, 0.0)
 
 
-def test_derivatives_are_finite_everywhere() -> None:
+def test_derivatives_are_finite_everywhere():
     x = ca.SX.sym("x", 5)
     F = ca.vertcat(*LOPSIDED.forces(*ca.vertsplit(x)))
     gradient = ca.Function("gradient", [x], [ca.jacobian(F, x)])
@@ -159,20 +154,20 @@ def test_derivatives_are_finite_everywhere() -> None:
                     assert np.isfinite(slope).all(), (alpha, kappa, F_z, mu)
 
 
-def test_a_bad_load_is_not_hidden() -> None:
+def test_a_bad_load_is_not_hidden():
     assert all(not isfinite(f) for f in SEDAN.forces(0.1, 0.0, 0.0, nan))
     assert all(not isfinite(f) for f in SEDAN.forces(nan, 0.0, 0.0, 4000.0))
     assert all(not isfinite(f) for f in SEDAN.forces(0.1, 0.0, 0.0, inf))
 
 
-def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis() -> None:
+def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis():
     forward = SEDAN.forces(0.05, 0.0, 0.0, 4000.0)
     backward = SEDAN.forces(pi - 0.05, 0.0, 0.0, 4000.0)
     assert backward == pytest.approx(forward, abs=1e-6)
     assert SEDAN.forces(pi, 0.0, 0.0, 4000.0).F_y == pytest.approx(0.0, abs=1e-6)
 
 
-def test_combined_slip_of_the_sedan_stays_in_its_friction_ellipse() -> None:
+def test_combined_slip_of_the_sedan_stays_in_its_friction_ellipse():
     alpha, kappa = np.meshgrid(
         np.linspace(-pi / 2, pi / 2, 241),
         np.concatenate([-np.geomspace(1e-3, 1.0, 100), [0.0], np.geomspace(1e-3, 1.0, 100)]),
@@ -186,15 +181,15 @@ def test_combined_slip_of_the_sedan_stays_in_its_friction_ellipse() -> None:
 
 
 @pytest.mark.parametrize("name", ["PEX1", "PEY1", "REX1", "REY1"])
-def test_curvature_is_at_most_one(name: str) -> None:
-    def force(E: float) -> tuple[float, float]:
+def test_curvature_is_at_most_one(name):
+    def force(E):
         c = replace(SEDAN.coefficients, PEX2=0.0, PEY2=0.0, PEY4=0.0, **{name: E})
         return replace(SEDAN, coefficients=c).forces(0.2, -0.3, 0.0, 4000.0)
 
     assert force(3.0) == force(1.0) != force(0.9)
 
 
-def test_the_other_slip_never_turns_a_force_round() -> None:
+def test_the_other_slip_never_turns_a_force_round():
     c = replace(SEDAN.coefficients, RCX1=1.6, RCY1=1.6, RVY3=0.0)  # cos(1.6 π/2) < 0
     F = replace(SEDAN, coefficients=c).forces(1.5, 0.05, 0.0, 4000.0)
     assert F.F_x == 0.0
@@ -204,7 +199,7 @@ def test_the_other_slip_never_turns_a_force_round() -> None:
     assert F.F_x > 1000.0
 
 
-def test_braking_costs_cornering_force_and_the_other_way_round() -> None:
+def test_braking_costs_cornering_force_and_the_other_way_round():
     alpha, kappa = radians(6.0), -0.1
     free, both = SEDAN.forces(alpha, 0.0, 0.0, 4000.0), SEDAN.forces(alpha, kappa, 0.0, 4000.0)
     straight = SEDAN.forces(0.0, kappa, 0.0, 4000.0)
@@ -212,7 +207,7 @@ def test_braking_costs_cornering_force_and_the_other_way_round() -> None:
     assert 0.3 * straight.F_x > both.F_x > 0.99 * straight.F_x
 
 
-def test_friction_of_the_road_multiplies_the_friction_scales() -> None:
+def test_friction_of_the_road_multiplies_the_friction_scales():
     c = SEDAN.coefficients
     scaled = replace(SEDAN, coefficients=replace(c, LMUX=0.4, LMUY=0.4))
     slip = (0.08, -0.05, 0.03, 3000.0)
@@ -220,7 +215,7 @@ def test_friction_of_the_road_multiplies_the_friction_scales() -> None:
 
 
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX, ca.DM])
-def test_symbols_and_floats_give_the_same_force(kind: Any) -> None:
+def test_symbols_and_floats_give_the_same_force(kind):
     point = (0.06, -0.04, 0.03, 3500.0, 0.8)
     if kind is ca.DM:
         result = LOPSIDED.forces(*(ca.DM(value) for value in point))
@@ -233,7 +228,7 @@ def test_symbols_and_floats_give_the_same_force(kind: Any) -> None:
     assert values == pytest.approx(LOPSIDED.forces(*point), rel=1e-13)
 
 
-def test_the_sedan_tire_is_what_its_header_says() -> None:
+def test_the_sedan_tire_is_what_its_header_says():
     assert SEDAN.cornering_stiffness(4000.0) == pytest.approx(62e3, rel=0.005)
     assert SEDAN.cornering_stiffness(2000.0) == pytest.approx(37e3, rel=0.005)
     stiffness = [SEDAN.cornering_stiffness(F_z) for F_z in (7500.0, 7600.0, 7700.0)]
@@ -246,7 +241,7 @@ def test_the_sedan_tire_is_what_its_header_says() -> None:
     assert SEDAN.valid_range.F_z[0] < 4000.0 < SEDAN.valid_range.F_z[1] < 12000.0
 
 
-def test_a_side_that_no_car_has_is_refused() -> None:
+def test_a_side_that_no_car_has_is_refused():
     with pytest.raises(ValueError, match="'middle'"):
         SEDAN.mounted("middle")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="'middle'"):

@@ -1,7 +1,6 @@
 """Linear, Fiala and Dugoff tires: slopes, limits, and their integrals done another way."""
 
 from math import atan, hypot, isfinite, nan, pi, tan
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.tires import DugoffTire, FialaTire, LinearTire, Tire
+from models.tires import DugoffTire, FialaTire, LinearTire
 
 LINEAR = LinearTire(C_alpha=60e3, C_kappa=80e3)
 FIALA = FialaTire(C_alpha=60e3, C_kappa=80e3, friction=0.9)
@@ -20,7 +19,7 @@ LIMITED = pytest.mark.parametrize("tire", [FIALA, DUGOFF], ids=["fiala", "dugoff
 
 @TIRES
 @pytest.mark.parametrize("F_z", [-1.0, 0.0, 1.0, 4000.0])
-def test_stiffnesses_are_the_derivatives_at_zero_slip(tire: Tire, F_z: float) -> None:
+def test_stiffnesses_are_the_derivatives_at_zero_slip(tire, F_z):
     slip = ca.SX.sym("slip", 2)
     F = tire.forces(slip[0], slip[1], 0.0, F_z)
     J = np.array(ca.Function("J", [slip], [ca.jacobian(ca.vertcat(*F), slip)])([0.0, 0.0]))
@@ -31,7 +30,7 @@ def test_stiffnesses_are_the_derivatives_at_zero_slip(tire: Tire, F_z: float) ->
 
 
 @TIRES
-def test_forces_are_odd_in_the_slips_and_none_in_the_air(tire: Tire) -> None:
+def test_forces_are_odd_in_the_slips_and_none_in_the_air(tire):
     F = tire.forces(0.05, 0.0, 0.0, 4000.0)
     assert tire.forces(-0.05, 0.0, 0.0, 4000.0) == (F.F_x, -F.F_y)
     assert F.F_y > 1000.0
@@ -46,9 +45,7 @@ def test_forces_are_odd_in_the_slips_and_none_in_the_air(tire: Tire) -> None:
     F_z=st.floats(-1e3, 2e4),
     mu=st.floats(0.0, 1.5),
 )
-def test_no_slip_leaves_the_friction_circle(
-    tire: Tire, alpha: float, kappa: float, F_z: float, mu: float
-) -> None:
+def test_no_slip_leaves_the_friction_circle(tire, alpha, kappa, F_z, mu):
     F = tire.forces(alpha, kappa, 0.0, F_z, mu)
     assert all(isinstance(f, float) and isfinite(f) for f in F)
     assert hypot(*F) <= 0.9 * mu * max(F_z, 0.0) * (1.0 + 1e-9) + 1e-300  # subnormal digits
@@ -56,7 +53,7 @@ def test_no_slip_leaves_the_friction_circle(
 
 @LIMITED
 @pytest.mark.parametrize("kappa", [-1.0, -1.5])
-def test_a_locked_wheel_slides_with_all_its_friction(tire: Tire, kappa: float) -> None:
+def test_a_locked_wheel_slides_with_all_its_friction(tire, kappa):
     F = tire.forces(0.1, kappa, 0.0, 4000.0)
     assert hypot(*F) == pytest.approx(0.9 * 4000.0, rel=1e-3)
     assert F.F_x < -3000.0
@@ -64,7 +61,7 @@ def test_a_locked_wheel_slides_with_all_its_friction(tire: Tire, kappa: float) -
 
 
 @LIMITED
-def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis(tire: Tire) -> None:
+def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis(tire):
     forward, backward = (tire.forces(alpha, 0.02, 0.0, 4000.0) for alpha in (0.05, pi - 0.05))
     assert backward == pytest.approx(forward, rel=1e-9)
     beyond = [tire.forces(alpha, 0.0, 0.0, 4000.0).F_y for alpha in (1.5, pi / 2, 1.6)]
@@ -72,7 +69,7 @@ def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis(tire: Tire)
 
 
 @LIMITED
-def test_derivatives_are_finite_everywhere(tire: Tire) -> None:
+def test_derivatives_are_finite_everywhere(tire):
     x = ca.SX.sym("x", 5)
     J = ca.Function("J", [x], [ca.jacobian(ca.vertcat(*tire.forces(*ca.vertsplit(x))), x)])
     for alpha in (0.0, 0.1, pi / 2, pi):
@@ -84,14 +81,14 @@ def test_derivatives_are_finite_everywhere(tire: Tire) -> None:
 
 @LIMITED
 @pytest.mark.parametrize("spoiled", range(5))
-def test_a_number_that_is_none_is_not_hidden(tire: Tire, spoiled: int) -> None:
+def test_a_number_that_is_none_is_not_hidden(tire, spoiled):
     point = [0.05, 0.02, 0.0, 4000.0, 1.0]
     point[spoiled] = nan
     finite = all(isfinite(f) for f in tire.forces(*point))
     assert finite == (spoiled == 2)  # camber has no effect
 
 
-def test_fiala_is_the_integral_over_its_bristles() -> None:
+def test_fiala_is_the_integral_over_its_bristles():
     """Bristle deflection limited by μ times the parabolic pressure, summed along the contact."""
     F_z, C, mu = 4000.0, 60e3, 0.9
     front_to_rear = (np.arange(200_000) + 0.5) / 200_000
@@ -102,7 +99,7 @@ def test_fiala_is_the_integral_over_its_bristles() -> None:
         assert FIALA.forces(alpha, 0.0, 0.0, F_z).F_y == pytest.approx(integral, rel=1e-6)
 
 
-def test_fiala_slides_at_three_mu_F_z_and_smoothly() -> None:
+def test_fiala_slides_at_three_mu_F_z_and_smoothly():
     alpha = ca.SX.sym("alpha")
     F_y = FIALA.forces(alpha, 0.0, 0.0, 4000.0).F_y
     slope = ca.Function("slope", [alpha], [F_y, ca.jacobian(F_y, alpha)])
@@ -114,7 +111,7 @@ def test_fiala_slides_at_three_mu_F_z_and_smoothly() -> None:
     assert float(slope(0.9 * sliding)[1]) > 100.0
 
 
-def test_fiala_in_combined_slip_is_fiala_along_the_demand() -> None:
+def test_fiala_in_combined_slip_is_fiala_along_the_demand():
     """With equal stiffnesses the force depends on |σ| alone and points along σ."""
     tire = FialaTire(C_alpha=60e3, C_kappa=60e3, friction=0.9)
     for alpha, kappa in ((0.05, 0.03), (0.02, -0.2), (0.3, 0.4)):
@@ -125,7 +122,7 @@ def test_fiala_in_combined_slip_is_fiala_along_the_demand() -> None:
         assert np.array(F) == pytest.approx(alone * sigma / size, rel=1e-9)
 
 
-def test_dugoff_is_linear_while_less_than_half_the_friction_is_used() -> None:
+def test_dugoff_is_linear_while_less_than_half_the_friction_is_used():
     F = DUGOFF.forces(0.02, 0.0, 0.0, 4000.0)
     assert F.F_y == pytest.approx(60e3 * tan(0.02), rel=1e-12)
     assert F.F_x == 0.0
@@ -138,7 +135,7 @@ def test_dugoff_is_linear_while_less_than_half_the_friction_is_used() -> None:
 
 
 @pytest.mark.parametrize("slip", [(0.1, 0.0), (0.1, 0.2), (-0.3, -0.4), (0.0, 0.5)])
-def test_dugoff_is_its_published_formula(slip: tuple[float, float]) -> None:
+def test_dugoff_is_its_published_formula(slip):
     alpha, kappa = slip
     demand = 2.0 * hypot(80e3 * kappa, 60e3 * tan(alpha))
     lam = 0.9 * 4000.0 * (1.0 + kappa) / demand
@@ -149,7 +146,7 @@ def test_dugoff_is_its_published_formula(slip: tuple[float, float]) -> None:
 
 @TIRES
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX])
-def test_symbols_and_floats_give_the_same_force(tire: Tire, kind: Any) -> None:
+def test_symbols_and_floats_give_the_same_force(tire, kind):
     point = (0.06, -0.04, 0.03, 3500.0, 0.8)
     x = [kind.sym(name) for name in ("alpha", "kappa", "gamma", "F_z", "mu")]
     values = ca.Function("f", x, list(tire.forces(*x))).call(list(point))
@@ -157,7 +154,7 @@ def test_symbols_and_floats_give_the_same_force(tire: Tire, kind: Any) -> None:
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, nan, float("inf")])
-def test_parameters_that_are_not_positive_are_refused(bad: float) -> None:
+def test_parameters_that_are_not_positive_are_refused(bad):
     with pytest.raises(ValueError, match="C_alpha must be positive"):
         LinearTire(C_alpha=bad, C_kappa=1.0)
     with pytest.raises(ValueError, match="C_kappa must be positive"):
