@@ -161,3 +161,31 @@ def correct(
     keep[:, :2] -= gain
     after = keep @ P @ keep.T + gain @ R @ gain.T  # Joseph
     return estimate + move, (after + after.T) / 2
+
+
+class _Corrected(NamedTuple):
+    """What a measurement makes of an estimate.
+    move : of the estimate (n,).   P : covariance after (n, n).   keep : I - K H (n, n).
+    pull : Hᵀ S⁻¹ times the innovation (n,).
+    """
+
+    move: Any
+    P: Any
+    keep: Any
+    pull: Any
+
+
+def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> _Corrected:
+    """Return what a measurement of two numbers makes of an estimate, in Joseph's form.
+    P : covariance before (n, n).
+    H : what the numbers are of the estimate (2, n); a row of zeros measures nothing.
+    R : covariance of the numbers (2, 2).   innovation : (2,).
+    """
+    S = H @ P @ H.T + R
+    S_inverse = ca.inv_minor(S)
+    most = outlier * ca.sqrt(ca.diag(S))
+    trusted = ca.fmin(ca.fmax(innovation, -most), most)
+    K = P @ H.T @ S_inverse
+    keep = ca.SX.eye(P.size1()) - K @ H
+    after = keep @ P @ keep.T + K @ R @ K.T
+    return _Corrected(K @ trusted, (after + after.T) / 2, keep, H.T @ S_inverse @ trusted)

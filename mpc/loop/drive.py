@@ -14,7 +14,6 @@ import numpy as np
 from codegen.arrays import Array
 from models.sensors import is_shown
 from mpc.cars import Car, CarState
-from mpc.loop.dither import Dither
 from mpc.loop.lateral import TellsLateral
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
@@ -73,7 +72,6 @@ def drive(
     rng: np.random.Generator,
     learner: LearningTires | None = None,
     lateral: TellsLateral | None = None,
-    dither: Dither | None = None,
     laps: float = 1.0,
     time_limit: float = 300.0,
     widest: float = 2.0,
@@ -88,7 +86,7 @@ def drive(
     speed : wanted along the path, [m/s] where it is a number.
     sensors : of the car; None measures exactly.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-    they show.   dither : weaves along the path to teach; None keeps to it.
+    they show.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
     widest : deviation at which the car has left the path [m].
@@ -134,8 +132,6 @@ def drive(
             kappa=ahead.kappa,
             v_x=ahead.v_x,
         )
-        if dither is not None:
-            situation = dither.displaced(situation, state.t, tracker.times, tracker.period)
         command = tracker.step(situation)
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
