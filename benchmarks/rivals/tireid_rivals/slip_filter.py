@@ -19,7 +19,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel
-from identifier.baselines.kalman import FilteredTire, corrected
+from identifier.baselines.kalman import corrected
 from identifier.baselines.ports import WITH_A_Y, axle_loads, given_ports
 from identifier.method import Method, resumed
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
@@ -31,6 +31,7 @@ from tireid_rivals.without_v_y import (
     MOST_SLIDING,
     V_Y,
     V_Y_SD,
+    FilteredTire,
     axle_force,
     expected,
     predicted,
@@ -85,7 +86,7 @@ def _tire(curve: str, force: Any, unknowns: int) -> FilteredTire:
         del known, theta
         return CURVES[curve].slip(p, v_x, x, u)
 
-    return FilteredTire(slip=slip, force=force, lag=None, unknowns=unknowns, prior=1)
+    return FilteredTire(slip=slip, force=force, unknowns=unknowns)
 
 
 TIRES: Mapping[str, FilteredTire] = {

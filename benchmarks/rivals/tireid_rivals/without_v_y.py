@@ -6,11 +6,12 @@ A steady turn needs F_r = l_f m v_x r/L, so that on a linear tire its v_y is
 l_r r + v_x (δ_r - F_r/C_r): what every one of them begins with.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.baselines.kalman import FilteredTire, midpoint
+from identifier.baselines.kalman import midpoint
 from identifier.baselines.ports import motion_rate
 from identifier.setup import Port
 from models.bicycle import BicycleParameters
@@ -18,6 +19,18 @@ from models.bicycle import BicycleParameters
 V_Y = Port("v_y", "m/s", "lateral velocity at the center of gravity, positive to the left")
 V_Y_SD = Port("v_y_sd", "m/s", "standard deviation of v_y")
 MOST_SLIDING = 0.7  # |v_y|/v_x beyond which an estimate is none
+
+
+class FilteredTire(NamedTuple):
+    """What makes the forces by θ: functions of symbols.
+
+    slip(bicycle parameters, friction, θ, v_x, x, u) -> α (2,) [rad].
+    force(bicycle parameters, friction, θ, α, u) -> axle forces (2,) [N].   unknowns : size of θ.
+    """
+
+    slip: Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
+    force: Callable[[BicycleParameters, Any, Any, Any, Any], Any]
+    unknowns: int
 
 
 def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
