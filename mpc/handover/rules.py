@@ -12,9 +12,6 @@ class Rules:
     """Times and evidence of handing over.
 
     Evidence is a difference of chi-squares, -2 ln of a ratio of likelihoods: 8 is one in 50.
-
-    Parameters
-    ----------
     every : time between two looks at the friction [s].
     learnt_every : time between two looks at what was learnt [s].
     seconds : that a learnt tire must explain better than the one in use [s].

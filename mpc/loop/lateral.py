@@ -51,9 +51,6 @@ class LateralEstimate(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Localization:
     """How far position, heading and acceleration are trusted.
-
-    Parameters
-    ----------
     position : standard deviation [m].
     heading : standard deviation [rad].
     acceleration : of a_y - v_x r, sample by sample [m/s²].
@@ -83,9 +80,6 @@ class LateralVelocity:
     """Lateral velocity by an identifier from yaw rate, accelerometer, speed and steering.
 
     Position and heading correct it, where they are shown.
-
-    Parameters
-    ----------
     identifier : of a method that tells v_y; it is given every sample here, and learns.
     localization : how far position and heading are trusted; None takes the default.
     body : how it rolls; None takes what the chassis of the identifier's vehicle tells.

@@ -43,9 +43,6 @@ _CHANNELS = Measured._fields[1:]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarSensors:
     """The sensors of a car, one for each channel; the defaults are exact.
-
-    Parameters
-    ----------
     X, Y : position [m].
     psi : heading [rad].
     v_x, v_y : speed over ground [m/s]; v_y None where nothing measures it.
@@ -143,9 +140,6 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
 
 class FaultySensors:
     """Sensors of which some channels break for some time; a stuck one shows its last good value.
-
-    Parameters
-    ----------
     faults : what breaks, where channels are those of `Measured`.
     """
 
@@ -194,9 +188,6 @@ class _Preview(NamedTuple):
 
 class SpeedProfile:
     """A wanted speed along a path.
-
-    Parameters
-    ----------
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
     """
 
@@ -286,9 +277,7 @@ def cornering_limit(
 def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, speed: float) -> float:
     """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
     rate = _LARGEST_ANGLE * mu / _RAMP_TIME
-    ramp = StepSteer(
-        amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME
-    )
+    ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
     plant = Plant(vehicle, cast(Tire | None, tire))
     run = plant.simulate(ramp, speed=speed, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

@@ -21,7 +21,7 @@ from mpc.path.line import Line, PathError
 from mpc.path.path import Path
 from mpc.path.waypoints import sample
 
-DEGREE = 5
+_DEGREE = 5
 _PER_INTERVAL = 4  # places between two knots where limits hold
 _GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
 _CONE_SPACING = 3.0  # m
@@ -94,12 +94,12 @@ def _straightest(
     knots: float,
 ) -> tuple[BSpline, Array]:
     """Return the line as a spline and its knots; a course is asked for once for each drive."""
-    intervals = max(DEGREE + 1, ceil((end[0] - start[0]) / knots))
+    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / knots))
     inner = np.linspace(start[0], end[0], intervals + 1)
-    t = np.concatenate((np.full(DEGREE, start[0]), inner, np.full(DEGREE, end[0])))
+    t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
     c = _coefficients(t, inner, gates, start, end, clearance, easing)
-    greville = np.array([t[i + 1 : i + DEGREE + 1].mean() for i in range(c.size)])  # of y = x
-    return BSpline(t, np.column_stack((greville, c)), DEGREE), inner
+    greville = np.array([t[i + 1 : i + _DEGREE + 1].mean() for i in range(c.size)])  # of y = x
+    return BSpline(t, np.column_stack((greville, c)), _DEGREE), inner
 
 
 def _coefficients(
@@ -111,7 +111,7 @@ def _coefficients(
     clearance: float,
     easing: float,
 ) -> Array:
-    n = t.size - DEGREE - 1
+    n = t.size - _DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
     x = np.unique(np.concatenate((x, edges[(edges > x[0]) & (edges < x[-1])])))
@@ -145,8 +145,8 @@ def _coefficients(
 
 def _basis(t: Array, x: Array, order: int) -> Any:
     """Return the sparse matrix from the coefficients to a derivative at x."""
-    n = t.size - DEGREE - 1
-    matrix = BSpline(t, np.eye(n), DEGREE)(x, nu=order)
+    n = t.size - _DEGREE - 1
+    matrix = BSpline(t, np.eye(n), _DEGREE)(x, nu=order)
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-12, 0.0, matrix)))
 
 
@@ -164,7 +164,7 @@ def _basis(t: Array, x: Array, order: int) -> Any:
 # ours is the one of smallest peak curvature, see the gates above.
 
 _CAR_WIDTH = 1.8  # m
-NARROWEST, WIDEST = 1.0, 2.6  # m, of a car
+_NARROWEST, _WIDEST = 1.0, 2.6  # m, of a car
 
 
 def iso_3888_1(
@@ -228,8 +228,8 @@ def iso_3888_2(
 
 
 def _checked(car_width: float) -> float:
-    if not NARROWEST <= car_width <= WIDEST:
-        raise PathError(f"car_width must be {NARROWEST} to {WIDEST} m, it is {car_width}")
+    if not _NARROWEST <= car_width <= _WIDEST:
+        raise PathError(f"car_width must be {_NARROWEST} to {_WIDEST} m, it is {car_width}")
     return car_width
 
 

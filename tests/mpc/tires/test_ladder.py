@@ -8,7 +8,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
 from models.recordings import Recording
-from mpc.prediction import N_CAR, build_dynamics
+from mpc.prediction import build_dynamics
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
 from mpc.tires.tire import ALL, Car, Point
@@ -159,7 +159,7 @@ def test_a_model_learnt_anew_is_other_weights_only(car):
     assert one.structure == other.structure
     assert one.weights.size == one.structure.n_weights
     assert one.structure.lagged
-    assert one.car.size == N_CAR
+    assert one.car.size == 4
 
 
 @pytest.fixture(name="racer")
