@@ -114,7 +114,7 @@ def _build_step(textbook: bool) -> ca.Function:
     alpha = slip_of(v_mean, x, u_mean)
     slip = alpha if textbook else moved[2:]
     rate = motion_rate(p, v_mean, x, force_of(slip, u_mean))
-    sigma = None if textbook else known[1] * ca.exp(theta[of_curve : of_curve + 2])
+    sigma: Any = None if textbook else known[1] * ca.exp(theta[of_curve : of_curve + 2])
     if not textbook:
         rate = ca.vertcat(rate, v_mean / sigma * (alpha - slip))
     ahead = ca.vertcat(midpoint(estimate, rate, dt), theta)

@@ -267,15 +267,15 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     return _fitted_tire(vehicle, alpha, force, lengths)
 
 
-def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
+def mounted_tire(vehicle: Vehicle, tire: Tire, rear: Tire | None = None) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
-    vehicle : the car; it needs no chassis.
+    vehicle : the car; it needs no chassis.   rear : tire of the rear axle; None takes the same.
     """
     alpha = slip_grid(LARGEST_SLIP)
     x = ca.SX.sym("alpha")
     force = []
-    for load in vehicle.axle_loads:
-        axle = ca.Function("axle", [x], [_both_sides(tire, x, 0.0, (0.5 * load, 0.5 * load), 1.0)])
+    for one, load in zip((tire, tire if rear is None else rear), vehicle.axle_loads, strict=True):
+        axle = ca.Function("axle", [x], [_both_sides(one, x, 0.0, (0.5 * load, 0.5 * load), 1.0)])
         force.append(np.array(axle(alpha[None])).ravel())
     return _fitted_tire(vehicle, alpha, np.stack(force), None)
 

@@ -7,7 +7,6 @@ import pytest
 from codegen.graph import OPERATIONS
 from identifier.baselines.curves import CurveModel
 from identifier.paper.network import Network, NetworkModel, Weights
-from models.tires import DugoffTire, FialaTire
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
 from mpc.problem import Cost, tracking_errors
@@ -43,7 +42,6 @@ def ladder():
 
 
 MAGIC = np.array([[11.0, 1.4, 7600.0], [12.0, 1.35, 6000.0]])
-WHEEL = {"C_alpha": 6e4, "C_kappa": 8e4, "friction": 0.9}
 TIRES = {
     "linear": prediction_tire(CAR),
     "network": prediction_tire(network()),
@@ -61,8 +59,6 @@ TIRES = {
             offset=np.array([0.01, 0.1]),
         )
     ),
-    "dugoff": prediction_tire(DugoffTire(**WHEEL), CAR),
-    "fiala": prediction_tire(FialaTire(**WHEEL), CAR),
     "oracle": oracle_tire(CAR),
 }
 

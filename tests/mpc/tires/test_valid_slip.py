@@ -82,7 +82,7 @@ def test_a_curve_goes_on_without_a_kink(oracle):
 def test_a_tire_that_slides_fully_still_rises():
     tire = prediction_tire(FialaTire(C_alpha=6e4, C_kappa=8e4, friction=0.5), CAR)
     kept = curves(tire, valid_slip(tire, MOST))
-    assert np.diff(curves(tire)).min() == pytest.approx(0.0, abs=1e-6)
+    assert np.diff(curves(tire)).min() < 0.0
     assert np.diff(kept).min() > 0.0
 
 
