@@ -29,7 +29,7 @@ from identifier.baselines.ports import (
     motion_rate,
     sample_ports,
 )
-from identifier.method import Method, resumed
+from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters
@@ -61,14 +61,6 @@ def _decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any
     C = 1 + 1 / (1 + ca.exp(-theta[2:4] - _LOGIT))
     D = friction * loads * ca.exp(theta[4:6])
     return ca.horzcat(slope / (C * D), C, D)
-
-
-def _encoded(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
-    """Return the θ that `_decoded` makes such parameters of, (6,)."""
-    B, C, D = parameters.T
-    stated, loads = np.array(vehicle.bicycle)[4:], np.array(vehicle.axle_loads)
-    shape = np.log((C - 1.0) / (2.0 - C)) - _LOGIT
-    return np.concatenate([np.log(B * C * D / stated), shape, np.log(D / (friction * loads))])
 
 
 _NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
@@ -251,26 +243,16 @@ class CurveEkf(Method):
         return "lag of the tires and offsets of the sensors are identified, as by the default"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
-        theta, own = np.zeros(len(KINDS)), np.zeros(0 if self.textbook else OWN)
+        """Return what a run needs; it begins afresh, from the prior."""
         if start is not None:
-            refusal = "the stored model is not a curve 'magic_formula'"
-            stored = resumed(start, CurveModel, refusal, curve="magic_formula")
-            with np.errstate(invalid="ignore", divide="ignore"):  # judged below
-                theta = _encoded(vehicle, self.friction, stored.parameters)
-            if not np.isfinite(theta).all():
-                raise ValueError(
-                    "a curve to begin with must have positive stiffness and friction and a shape "
-                    f"between 1 and 2, its parameters are {stored.parameters.tolist()}"
-                )
-            own = self._own_of(stored)
+            raise ValueError("this filter begins afresh: it goes on from no stored model")
         lags = 0 if self.textbook else 2
         prior = () if self.textbook else _OWN_PRIOR
         noise = [self.v_y_noise, self.r_noise, *[self.v_y_noise / self.learning_speed] * lags]
         return Setup(
             scan=_scan(self.textbook),
             carry={
-                "estimate": np.concatenate([np.zeros(2 + lags), theta, own]),
+                "estimate": np.zeros(2 + lags + self.limit.size),
                 "P": np.diag([*noise, *self.spread]) ** 2,
                 "before": np.zeros(3),
                 "running": np.zeros(1),
@@ -325,15 +307,6 @@ class CurveEkf(Method):
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the curve with the carried parameters, lag and offsets."""
         return self.model(vehicle, state["estimate"].ravel()[-self.limit.size :])
-
-    def _own_of(self, stored: CurveModel) -> Array:
-        """Return the lag and the offsets of a stored curve as unknowns, (4,) or none."""
-        if self.textbook:
-            return np.zeros(0)
-        lag = np.maximum(stored.relaxation_length / self.relaxation_length, math.exp(-_LAG_LIMIT))
-        return np.concatenate(
-            [np.log(lag), stored.offset / (self.steering_spread, self.v_y_spread)]
-        )
 
 
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:

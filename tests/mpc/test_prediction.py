@@ -9,7 +9,7 @@ from identifier.baselines.curves import CurveModel
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
-from mpc.problem import Cost, tracking_errors
+from mpc.problem import Cost
 from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.ladder import LadderAxles, ladder_weights
 from mpc.tires.tire import ALL, valid_slip
@@ -155,16 +155,6 @@ def test_it_goes_where_a_car_in_the_plane_goes(radius):
         assert np.allclose(predicted, expected, rtol=2e-3, atol=1e-3) == same
 
 
-def test_a_straight_on_the_left_mirrors_one_on_the_right():
-    for kind in ("linear", "network", "oracle"):
-        tire = TIRES[kind]
-        stage, q = build_stage(tire.structure), Cost().numbers()
-        for x, u, kappa, *rest in situations(tire, 10):
-            there, here = stage(-x, -u, -kappa, *rest, q), stage(x, u, kappa, *rest, q)
-            np.testing.assert_allclose(np.array(there[0]), -np.array(here[0]), atol=1e-12)
-            np.testing.assert_allclose(np.array(there[1]), np.array(here[1]), atol=1e-9)
-
-
 def test_other_weights_need_no_other_function():
     one, other = (prediction_tire(network(seed)) for seed in (0, 1))
     stage = build_stage(one.structure)
@@ -266,9 +256,3 @@ def test_ten_units_cost_few_operations():
     """14-28 µs for 40 stages when measured; a count does not depend on the machine."""
     assert build_stage(TIRES["network"].structure).n_instructions() < 4000
     assert build_stage(TIRES["oracle"].structure).n_instructions() < 7250
-
-
-def test_errors_are_zero_on_the_path():
-    x, kappa, v_x = ca.DM([0.0, -0.02, 0.4, 0.4, 0.05]), 0.02, 20.0
-    y = np.array(tracking_errors(x, kappa, v_x, v_x)).ravel()
-    np.testing.assert_allclose(y, [0.0, -0.02, 0.0, 0.4, 0.0, 0.05, 0.0], atol=1e-12)

@@ -48,17 +48,6 @@ def test_two_straights_close_a_course():
     Path.from_line(line_along(course), name="rectangle", closed=True)
 
 
-def test_a_straight_of_less_than_a_meter_does_not_close_a_course():
-    turn = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
-    for length, closes in ((1.5, True), (0.5, False)):
-        sections = [Straight(length=length), *corners(turn)[1:]]
-        if closes:
-            assert close(sections, (4, 6))[4].length == pytest.approx(length, abs=1e-6)
-        else:
-            with pytest.raises(PathError, match="section 4 cannot close"):
-                close(sections, (4, 6))
-
-
 def test_courses_that_cannot_close_are_refused():
     right = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
     with pytest.raises(PathError, match="must turn by 2 pi"):
