@@ -17,11 +17,13 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from codegen.arrays import Array
+from models.rules import require_positive
 from mpc.path.line import Line, PathError
 from mpc.path.path import Path
 from mpc.path.waypoints import sample
 
 _DEGREE = 5
+_KNOTS = 1.0  # m, about their distance
 _PER_INTERVAL = 4  # places between two knots where limits hold
 _GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
 _CONE_SPACING = 3.0  # m
@@ -64,23 +66,18 @@ def line_through_gates(
     clearance: float,
     easing: float,
     spacing: float = 0.25,
-    knots: float = 1.0,
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
     start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
     spacing : longest step of the samples [m].
-    knots : about the distance of the knots of the spline [m].
     """
-    numbers = {"easing": easing, "spacing": spacing, "knots": knots, "length": end[0] - start[0]}
-    for name, value in {**numbers, "clearance": clearance}.items():
-        if not (value > 0.0 and isfinite(value)):
-            raise PathError(f"gates: {name} must be positive and finite, it is {value}")
+    require_positive(PathError, clearance=clearance, spacing=spacing)
     for gate in gates:
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")
-    spline, inner = _straightest(tuple(gates), start, end, clearance, easing, knots)
+    spline, inner = _straightest(tuple(gates), start, end, clearance, easing)
     return sample(spline, inner, spacing, "gates")
 
 
@@ -91,10 +88,9 @@ def _straightest(
     end: tuple[float, float],
     clearance: float,
     easing: float,
-    knots: float,
 ) -> tuple[BSpline, Array]:
     """Return the line as a spline and its knots; a course is asked for once for each drive."""
-    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / knots))
+    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / _KNOTS))
     inner = np.linspace(start[0], end[0], intervals + 1)
     t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
     c = _coefficients(t, inner, gates, start, end, clearance, easing)
