@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from models.sensors import is_shown
-from mpc.cars import Car, CarState
+from mpc.cars import CarState, DoubleTrackCar
 from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
@@ -35,7 +35,7 @@ class LearningTires(Protocol):
 
 def drive(
     path: Path,
-    car: Car,
+    car: DoubleTrackCar,
     tracker: Tracker,
     *,
     speed: SpeedProfile | float,
@@ -181,7 +181,7 @@ def _located(measured: Measured, last: _Place, dt: float) -> _Place:
     return _Place(X, Y, psi, v_x, v_y, r, silent)
 
 
-def _at_the_start(path: Path, car: Car, profile: SpeedProfile) -> CarState:
+def _at_the_start(path: Path, car: DoubleTrackCar, profile: SpeedProfile) -> CarState:
     """Return the car on the path, along it, at the wanted speed."""
     X, Y, psi = (float(value) for value in path.pose(0.0))
     return car.start(float(profile.at(0.0)), X=X, Y=Y, psi=psi)

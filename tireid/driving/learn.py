@@ -8,7 +8,7 @@ import numpy as np
 from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
-from mpc.cars import Car, DoubleTrackCar
+from mpc.cars import DoubleTrackCar
 from mpc.loop.lateral import LateralVelocity
 from mpc.loop.sensing import Measured, Measures, cornering_limit, inertial_unit
 from tireid.driving.setup import PERIOD
@@ -26,7 +26,7 @@ RATE_LIMIT = 1.0  # rad/s at the road wheels
 
 
 def learning_drive(
-    car: Car,
+    car: DoubleTrackCar,
     sensors: Measures,
     rng: np.random.Generator,
     *,
