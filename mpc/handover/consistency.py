@@ -71,11 +71,10 @@ class Consistency:
 
     Attributes: agrees, whether they do and did for a while; worst, of the last sample.
     dt : sampling interval [s].
-    tolerances : how far good sensors may disagree; None takes the default.
     """
 
-    def __init__(self, dt: float, tolerances: Tolerances | None = None) -> None:
-        self._dt, self._allowed = dt, tolerances or Tolerances()
+    def __init__(self, dt: float) -> None:
+        self._dt, self._allowed = dt, Tolerances()
         self._calm, self._calm_asked = math.inf, self._allowed.calm
         self._begin()
         self.agrees, self.worst = True, _NONE

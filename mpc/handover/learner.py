@@ -72,21 +72,14 @@ class Learner:
     """Keeps a tracker on the tire that its supervisor names.
 
     Weights go to a new target within the blending time of the rules, in steps that change the
-    planned steering rate by no more than `largest_jump`, or `quick_jump` for another friction.
+    planned steering rate by no more than they allow.
 
     Attributes: supervisor; moves, one for each period in which weights moved or could not.
-    largest_jump : of the planned steering rate [rad/s].
-    quick_jump : the same where the friction has changed [rad/s].
     """
 
-    def __init__(
-        self, supervisor: Supervisor, *, largest_jump: float = 0.05, quick_jump: float = 0.2
-    ) -> None:
-        if not (largest_jump > 0.0 and quick_jump > 0.0):
-            raise ValueError(f"jumps must be positive, they are {largest_jump} and {quick_jump}")
+    def __init__(self, supervisor: Supervisor) -> None:
         self.supervisor = supervisor
         self.moves: list[_Moved] = []
-        self._jump, self._quick_jump = largest_jump, quick_jump
         self._sensors = Consistency(supervisor.identifier.method.dt)
         self._steered: deque[float] = deque()  # what was asked of the wheels, newest last [rad]
         self._left = 0.0  # time in which to arrive [s]
@@ -133,7 +126,8 @@ class Learner:
         target = self.supervisor.target
         if tracker.tire is target:
             return
-        most = self._quick_jump if self._quick else self._jump
+        rules = self.supervisor.rules
+        most = rules.quick_jump if self._quick else rules.jump
         share = min(1.0, tracker.period / max(self._left, tracker.period))
         step = blended(tracker.tire, target, share, planned=tracker.previewed_rate, most=most)
         if step.share > 0.0:

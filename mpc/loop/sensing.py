@@ -1,10 +1,10 @@
 """What a driving car measures of itself, sample by sample, and sees of the path before it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -261,7 +261,6 @@ _RAMP_TIME = 20.0  # s
 _LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 
 
-@cache  # setting up a drive asks a dozen times
 def cornering_limit(
     vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, *, speed: float = 20.0
 ) -> float:
@@ -271,7 +270,14 @@ def cornering_limit(
     mu : friction of the road over that of the tire's measurement [-].
     speed : at which the car is driven [m/s].
     """
+    return _steady_limit(vehicle, cast(Hashable, tire), mu, speed)
+
+
+@cache
+def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, speed: float) -> float:
+    """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
     rate = _LARGEST_ANGLE * mu / _RAMP_TIME
     ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
-    run = Plant(vehicle, tire).simulate(ramp, speed=speed, friction=Friction(scale=mu))
+    plant = Plant(vehicle, cast(Tire | None, tire))
+    run = plant.simulate(ramp, speed=speed, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

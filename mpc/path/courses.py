@@ -165,17 +165,14 @@ def handling_course(*, spacing: float = 0.25) -> Path:
     ]
     line = line_along(sections, spacing=spacing)
     path = Path.from_line(line, name="handling course", closed=True)
-    return Path.from_line(line, name=path.name, closed=True, cones=pairs_beside(path))
+    return Path.from_line(line, name=path.name, closed=True, cones=_pairs_beside(path))
 
 
-def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Array:
-    """Return pairs of cones on both sides of a path, X and Y [m], (k, 2).
-    gap : about the distance from pair to pair along the path [m].
-    half_width : from the path to a cone [m].
-    """
-    s = np.linspace(0.0, path.length, max(2, round(path.length / gap)), endpoint=not path.closed)
+def _pairs_beside(path: Path) -> Array:
+    """Return pairs of cones, 2.5 m beside a path and about every 8 m, X and Y [m], (k, 2)."""
+    s = np.linspace(0.0, path.length, round(path.length / 8.0), endpoint=not path.closed)
     X, Y, psi = path.pose(s)
-    across = half_width * np.column_stack((-np.sin(psi), np.cos(psi)))
+    across = 2.5 * np.column_stack((-np.sin(psi), np.cos(psi)))
     middle = np.column_stack((X, Y))
     return np.vstack((middle + across, middle - across))
 

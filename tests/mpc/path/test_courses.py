@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from mpc.path import BUILT_IN, PathError, constant_radius, handling_course
-from mpc.path.courses import pairs_beside
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +43,11 @@ def test_a_circle_is_entered_and_left_gently_on_either_side():
 
 
 def test_cones_stand_beside_the_path(course):
-    cones = pairs_beside(course, gap=10.0, half_width=2.0)
+    cones = course.cones
     near = [course.project(x, y).e_y for x, y in cones]
     half = len(cones) // 2
-    assert near == pytest.approx([2.0] * half + [-2.0] * half, abs=1e-6)
-    assert len(cones) == 2 * round(course.length / 10.0)
+    assert near == pytest.approx([2.5] * half + [-2.5] * half, abs=1e-6)
+    assert len(cones) == 2 * round(course.length / 8.0)
 
 
 def test_the_names_of_the_command_line_build_paths():
