@@ -4,6 +4,7 @@ import ctypes
 import re
 import subprocess
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,6 +36,58 @@ def test_example_and_handover_have_no_warning_in_any_mix_of_precisions(
     for source in [*c_files(folder), *c_files(folder, "examples")]:
         answer = run(compiler, *STRICT, *defines, *INCLUDES, "-O2", "-c", source, cwd=folder)
         assert (answer.returncode, answer.stderr) == (0, ""), source
+
+
+@pytest.fixture(scope="module")
+def sensing():
+    """By law, an identifier that reads a_y with a tracker: the default, and one that tells v_y."""
+    return cache(lambda law: build_pair(build_package(make_method(law, CAR), CAR, with_a_y=True)))
+
+
+def program(folder, run, compiler="gcc", *, single=0):
+    """Build the example with its packages; return what the compiler says."""
+    parts = ("", "identifier/", "mpc/")
+    sources = [path for part in parts for path in c_files(folder, f"{part}src")]
+    defines = [f"-DTIREID_SINGLE={single}", f"-DTIREID_MPC_SINGLE={single}"]
+    words = [*STRICT, "-O1", "-ffp-contract=off", *defines, *INCLUDES, *sources]
+    return run(compiler, *words, *c_files(folder, "examples"), "-lm", "-o", "loop", cwd=folder)
+
+
+@pytest.mark.parametrize(("law", "single"), [("axle", 0), ("inertial", 0), ("inertial", 1)])
+def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_pair, run):
+    """The inertial one without a sensor of v_y: the tracker steers by the v_y that is told."""
+    folder = write_pair(sensing(law))
+    answer = program(folder, run, single=single)
+    assert (answer.returncode, answer.stderr) == (0, "")
+    log = folder / "log.csv"
+    answer = run(str(folder / "loop"), str(log))
+    assert answer.returncode == 0, answer.stdout
+    rms = [float(text) for text in re.findall(r"rms ([\d.]+) m", answer.stdout)]
+    exported, learnt = np.array(rms).reshape(2, -1)
+    assert learnt[-1] < 0.6 * exported[-1]
+    assert np.abs(np.loadtxt(log, delimiter=",", skiprows=1)[:, 3]).max() < 0.3
+
+
+def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
+    """Compliance, the share of sway, and the zero of the steering: as Python makes the tire."""
+    pair = sensing("inertial")
+    slalom = Slalom(
+        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99
+    )
+    drive = replace(Plant(CAR).simulate(slalom, speed=20.0).recording(), v_y=None)
+    drive = replace(drive, delta_f=drive.delta_f - 0.004)
+    library = joined(write_pair(pair))
+    learnt = CompiledPackage.of(pair.identifier, single=False)
+    learnt.run(drive)
+    weights, specialized = learnt.weights, pair.identifier.specialized
+    assert np.abs(weights["sensors"]).max() > 5e-4
+    state = {**specialized.carry, **weights}
+    wanted = prediction_tire(specialized.method.frozen(CAR, state))
+    assert wanted.weights[0] != 0.0  # the zero of the steering
+    assert not np.allclose(wanted.weights, pair.tracker.tire.weights, rtol=0.01)
+    taken, params = handed_over(library, pair, weights, 1.0)
+    assert taken
+    np.testing.assert_allclose(params["weights"], wanted.weights, rtol=1e-14)
 
 
 @pytest.mark.parametrize(("law", "single"), [("integral", "OFF"), ("axle", "ON")])

@@ -171,6 +171,32 @@ def test_of_a_car_with_downforce_forces_are_those_of_the_frozen_model(racer, for
     np.testing.assert_allclose(less[0], model.at_friction(0.5).axle_force(slid)[-1], rtol=1e-9)
 
 
+def test_of_a_car_with_downforce_slip_lags_as_in_the_frozen_model(racer):
+    model, drive = axle_model(racer), slalom()
+    drive = replace(drive, v_x=np.linspace(15.0, 60.0, len(drive)))
+    tire = prediction_tire(model)
+    rates = build_dynamics(tire.structure)
+    behind, fine, slips = np.zeros(2), 10, []
+    for k in range(len(drive)):
+        slips.append(behind)
+        i = min(k + 1, len(drive) - 1)
+        for j in range(fine):
+            share = j / fine
+            v_x, v_y, r, delta = (
+                (1 - share) * signal[k] + share * signal[i]
+                for signal in (drive.v_x, drive.v_y, drive.r, drive.delta_f)
+            )
+            x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
+            x_dot = rates(x, 0.0, 0.0, v_x, 1e-9, tire.car, tire.weights, *ALL)
+            behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
+    expected = model.lagged_slip(drive)[100:]
+    size = np.abs(expected).max(axis=0)
+    assert (np.abs(np.array(slips)[100:] - expected).max(axis=0) < 0.03 * size).all()
+    plain = replace(model, vehicle=replace(racer, downforce_area_front=0.0, downforce_area_rear=0))
+    apart = np.abs(plain.lagged_slip(drive)[100:] - expected).max(axis=0)
+    assert (apart > 5.0 * np.abs(np.array(slips)[100:] - expected).max(axis=0)).any()
+
+
 def test_caution_is_refused_for_a_car_whose_bands_are_of_static_loads(racer):
     tire = prediction_tire(axle_model(racer))
     assert Tracker(tire, period=0.05).caution == 0.0
