@@ -21,6 +21,7 @@ from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
 from tests.kept import Kept
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put
+from tests.rivals import rival
 
 CAR = sedan()
 INCLUDES = ["-Iinclude", "-Iidentifier/include", "-Impc/include"]
@@ -234,7 +235,7 @@ def test_a_curve_that_falls_is_no_tire(taught, pairs, libraries):
 
 
 @pytest.mark.parametrize(
-    ("law", "complaint"), [("washout", "no tire"), ("magic_formula_ekf", "CurveModel")]
+    ("law", "complaint"), [rival("washout", "no tire"), ("magic_formula_ekf", "CurveModel")]
 )
 def test_what_cannot_be_handed_over_is_said(law, complaint):
     with pytest.raises(NoHandoverError, match=complaint):
