@@ -88,25 +88,28 @@ $(VENV)/.demo: pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable .
 	touch $@
 
-$(VENV)/.test: pyproject.toml requirements-test.lock | $(PY)
+# Methods that tireid is compared with: tests and benchmarks ask for them, users need not have them.
+RIVALS := benchmarks/rivals
+
+$(VENV)/.test: pyproject.toml $(RIVALS)/pyproject.toml requirements-test.lock | $(PY)
 ifeq ($(LOCKED),)
-	$(PY) -m pip install --quiet --editable ".[test]"
+	$(PY) -m pip install --quiet --editable ".[test]" --editable $(RIVALS)
 else
 	$(PY) -m pip install --quiet --require-hashes --requirement requirements-test.lock
-	$(PY) -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(PY) -m pip install --quiet --no-deps --no-build-isolation --editable . --editable $(RIVALS)
 endif
 	touch $@
 
-$(VENV)/.bench: pyproject.toml | $(PY)
-	$(PY) -m pip install --quiet --editable ".[bench]"
+$(VENV)/.bench: pyproject.toml $(RIVALS)/pyproject.toml | $(PY)
+	$(PY) -m pip install --quiet --editable ".[bench]" --editable $(RIVALS)
 	touch $@
 
 $(VENV)/.docs: pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable ".[docs]"
 	touch $@
 
-$(VENV)/.mutants: pyproject.toml | $(PY)
-	$(PY) -m pip install --quiet --editable ".[mutants]"
+$(VENV)/.mutants: pyproject.toml $(RIVALS)/pyproject.toml | $(PY)
+	$(PY) -m pip install --quiet --editable ".[mutants]" --editable $(RIVALS)
 	touch $@
 
 # The newest versions that there are, the lowest that pyproject.toml allows: in environments of their

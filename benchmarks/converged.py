@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
-from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
+from mpc.prediction import build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
 from mpc.realtime import Command, Status, Tracker
-from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
+from mpc.tires.tire import Car, PredictionTire, TireStructure, valid_slip
 
 STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged
 N_SOFT = 3  # e_y, slip in front, slip at the rear
@@ -60,7 +60,7 @@ def build_nlp(structure: TireStructure, horizon: int) -> dict[str, Any]:
     X, U, S = ca.MX.sym("X", n_x, N + 1), ca.MX.sym("U", 1, N), ca.MX.sym("S", N_SOFT, N)
     road = ca.MX.sym("road", 2, N)  # kappa, v_x
     dt, R = ca.MX.sym("dt"), ca.MX.sym("R")
-    car, w = ca.MX.sym("car", N_CAR), ca.MX.sym("w", structure.n_weights)
+    car, w = ca.MX.sym("car", len(Car._fields)), ca.MX.sym("w", structure.n_weights)
     q, q_end = ca.MX.sym("q", N_ERRORS), ca.MX.sym("q_end", N_ERRORS)
     bounds, Z = ca.MX.sym("bounds", N_SOFT), ca.MX.sym("Z", N_SOFT)
     beyond = bounds[1:], ca.MX.sym("rise", 2), ca.MX(1.0)

@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = "benchmarks"
-PACKAGES = (SCRIPTS, "codegen", "identifier", "models", "mpc", "tireid")
+RIVALS = "tireid_rivals"
+PACKAGES = (SCRIPTS, "codegen", "identifier", "models", "mpc", "tireid", RIVALS)
 BOOKS = {f"{SCRIPTS}.{name}" for name in ("targets", "fingerprint")}  # write down, measure nothing
 OWN = "script"
 COMMANDS = "tireid.__main__"
@@ -94,7 +95,8 @@ def _path(name: str, root: Path) -> Path | None:
     """Return the file of a module of the project; None where there is none."""
     if name.partition(".")[0] not in PACKAGES:
         return None
-    place = root.joinpath(*name.split("."))
+    parts = name.split(".")
+    place = root.joinpath(*(["benchmarks", "rivals"] if parts[0] == RIVALS else []), *parts)
     files = (place.with_suffix(".py"), place / "__init__.py", place / "__main__.py")
     return next((path for path in files if path.is_file()), None)
 

@@ -38,7 +38,6 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "verdicts_without_v_y": [],
     "bands": [],
     "plan": [],
-    "dither": [],
     "fleet": [],
     "guaranteed": [],
     "guaranteed_faster": [],

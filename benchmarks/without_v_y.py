@@ -3,7 +3,7 @@
     python -m benchmarks.without_v_y [--record] [--only PART ...] [--cars N]
 
 A linear Kalman filter on the vehicle's tires, a naive joint filter of state and tires, a washout,
-and moving-horizon estimation, as `tireid compare` has them, on recordings of CarMaker, the own
+and moving-horizon estimation, those of benchmarks/rivals, on recordings of CarMaker, the own
 sensors of the real 1:10 car, and random cars on banked roads with what inertial sensors add; all in
 one run. Nobody is shown v_y; the true one scores, from the first sample. Numbers of the baselines
 were chosen on random cars with seeds below `FIRST_SEED`, and on no recording. Where the
@@ -39,10 +39,10 @@ from identifier.methods import continuing, make_method
 from identifier.run import History, identify
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
+from tireid_rivals import NAMES
 
 CARS = 80
 OWN = "inertial"
-BASELINES = ("linear_kf", "joint_ekf", "washout", "mhe")
 SLOWEST = 0.3  # m/s, from which a random drive counts
 FAST = 3.0  # m/s, from which the race car's counts
 MOST = {"slalom1_14_5ms": 0.15, "experiment2_40kmh": 0.05, "ferrari": 0.32}  # degrees
@@ -106,7 +106,7 @@ def runs(
     blind = replace(recording, v_y=None, a_y=central, axle_force=None)
     return {
         OWN: without_v_y(recording, vehicle, position, roll=roll),
-        **{name: identify(blind, vehicle, make_method(name, vehicle)) for name in BASELINES},
+        **{name: identify(blind, vehicle, make_method(name, vehicle)) for name in NAMES},
     }
 
 
@@ -171,7 +171,7 @@ def random_drives(targets: Targets, cars: int) -> None:
         record(targets, f"cars/{kind}", {name: median(one) for name, one in by_name.items()})
     every = {name: [one for kind in CLASSES for one in found[kind][name]] for name in found[kind]}
     record(targets, "cars/all", {name: median(one) for name, one in every.items()})
-    for name in BASELINES:
+    for name in NAMES:
         wins = np.mean([o.rms < b.rms for o, b in zip(every[OWN], every[name], strict=True)])
         targets.record(f"cars/all/wins_over_{name}", 100.0 * float(wins), "%")
         over = median(every[OWN]).share / median(every[name]).share
@@ -194,7 +194,7 @@ def carmaker(targets: Targets) -> None:
             for name, history in runs(recording, CARMAKER, (0.0, 0.0), roll=False).items()
         }
         record(targets, f"carmaker/{run}", found)
-        best = min(found[name].rms for name in BASELINES)
+        best = min(found[name].rms for name in NAMES)
         targets.at_most(f"{run}, {OWN} over the best baseline", found[OWN].rms / best, 1.0, "-")
 
 
@@ -268,7 +268,7 @@ def cost(targets: Targets) -> None:
     targets : collects what is recorded.
     """
     recording = read_recording(DATA / "carmaker.csv.gz", run=CARMAKER_RUNS[0])
-    methods = {name: make_method(name, CARMAKER) for name in (OWN, *BASELINES)}
+    methods = {name: make_method(name, CARMAKER) for name in (OWN, *NAMES)}
     for name, seconds in step_times(methods, CARMAKER, recording, repeats=5).items():
         print(f"  a step of {name:10} {1e6 * seconds:8.2f} us")
         targets.record(f"step/{name}", 1e6 * seconds, "us")

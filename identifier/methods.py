@@ -12,15 +12,7 @@ from typing import Any
 
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.model import AxleModel
-from identifier.baselines import (
-    HorizonEstimator,
-    LaggedEkf,
-    LinearBaseline,
-    Washout,
-    joint_ekf,
-    linear_kf,
-    magic_formula_ekf,
-)
+from identifier.baselines import LaggedEkf, LinearBaseline, magic_formula_ekf
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.method import FitMethod
@@ -61,12 +53,7 @@ METHODS: Mapping[str, Factory] = {
     "magic_formula_ekf": _seedless(magic_formula_ekf),
     "textbook_ekf": _seedless(partial(magic_formula_ekf, textbook=True)),
     "lagged_ekf": _seedless(LaggedEkf.for_vehicle),
-    "linear_kf": _seedless(linear_kf),
-    "joint_ekf": _seedless(joint_ekf),
-    "washout": _seedless(Washout.for_vehicle),
-    "mhe": _seedless(HorizonEstimator.for_vehicle),
 }
-
 
 # By kind of model, the method that goes on from one.
 LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
@@ -81,6 +68,8 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
 
 
 GROUP = "tireid.methods"
+# What benchmarks/rivals has, a distribution of its own: who asks for one is told where it is.
+_RIVALS = ("linear_kf", "joint_ekf", "washout", "mhe")
 
 
 @cache
@@ -114,8 +103,7 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     """
     if name in METHODS:
         return METHODS[name](vehicle, seed)
-    if name not in _installed():
-        raise ValueError(f"method must be one of {', '.join(methods())}, not {name!r}")
+    require_method(name)
     point = _installed()[name]
     try:
         method = point.load()(vehicle, seed)
@@ -125,6 +113,22 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     if not isinstance(method, Method):
         raise ValueError(f"method {name} ({point.value}) is a {type(method).__name__}, no Method")
     return method
+
+
+def require_method(name: str) -> None:
+    """Refuse a name that is none of `methods`; of a rival that is not installed, say where it is.
+
+    Raises
+    ------
+    ValueError
+        Where the name is none.
+    """
+    if name in methods():
+        return
+    if name in _RIVALS:
+        place = "pip install ./benchmarks/rivals in a clone of the repository"
+        raise ValueError(f"method {name} is not installed: {place}")
+    raise ValueError(f"method must be one of {', '.join(methods())}, not {name!r}")
 
 
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: bool = True) -> Method:

@@ -23,7 +23,7 @@ from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.reproducibility import AxleRmse, Replay, freeze_key, online_error, reproduce
 from identifier.run import History, identify
-from models.maneuvers import Maneuver, Slalom, TwoStepSteer
+from models.maneuvers import Maneuver, SampledSteer, Slalom
 from models.plant import Plant
 from models.recordings import Recording
 from models.vehicle import sedan
@@ -33,11 +33,9 @@ SPEED = 20.0  # m/s
 ONSETS = {"step_steer": 29.0, "slalom": 25.0}  # s, errors count from here on
 FREEZES = {"step_steer": (32.0, 35.0), "slalom": (32.0, 40.0)}  # s, as in the paper
 MANEUVERS: Mapping[str, Maneuver] = {
-    "step_steer": TwoStepSteer(
-        amplitude=np.radians(4.0),
-        second_share=0.5,
-        onset=ONSETS["step_steer"],
-        second_onset=36.0,
+    "step_steer": SampledSteer(
+        times=(ONSETS["step_steer"], 29.2, 36.0, 36.1),
+        angles=tuple(np.radians([0.0, 4.0, 4.0, 2.0])),
         rate_limit=np.radians(20.0),
         duration=45.0,
     ),

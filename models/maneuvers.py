@@ -9,7 +9,7 @@ sine at least 2 pi frequency amplitude.
 """
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,7 +34,7 @@ class Maneuver(Protocol):
 def _check(maneuver: Any, *, steepest: float) -> None:
     """Refuse numbers that are not physical and a steering rate above the limit."""
     name = type(maneuver).__name__
-    free = ("amplitude", "second_share", "onset", "rear_ratio", "seed", "pause")
+    free = ("amplitude", "onset", "rear_ratio", "seed", "pause")
     for field in fields(maneuver):
         value = getattr(maneuver, field.name)
         if not math.isfinite(value):
@@ -60,7 +60,7 @@ def _both(front: Any, rear_ratio: float) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepSteer:
-    """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
+    """A ramp at `rate_limit` to a held angle: the step steer of ISO 7401, slow up to the limit.
     amplitude : final angle [rad].
     """
 
@@ -74,56 +74,9 @@ class StepSteer:
         _check(self, steepest=0.0)
 
     def steering(self, t: Array) -> Array:
-        angle = np.clip(self._rate * (t - self.onset), 0.0, abs(self.amplitude))
+        rate = self.rate_limit / max(1.0, abs(self.rear_ratio))
+        angle = np.clip(rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
-
-    @property
-    def arrival(self) -> float:
-        """Time at which the angle is reached [s]."""
-        return self.onset + abs(self.amplitude) / self._rate
-
-    @property
-    def _rate(self) -> float:
-        return self.rate_limit / max(1.0, abs(self.rear_ratio))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TwoStepSteer:
-    """A step steer whose angle changes again: two ramps at `rate_limit`, each to a held angle.
-    amplitude : angle held from the first ramp to the second [rad].
-    second_share : angle held after the second ramp, over `amplitude` [-].
-    onset : start of the first ramp [s].
-    second_onset : start of the second ramp [s], not before the first has arrived.
-    """
-
-    amplitude: float
-    second_share: float
-    onset: float
-    second_onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check(self, steepest=0.0)
-        arrival = self._first.arrival
-        if self.second_onset < arrival:
-            raise ManeuverError(
-                f"TwoStepSteer: second_onset must not be before the first ramp arrives at "
-                f"{arrival:.4g} s, it is {self.second_onset}"
-            )
-
-    @property
-    def _first(self) -> StepSteer:
-        return StepSteer(
-            amplitude=self.amplitude, onset=self.onset, rate_limit=self.rate_limit,
-            duration=self.duration, rear_ratio=self.rear_ratio,
-        )  # fmt: skip
-
-    def steering(self, t: Array) -> Array:
-        change = (self.second_share - 1.0) * self.amplitude
-        second = replace(self._first, amplitude=change, onset=self.second_onset)
-        return self._first.steering(t) + second.steering(t)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,27 +124,6 @@ class DoubleLaneChange:
         back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
         wave = np.sin(2.0 * math.pi * there) - np.sin(2.0 * math.pi * back)
         return _both(self.amplitude * wave, self.rear_ratio)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SlowlyIncreasingSteer:
-    """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
-    amplitude : final angle [rad].   rate : slope of the ramp of the front axle [rad/s].
-    """
-
-    amplitude: float
-    rate: float
-    onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check(self, steepest=self.rate)
-
-    def steering(self, t: Array) -> Array:
-        angle = np.clip(self.rate * (t - self.onset), 0.0, abs(self.amplitude))
-        return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Cars to drive that are not the prediction model: a state, and a step of one control period."""
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,45 +38,14 @@ class CarState(NamedTuple):
     inner: Any
 
 
-class Car(Protocol):
-    """A car that is driven by steering angle and wanted speed, one period at a time."""
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The car as a controller knows it."""
-
-    @property
-    def tire(self) -> Tire:
-        """What is mounted on its wheels: what only an oracle is given."""
-
-    @property
-    def friction(self) -> Friction:
-        """Friction of the road over the tire's own."""
-
-    @property
-    def period(self) -> float:
-        """For which the inputs are held [s]."""
-
-    @property
-    def speed_gain(self) -> float:
-        """Acceleration that the driver asks for, per error of the speed [1/s]."""
-
-    def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
-        """Return the car rolling straight ahead.
-        v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
-        """
-
-    def step(self, state: CarState, command: float, v_ref: float) -> CarState:
-        """Return the car one period later.
-        command : angle asked of the front road wheels [rad].   v_ref : wanted speed [m/s].
-        """
-
-
 _HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 
 
 class DoubleTrackCar:
-    """A car of `models.plant` on a road.
+    """A car of `models.plant` on a road, driven by steering angle and wanted speed.
+
+    Attributes: vehicle, as a controller knows it; tire, which only an oracle is given; friction;
+    period; speed_gain, acceleration that the driver asks for, per error of the speed [1/s].
     vehicle : the car; it needs a chassis.
     tire : of all four wheels; None reads the file named by the chassis.
     friction : of the road; None is what the tire was measured on.
@@ -104,9 +73,15 @@ class DoubleTrackCar:
         self.speed_gain = driver.gain
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
+        """Return the car rolling straight ahead.
+        v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
+        """
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
+        """Return the car one period later.
+        command : angle asked of the front road wheels [rad].   v_ref : wanted speed [m/s].
+        """
         return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
     def _state(self, plant: PlantState) -> CarState:

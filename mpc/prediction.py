@@ -22,9 +22,9 @@ from mpc.tires.tire import Car, Pair, Point, TireStructure, believed_force
 # κ [1/m], > 0 where the path turns left, and v_x [m/s] are constant over a stage of dt [s].
 # Force curves are those of the tire up to the slip that is of use, and rise slightly beyond.
 
-N_CAR = 4
+_N_CAR = 4
 # Least 1 - κ e_y that is believed: towards the center of a turn it vanishes, and ṡ has no bound.
-NEAREST = 0.1
+_NEAREST = 0.1
 
 
 class Ports(NamedTuple):
@@ -59,7 +59,7 @@ def state_size(structure: TireStructure) -> int:
 
 
 def stage_ports(structure: TireStructure) -> Ports:
-    sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights, 2, 2, 1)
+    sizes = (state_size(structure), 1, 1, 1, 1, _N_CAR, structure.n_weights, 2, 2, 1)
     pairs = zip(Ports._fields, sizes, strict=True)
     return Ports(*(ca.SX.sym(name, size) for name, size in pairs))
 
@@ -75,7 +75,7 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
 
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)
-    s_dot = (p.v_x * c - v_y * s) * (1 / ca.fmax(1 - p.kappa * e_y, NEAREST))
+    s_dot = (p.v_x * c - v_y * s) * (1 / ca.fmax(1 - p.kappa * e_y, _NEAREST))
     rates = [
         p.v_x * s + v_y * c,
         r - p.kappa * s_dot,
@@ -104,7 +104,7 @@ def _lag_lengths(structure: TireStructure, slip: Pair, at: Point, grip: Any) -> 
     return structure.lag_length((slip[0] * per_grip, slip[1] * per_grip), there)
 
 
-RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
+_RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
 
 
 def build_dynamics(structure: TireStructure) -> ca.Function:
@@ -145,7 +145,7 @@ def build_stage(structure: TireStructure) -> ca.Function:
     x_next, A, B = _runge_kutta(f, p)
     H, h = gauss_newton(tracking_errors(p.x, p.kappa, p.v_x, at.s_dot), p.x, q)
     results = [x_next, A, B, H, h, at.slip, at.slip_x]
-    return _finished("stage", {**p._asdict(), "q": q}, results, RESULTS)
+    return _finished("stage", {**p._asdict(), "q": q}, results, _RESULTS)
 
 
 @cache
@@ -159,7 +159,7 @@ def build_end(structure: TireStructure) -> ca.Function:
     at = motion(structure, p)
     H, h = gauss_newton(tracking_errors(p.x, p.kappa, p.v_x, at.s_dot), p.x, q)
     ports = {name: port for name, port in p._asdict().items() if name not in ("u", "dt")}
-    return _finished("end", {**ports, "q": q}, [H, h, at.slip, at.slip_x], RESULTS[3:])
+    return _finished("end", {**ports, "q": q}, [H, h, at.slip, at.slip_x], _RESULTS[3:])
 
 
 @cache

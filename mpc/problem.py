@@ -29,7 +29,7 @@ SCALES = {
     "steering": 0.1,  # rad
     "progress": 0.1,  # -
 }
-STEERING_RATE_SCALE = 0.5  # rad/s
+_STEERING_RATE_SCALE = 0.5  # rad/s
 N_ERRORS = len(SCALES)
 
 
@@ -81,7 +81,7 @@ class Cost:
     @property
     def R(self) -> float:
         """Of ½ R u², u the steering rate [rad/s]."""
-        return self.steering_rate / STEERING_RATE_SCALE**2
+        return self.steering_rate / _STEERING_RATE_SCALE**2
 
 
 def tracking_errors(x: Any, kappa: Any, v_x: Any, s_dot: Any) -> Any:

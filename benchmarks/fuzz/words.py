@@ -82,7 +82,6 @@ MORE = (
         "--speed 1e999%",
     ),
     *(
-        "--dither nan",
         "--area 1e999x3",
         "--area x",
         "--steering-ratio 0",

@@ -1,4 +1,10 @@
-"""B, C, D of a Magic Formula per axle by an extended Kalman filter; they freeze to that curve."""
+"""B, C, D of a Magic Formula per axle by an extended Kalman filter; they freeze to that curve.
+
+ẋ = K F(θ, α', u) - [v_x r, 0] + w_x,   α̇' = v_x/σ (α(x, u, θ) - α'),   θ̇ = w_θ (random walk),
+measured: x + noise. The textbook's has neither α' nor offsets: F reads α itself. The Jacobian of
+the sampled map, with steering and speed at their means, is taken by automatic differentiation. An
+outlier leads x all the way, unless slip lags: α' would remember it.
+"""
 
 import math
 from collections.abc import Mapping
@@ -12,9 +18,18 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel, measured_slip, unlagged
-from identifier.baselines.kalman import NOISE, PORTS, FilteredTire, build_step
-from identifier.baselines.ports import LAG_DESCRIBED, OVER, axle_loads
-from identifier.method import Method, resumed
+from identifier.baselines.kalman import CARRY, PORTS, correct, midpoint
+from identifier.baselines.ports import (
+    LAG_DESCRIBED,
+    LAG_PORTS,
+    OVER,
+    axle_loads,
+    lag_symbols,
+    lagged_slip,
+    motion_rate,
+    sample_ports,
+)
+from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters
@@ -29,18 +44,18 @@ from models.vehicle import GRAVITY, Vehicle
 
 TYPICAL_SHAPE = 1.4  # C of a passenger tire, Pacejka, Tyre and Vehicle Dynamics, figure 4.9
 _LOGIT = math.log((TYPICAL_SHAPE - 1.0) / (2.0 - TYPICAL_SHAPE))
-STIFFNESS, SHAPE, FRICTION = range(3)
-LIMITS = (2.0, 3.0, 1.5)  # of |θ| by kind: stiffness within a factor of 7.4, friction 4.5
+_STIFFNESS, _SHAPE, _FRICTION = range(3)
+_LIMITS = (2.0, 3.0, 1.5)  # of |θ| by kind: stiffness within a factor of 7.4, friction 4.5
 _LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
 _OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
 
 
 _SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
-KINDS = (STIFFNESS, STIFFNESS, SHAPE, SHAPE, FRICTION, FRICTION)  # of each θ of the curve
+KINDS = (_STIFFNESS, _STIFFNESS, _SHAPE, _SHAPE, _FRICTION, _FRICTION)  # of each θ of the curve
 MAGIC = CURVES["magic_formula"]
 
 
-def decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
+def _decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
     """Return B, C, D (2, 3) of θ: log stiffness, logit shape, log friction; front and rear each."""
     slope = ca.vertcat(p.C_f, p.C_r) * ca.exp(theta[0:2])  # B C D, which data tell sooner than B
     C = 1 + 1 / (1 + ca.exp(-theta[2:4] - _LOGIT))
@@ -48,53 +63,105 @@ def decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
     return ca.horzcat(slope / (C * D), C, D)
 
 
-def _encoded(vehicle: Vehicle, friction: float, parameters: Array) -> Array:
-    """Return the θ that `decoded` makes such parameters of, (6,)."""
-    B, C, D = parameters.T
-    stated, loads = np.array(vehicle.bicycle)[4:], np.array(vehicle.axle_loads)
-    shape = np.log((C - 1.0) / (2.0 - C)) - _LOGIT
-    return np.concatenate([np.log(B * C * D / stated), shape, np.log(D / (friction * loads))])
-
-
+_NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
+_CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")
 OWN = 4  # unknowns beside those of the curve: ln σ/σ₀ (2,), δ₀ and b over their spreads
 _OWN_PRIOR = ("relaxation_length", "steering_spread", "v_y_spread")
 
 
-def _filtered_tire(textbook: bool) -> FilteredTire:
-    """Return what makes the forces of a curve by θ = [curve, ln σ/σ₀, δ₀ and b over spreads].
+def _build_step(textbook: bool) -> ca.Function:
+    """Return the filter's step; all numbers stay inputs of it.
 
-    Prior: friction [-], then those of `_OWN_PRIOR` where it is not the textbook's.
+    Carried: estimate (n,) = [v_y, r, α' where slip lags, θ], its covariance P, before (3,) = δ_f,
+    δ_r and v_x of the last sample, running (1 after a sample in motion); where slip lags also the
+    `LaggedSlip` of what is measured, which the output force reads as the frozen model does: that of
+    the θ carried into the sample. Held: noise in the order of `_NOISE` (standard deviations [m/s],
+    [rad/s]; disturbances per root of time [m/s/√s], [rad/s/√s]), walk of θ [1/√s], limit of |θ|,
+    learning_speed [m/s], prior: friction [-], then `_OWN_PRIOR`. Below that speed θ and its
+    covariance are kept, and x and α' begin anew from the measurement.
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
-    n = len(KINDS)
+    s, of_curve = sample_ports(), len(KINDS)
+    lags, own, prior = (0, 0, 1) if textbook else (2, OWN, 1 + len(_OWN_PRIOR))
+    unknowns = of_curve + own
+    p, dt, n = s.parameters, s.sampling[0], 2 + lags + unknowns
+    estimate, P, before = ca.SX.sym("estimate", n), ca.SX.sym("P", n, n), ca.SX.sym("before", 3)
+    running, noise = ca.SX.sym("running"), ca.SX.sym("noise", len(_NOISE))
+    walk, limit = ca.SX.sym("walk", unknowns), ca.SX.sym("limit", unknowns)
+    known, learning_speed = ca.SX.sym("prior", prior), ca.SX.sym("learning_speed")
+    moved, theta = estimate[: 2 + lags], estimate[2 + lags :]
+    x, loads = estimate[:2], axle_loads(p, GRAVITY)
+    learning = s.v_x >= learning_speed
 
-    def slip(p: BicycleParameters, known: Any, theta: Any, v_x: Any, x: Any, u: Any) -> Any:
+    def slip_of(v_x: Any, x: Any, u: Any) -> Any:
         if textbook:
             return MAGIC.slip(p, v_x, x, u)
-        return measured_slip(MAGIC, p, known[2:4] * theta[n + 2 :], v_x, x, u)
+        return measured_slip(MAGIC, p, known[2:4] * theta[of_curve + 2 :], v_x, x, u)
 
-    def force(p: BicycleParameters, known: Any, theta: Any, slip: Any, u: Any) -> Any:
-        loads = axle_loads(p, GRAVITY)
-        return MAGIC.force(decoded(p, known[0], loads, theta[:n]), loads, slip, u)
+    def force_of(slip: Any, u: Any) -> Any:
+        return MAGIC.force(_decoded(p, known[0], loads, theta[:of_curve]), loads, slip, u)
 
-    def lag(known: Any, theta: Any) -> Any:
-        return known[1] * ca.exp(theta[n : n + 2])
+    u_mean = (before[:2] + s.u) / 2
+    v_mean = ca.fmax((before[2] + s.v_x) / 2, learning_speed)
+    alpha = slip_of(v_mean, x, u_mean)
+    slip = alpha if textbook else moved[2:]
+    rate = motion_rate(p, v_mean, x, force_of(slip, u_mean))
+    sigma: Any = None if textbook else known[1] * ca.exp(theta[of_curve : of_curve + 2])
+    if not textbook:
+        rate = ca.vertcat(rate, v_mean / sigma * (alpha - slip))
+    ahead = ca.vertcat(midpoint(estimate, rate, dt), theta)
+    F = ca.jacobian(ahead, estimate)
+    Q = ca.diag(ca.vertcat(noise[2:4], ca.SX(lags, 1), walk) ** 2 * dt)
+    R = ca.diag(noise[:2] ** 2)
+    found, P_found = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4], follow=textbook)
 
-    own, prior = (0, 0) if textbook else (OWN, len(_OWN_PRIOR))
-    return FilteredTire(
-        slip=slip, force=force, lag=None if textbook else lag, unknowns=n + own, prior=1 + prior
+    going = ca.logic_and(learning, running > 0.5)
+    told_slip = alpha_now = slip_of(s.speed, s.x, s.u)
+    afresh = ca.vertcat(s.x, alpha_now[:lags], theta)
+    at_once = ca.jacobian(afresh, ca.vertcat(s.x, theta))  # a start is taken for a steady slide
+    unsteady = ca.vertcat(ca.SX(2, 1), ca.repmat(noise[0] / s.speed, lags, 1), ca.SX(unknowns, 1))
+    P_afresh = at_once @ ca.diagcat(R, P[2 + lags :, 2 + lags :]) @ at_once.T
+    P_afresh += ca.diag(unsteady**2)
+    following = ca.if_else(going, found, afresh)
+    theta_next = ca.fmin(ca.fmax(following[2 + lags :], -limit), limit)
+    last, carry = lag_symbols(), _carry(textbook)
+    lag_next: tuple[Any, ...] = ()
+    if not textbook:
+        told_slip = lagged_slip(last, alpha_now, s.speed * dt, sigma)
+        lag_next = (told_slip, alpha_now, ca.if_else(s.moving, 1, 0))
+    return ca.Function(
+        "magic_formula_ekf",
+        [
+            *(estimate, P, before, running, *last[: len(lag_next)]),
+            *(s.x, s.u, s.v_x),
+            *(noise, walk, limit, known, learning_speed, s.vehicle, s.sampling),
+        ],
+        [
+            ca.vertcat(following[: 2 + lags], theta_next),
+            ca.densify(ca.if_else(going, P_found, P_afresh)),
+            ca.vertcat(s.u, s.v_x),
+            ca.if_else(learning, 1, 0),
+            *lag_next,
+            ca.if_else(s.moving, force_of(told_slip, s.u), 0),
+        ],
+        [*carry, *OVER, *_CONSTANTS, "vehicle", "sampling"],
+        [*(f"{port}_next" for port in carry), "axle_force"],
+        {"cse": True},
     )
+
+
+def _carry(textbook: bool) -> tuple[str, ...]:
+    return CARRY if textbook else (*CARRY, *LAG_PORTS)
 
 
 @cache
 def _scan(textbook: bool) -> Scan:
-    tire = _filtered_tire(textbook)
-    return Scan(build_step("magic_formula_ekf", tire), carry=tire.carry, over=OVER)
+    return Scan(_build_step(textbook), carry=_carry(textbook), over=OVER)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurveEkf(Method):
-    """Tire parameters that walk at random, slowly, in the coordinates of `decoded`.
+    """Tire parameters that walk at random, slowly, in the coordinates of `_decoded`.
 
     With them the lag of the tire and the zeros of both sensors, which the default learns too.
     walk : of every parameter [1/√s].   v_y_noise : standard deviation of measured v_y [m/s].
@@ -134,7 +201,7 @@ class CurveEkf(Method):
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        filtered = ("walk", *NOISE, "friction", *_SPREADS, *_OWN_PRIOR, "relaxation_spread")
+        filtered = ("walk", *_NOISE, "friction", *_SPREADS, *_OWN_PRIOR, "relaxation_spread")
         names = (*filtered, "dt", "learning_speed", "min_speed")
         require_positive(ValueError, **{name: getattr(self, name) for name in names})
 
@@ -176,33 +243,23 @@ class CurveEkf(Method):
         return "lag of the tires and offsets of the sensors are identified, as by the default"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
-        theta, own = np.zeros(len(KINDS)), np.zeros(0 if self.textbook else OWN)
+        """Return what a run needs; it begins afresh, from the prior."""
         if start is not None:
-            refusal = "the stored model is not a curve 'magic_formula'"
-            stored = resumed(start, CurveModel, refusal, curve="magic_formula")
-            with np.errstate(invalid="ignore", divide="ignore"):  # judged below
-                theta = _encoded(vehicle, self.friction, stored.parameters)
-            if not np.isfinite(theta).all():
-                raise ValueError(
-                    "a curve to begin with must have positive stiffness and friction and a shape "
-                    f"between 1 and 2, its parameters are {stored.parameters.tolist()}"
-                )
-            own = self._own_of(stored)
+            raise ValueError("this filter begins afresh: it goes on from no stored model")
         lags = 0 if self.textbook else 2
         prior = () if self.textbook else _OWN_PRIOR
         noise = [self.v_y_noise, self.r_noise, *[self.v_y_noise / self.learning_speed] * lags]
         return Setup(
             scan=_scan(self.textbook),
             carry={
-                "estimate": np.concatenate([np.zeros(2 + lags), theta, own]),
+                "estimate": np.zeros(2 + lags + self.limit.size),
                 "P": np.diag([*noise, *self.spread]) ** 2,
                 "before": np.zeros(3),
                 "running": np.zeros(1),
                 **({} if self.textbook else unlagged()),
             },
             constants={
-                "noise": np.array([getattr(self, name) for name in NOISE]),
+                "noise": np.array([getattr(self, name) for name in _NOISE]),
                 "walk": np.full(self.limit.size, self.walk),
                 "limit": self.limit,
                 "prior": np.array([getattr(self, name) for name in ("friction", *prior)]),
@@ -222,7 +279,7 @@ class CurveEkf(Method):
     @property
     def limit(self) -> Array:
         """What the unknowns θ stay within, (n,) [-]."""
-        of_curve = [LIMITS[kind] for kind in KINDS]
+        of_curve = [_LIMITS[kind] for kind in KINDS]
         own = [] if self.textbook else [_LAG_LIMIT, _LAG_LIMIT, *_OFFSET_LIMITS]
         return np.array([*of_curve, *own])
 
@@ -231,7 +288,7 @@ class CurveEkf(Method):
         theta : unknowns, (n,).
         """
         n, loads = len(KINDS), ca.DM(vehicle.axle_loads)
-        values = decoded(vehicle.bicycle, self.friction, loads, ca.DM(theta[:n]))
+        values = _decoded(vehicle.bicycle, self.friction, loads, ca.DM(theta[:n]))
         curve = CurveModel(
             vehicle=vehicle,
             curve="magic_formula",
@@ -250,15 +307,6 @@ class CurveEkf(Method):
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the curve with the carried parameters, lag and offsets."""
         return self.model(vehicle, state["estimate"].ravel()[-self.limit.size :])
-
-    def _own_of(self, stored: CurveModel) -> Array:
-        """Return the lag and the offsets of a stored curve as unknowns, (4,) or none."""
-        if self.textbook:
-            return np.zeros(0)
-        lag = np.maximum(stored.relaxation_length / self.relaxation_length, math.exp(-_LAG_LIMIT))
-        return np.concatenate(
-            [np.log(lag), stored.offset / (self.steering_spread, self.v_y_spread)]
-        )
 
 
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:

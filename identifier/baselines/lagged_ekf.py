@@ -20,16 +20,17 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curve_ekf import TYPICAL_SHAPE
 from identifier.baselines.curves import CURVES, CurveModel, measured_slip, unlagged
-from identifier.baselines.kalman import CARRY, PORTS, midpoint
+from identifier.baselines.kalman import CARRY, PORTS, corrected, midpoint
 from identifier.baselines.ports import (
     LAG_DESCRIBED,
     LAG_PORTS,
+    WITH_A_Y,
     axle_loads,
+    given_ports,
     lag_symbols,
     lagged_slip,
     motion_rate,
 )
-from identifier.baselines.without_v_y import OVER, corrected, given_ports
 from identifier.method import Method
 from identifier.setup import Setup
 from identifier.tire_model import TireModel
@@ -127,7 +128,7 @@ def build_step(name: str) -> ca.Function:
             *(told_slip, alpha_now, ca.if_else(s.moving, 1, 0)),
             ca.if_else(s.moving, axle_force, 0),
         ],
-        [*CARRY, *LAG_PORTS, *OVER, "vehicle", "sampling", "numbers"],
+        [*CARRY, *LAG_PORTS, *WITH_A_Y, "vehicle", "sampling", "numbers"],
         [*(f"{port}_next" for port in (*CARRY, *LAG_PORTS)), "axle_force"],
         {"cse": True},
     )
@@ -135,7 +136,7 @@ def build_step(name: str) -> ca.Function:
 
 @cache
 def _scan() -> Scan:
-    return Scan(build_step("lagged_ekf"), carry=(*CARRY, *LAG_PORTS), over=OVER)
+    return Scan(build_step("lagged_ekf"), carry=(*CARRY, *LAG_PORTS), over=WITH_A_Y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

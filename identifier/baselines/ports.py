@@ -1,8 +1,7 @@
 """What the steps of all baselines read, and the equation of motion that they share.
 
 x = [v_y, r] [m/s, rad/s].   u = [δ_f, δ_r] [rad].   F: axle forces [N], frame of the body.
-ẋ = K F - [v_x r, 0]   and, with ξ = K⁻¹ x [N s],   ξ̇ = F - n,   n = m v_x r [l_r, l_f]/L:
-n is the force that holds a steady turn. Equation numbers: Hong and Choi.
+ẋ = K F - [v_x r, 0]; equation numbers: Hong and Choi.
 The tire's lag is dα'/dt = v_x/σ (α - α'), σ the relaxation length (Pacejka, Tyre and Vehicle
 Dynamics, 2nd ed., (7.7)): it is solved exactly for α linear over the step, so that no short σ makes
 it unstable and σ = 0 is no lag at all.
@@ -16,6 +15,8 @@ from identifier.setup import Port
 from models.bicycle import BicycleParameters, bicycle
 
 OVER = ("x", "u", "v_x")
+WITH_A_Y = (*OVER, "a_y")
+_MOST_FELT = 98.0  # m/s²: no car feels more
 _SAMPLING = ("dt", "min_speed")
 
 
@@ -55,16 +56,37 @@ def sample_ports() -> Sample:
     )
 
 
+class Given(NamedTuple):
+    """A sample with a_y [m/s²], 0 where there is none.
+    has_a_y : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
+    """
+
+    sample: Sample
+    a_y: Any
+    has_a_y: Any
+    a_y_port: Any
+
+    @property
+    def ports(self) -> list[Any]:
+        """The ports of `WITH_A_Y`, then vehicle and sampling."""
+        s = self.sample
+        return [s.x, s.u, s.v_x, self.a_y_port, s.vehicle, s.sampling]
+
+    @property
+    def r(self) -> Any:
+        """The measured yaw rate [rad/s]."""
+        return self.sample.x[1]
+
+
+def given_ports() -> Given:
+    a_y = ca.SX.sym("a_y")
+    has_a_y = ca.fabs(a_y) < _MOST_FELT  # NaN is not
+    return Given(sample_ports(), ca.if_else(has_a_y, a_y, 0), has_a_y, a_y)
+
+
 def axle_loads(p: BicycleParameters, gravity: float) -> Any:
     """Return the static axle loads F_z (2,) [N].   gravity : g [m/s²]."""
     return p.m * gravity / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
-
-
-def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
-    """Return n, the axle forces of a steady turn (2,) [N].
-    v_x : longitudinal speed [m/s].   x : [v_y, r] (2,).
-    """
-    return p.m * v_x * x[1] / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
 
 
 def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:

@@ -15,9 +15,9 @@ from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
 
 LARGEST_SLIP = 0.25  # rad: an axle slides long before
-SHARES = (0.02, 0.04, 0.08, 0.16, 0.28, 0.44, 0.64, 1.0)  # of the largest slip that is judged
-MOST_GRIP = 1.8  # static axle loads: no road tire has more
-LEAST_GRIP = 0.03  # static axle loads at a slip of 0.1 rad and more: less is no road
+_SHARES = (0.02, 0.04, 0.08, 0.16, 0.28, 0.44, 0.64, 1.0)  # of the largest slip that is judged
+_MOST_GRIP = 1.8  # static axle loads: no road tire has more
+_LEAST_GRIP = 0.03  # static axle loads at a slip of 0.1 rad and more: less is no road
 WRONG_WAY = 0.03  # static axle loads that a force may push the wrong way, for offsets of sensors
 
 
@@ -48,11 +48,11 @@ def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SL
         return "a force is not finite"
     for i, axle in enumerate(("front", "rear")):
         push = pushes[:, i]
-        if push.max() > MOST_GRIP:
+        if push.max() > _MOST_GRIP:
             return f"the {axle} axle would carry {push.max():.2f} times its load"
         if push.min() < -WRONG_WAY:
             return f"the {axle} axle would push the wrong way by {-push.min():.2f} of its load"
-        if largest >= 0.1 and push[..., -1].min() < LEAST_GRIP:
+        if largest >= 0.1 and push[..., -1].min() < _LEAST_GRIP:
             return f"the {axle} axle would slide at {push[..., -1].min():.2f} of its load"
         if not (push[0].sum(axis=0)[0] > 0.0):
             return f"the force of the {axle} axle does not rise with slip"
@@ -64,7 +64,7 @@ def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Ar
     arm, load = car_numbers(tire.vehicle)[:, [0, 3]].T
     load = load * tire.vehicle.load_ratio(v_x)
     signs = np.array([1.0, -1.0])[:, None]
-    alpha = signs * largest * np.array(SHARES)
+    alpha = signs * largest * np.array(_SHARES)
     r = np.array([0.0, 1.0, -1.0])[:, None, None] * GRAVITY / (3.0 * v_x)
     alpha, r = np.broadcast_arrays(alpha[None], r)
     v_y = arm[1] * -r - v_x * np.tan(alpha)  # both axles at the same slip

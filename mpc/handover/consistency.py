@@ -22,9 +22,6 @@ from mpc.loop.sensing import Measured
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
     """How far good sensors may disagree.
-
-    Parameters
-    ----------
     rate : l, at which an observer is pulled to its measurement [1/s].
     along : of v_x against the position [m/s], and ...
     along_share : ... for each m/s of speed [-]: a wheel's radius is known to about that.
@@ -65,26 +62,22 @@ class Residual(NamedTuple):
         return f"{self.relation} disagree by {self.value:.2g} {self.unit}"
 
 
-NONE = Residual("", 0.0, "", 0.0)
-NOT_A_NUMBER = Residual("a sensor shows no number: sensors", math.inf, "", math.inf)
+_NONE = Residual("", 0.0, "", 0.0)
+_NOT_A_NUMBER = Residual("a sensor shows no number: sensors", math.inf, "", math.inf)
 
 
 class Consistency:
     """Watches the sensors of a car, sample by sample.
 
     Attributes: agrees, whether they do and did for a while; worst, of the last sample.
-
-    Parameters
-    ----------
     dt : sampling interval [s].
-    tolerances : how far good sensors may disagree; None takes the default.
     """
 
-    def __init__(self, dt: float, tolerances: Tolerances | None = None) -> None:
-        self._dt, self._allowed = dt, tolerances or Tolerances()
+    def __init__(self, dt: float) -> None:
+        self._dt, self._allowed = dt, Tolerances()
         self._calm, self._calm_asked = math.inf, self._allowed.calm
         self._begin()
-        self.agrees, self.worst = True, NONE
+        self.agrees, self.worst = True, _NONE
 
     def _begin(self) -> None:
         self._predicted: tuple[float, ...] | None = None  # X, Y, ψ, v_y as predicted
@@ -115,7 +108,7 @@ class Consistency:
         allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
         if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST_SHOWN):
             self._begin()
-            return NOT_A_NUMBER
+            return _NOT_A_NUMBER
         cos_psi, sin_psi = math.cos(m.psi), math.sin(m.psi)
         rates = (
             m.v_x * cos_psi - m.v_y * sin_psi,

@@ -29,9 +29,6 @@ COLUMNS = ("v_x", "v_y", "r", "delta")  # m/s, m/s, rad/s, rad
 
 class Window:
     """The last samples in the order of `COLUMNS`, oldest first, always in one piece of memory.
-
-    Parameters
-    ----------
     seconds : longest time that can be looked back on [s].
     dt : sampling interval [s].
     """
@@ -76,7 +73,7 @@ class Window:
         self._kept = 0
 
 
-SHORTEST_LAG = 1e-3  # m
+_SHORTEST_LAG = 1e-3  # m
 
 
 def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float) -> Array:
@@ -113,7 +110,7 @@ def axle_scan(structure: Any, k: int) -> Scan:
         slip: Any = ca.vertcat(*structure.slip(at))
         if structure.lagged:
             sigma = ca.vertcat(*structure.lag_length((lagged[0, i], lagged[1, i]), at))
-            share = 1 - ca.exp(-v_x * dt / ca.fmax(sigma, SHORTEST_LAG))
+            share = 1 - ca.exp(-v_x * dt / ca.fmax(sigma, _SHORTEST_LAG))
             slip = ca.if_else(begun > 0, lagged[:, i] + share * (slip - lagged[:, i]), slip)
         slips.append(slip)
         forces.append(ca.vertcat(*structure.force((slip[0], slip[1]), at)))
@@ -131,9 +128,6 @@ def axle_scan(structure: Any, k: int) -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorModel:
     """What errors are expected of a good tire.
-
-    Parameters
-    ----------
     stretch : time over which forces are averaged [s].
     settle : time before the first judged stretch, for the lag of the tire [s].
     error : standard deviation [static axle loads]; 0.02 is 0.2 m/s².
@@ -172,9 +166,6 @@ class ChiSquare(NamedTuple):
 
 class Judge:
     """Chi-squares of tires over samples that come at one interval.
-
-    Parameters
-    ----------
     dt : sampling interval [s].
     expected : errors of a good tire; None takes the default.
     """
@@ -196,14 +187,6 @@ class Judge:
         seconds : in which the judged stretches end [s].
         """
         return seconds + (self._settle + self._h + 1) * self.dt
-
-    def errors(self, tire: PredictionTire, samples: Array) -> tuple[Array, Array]:
-        """Return e (m, 2) and the forces that it is the error of (m, 2) [static axle loads].
-
-        samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
-        """
-        e, force = self._errors(tire, tire.weights[None], samples)
-        return e[0], force[0]
 
     def chi_square(self, tire: PredictionTire, samples: Array) -> ChiSquare:
         """Return how badly a tire explains samples."""

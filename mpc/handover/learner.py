@@ -13,20 +13,19 @@ from mpc.loop.sensing import Measured
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
 
-HALVINGS = 6
+_HALVINGS = 6
 
 
-class Step(NamedTuple):
+class _Step(NamedTuple):
     """A move of the weights.
 
     tire : to steer with now.   share : of the way that was left [-], 0 where nothing could move.
-    jump : of the steering rate that comes from it [rad/s].   arrived : whether nothing is left.
+    jump : of the steering rate that comes from it [rad/s].
     """
 
     tire: PredictionTire
     share: float
     jump: float
-    arrived: bool
 
 
 def blended(
@@ -36,7 +35,7 @@ def blended(
     *,
     planned: Callable[[PredictionTire], float],
     most: float,
-) -> Step:
+) -> _Step:
     """Return the next weights on the way to a target, on which the plan does not jump.
 
     The share is halved until the tracker, asked what it would plan with the weights in the same
@@ -50,19 +49,18 @@ def blended(
         raise ValueError(f"weights of {now.structure} cannot move to those of {target.structure}")
     way = target.weights - now.weights
     if not np.any(way):
-        return Step(target, 1.0, 0.0, True)
+        return _Step(target, 1.0, 0.0)
     reference = planned(now)
-    for _ in range(HALVINGS):
-        whole = share >= 1.0
-        tire = target if whole else now._replace(weights=now.weights + share * way)
+    for _ in range(_HALVINGS):
+        tire = target if share >= 1.0 else now._replace(weights=now.weights + share * way)
         jump = abs(planned(tire) - reference)
         if jump <= most:
-            return Step(tire, share, jump, whole)
+            return _Step(tire, share, jump)
         share *= 0.5
-    return Step(now, 0.0, 0.0, False)
+    return _Step(now, 0.0, 0.0)
 
 
-class Moved(NamedTuple):
+class _Moved(NamedTuple):
     """A move of weights at a time [s]: share of the way, jump of the planned rate [rad/s]."""
 
     t: float
@@ -74,24 +72,14 @@ class Learner:
     """Keeps a tracker on the tire that its supervisor names.
 
     Weights go to a new target within the blending time of the rules, in steps that change the
-    planned steering rate by no more than `largest_jump`, or `quick_jump` for another friction.
+    planned steering rate by no more than they allow.
 
     Attributes: supervisor; moves, one for each period in which weights moved or could not.
-
-    Parameters
-    ----------
-    largest_jump : of the planned steering rate [rad/s].
-    quick_jump : the same where the friction has changed [rad/s].
     """
 
-    def __init__(
-        self, supervisor: Supervisor, *, largest_jump: float = 0.05, quick_jump: float = 0.2
-    ) -> None:
-        if not (largest_jump > 0.0 and quick_jump > 0.0):
-            raise ValueError(f"jumps must be positive, they are {largest_jump} and {quick_jump}")
+    def __init__(self, supervisor: Supervisor) -> None:
         self.supervisor = supervisor
-        self.moves: list[Moved] = []
-        self._jump, self._quick_jump = largest_jump, quick_jump
+        self.moves: list[_Moved] = []
         self._sensors = Consistency(supervisor.identifier.method.dt)
         self._steered: deque[float] = deque()  # what was asked of the wheels, newest last [rad]
         self._left = 0.0  # time in which to arrive [s]
@@ -138,10 +126,11 @@ class Learner:
         target = self.supervisor.target
         if tracker.tire is target:
             return
-        most = self._quick_jump if self._quick else self._jump
+        rules = self.supervisor.rules
+        most = rules.quick_jump if self._quick else rules.jump
         share = min(1.0, tracker.period / max(self._left, tracker.period))
         step = blended(tracker.tire, target, share, planned=tracker.previewed_rate, most=most)
         if step.share > 0.0:
             tracker.set_tire(step.tire)
         self._left = max(self._left - tracker.period, tracker.period)
-        self.moves.append(Moved(self.supervisor.t, step.share, step.jump))
+        self.moves.append(_Moved(self.supervisor.t, step.share, step.jump))

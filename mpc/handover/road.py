@@ -18,11 +18,11 @@ from mpc.tires import PredictionTire
 # known after a third of a second, when a whole curve is not.
 
 LEAST = 0.15  # of the friction that a tire was learnt on: ice, after a dry road
-GRID = 13
+_GRID = 13
 PRIOR_SD = 0.7  # standard deviation of ln μ where nothing is seen
 
 
-class FrictionFit(NamedTuple):
+class _FrictionFit(NamedTuple):
     """Friction over that of the tire it began with [-], the tire, and how it explains the samples.
 
     `gain` is by how much the chi-square, with what is known of roads, falls by the change.
@@ -48,11 +48,6 @@ def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     return tire._replace(weights=weights)
 
 
-def can_scale(tire: PredictionTire) -> bool:
-    """Return whether a tire can be scaled to another friction."""
-    return tire.structure.at_friction(tire.weights, 1.0) is not None
-
-
 def fit_friction(
     judge: Judge,
     tire: PredictionTire,
@@ -61,7 +56,7 @@ def fit_friction(
     known: float = 1.0,
     between: tuple[float, float] = (LEAST, 1.0),
     scale: float = 1.0,
-) -> FrictionFit:
+) -> _FrictionFit:
     """Return the friction that explains samples best, and what is known of roads beforehand.
 
     known : friction over that of the tire that was taken so far [-].
@@ -76,15 +71,15 @@ def fit_friction(
         total = np.array([chi_square.total for chi_square in chi_squares])
         return total / scale + ((log_ratios - center) / PRIOR_SD) ** 2, chi_squares
 
-    grid = np.linspace(least, most, GRID)
+    grid = np.linspace(least, most, _GRID)
     cost, _ = costs(grid)
-    around = grid[int(np.argmin(cost))] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, GRID)
+    around = grid[int(np.argmin(cost))] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, _GRID)
     fine = np.append(np.clip(around, least, most)[:-1], center)  # what is known, too
     cost, chi_squares = costs(fine)
     best = int(np.argmin(cost))
     ratio = math.exp(fine[best])
     gain = float(cost[-1] - cost[best])
-    return FrictionFit(ratio, at_friction(tire, ratio), chi_squares[best], gain)
+    return _FrictionFit(ratio, at_friction(tire, ratio), chi_squares[best], gain)
 
 
 class Road(NamedTuple):
@@ -145,12 +140,12 @@ def look_at_road(
     baseline : mean chi-square of the tire in use where the road does not change [-].
     trusted : slip up to which a tire must be one [rad].
     """
-    if not can_scale(road.base):
+    if road.base.structure.at_friction(road.base.weights, 1.0) is None:
         return None
 
     def fit(
         seconds: float, least: float, most: float, *, wrong: float = 1.0
-    ) -> tuple[FrictionFit, ChiSquare] | None:
+    ) -> tuple[_FrictionFit, ChiSquare] | None:
         if not least < most:
             return None
         samples = window.last(judge.lookback(seconds))
@@ -164,7 +159,7 @@ def look_at_road(
         complaint = tire_complaint(found.tire, float(samples[-1, 0]), trusted)
         return None if complaint is not None else (found, now)
 
-    def change(verdict: Verdict, found: FrictionFit, now: ChiSquare, since: float) -> Change:
+    def change(verdict: Verdict, found: _FrictionFit, now: ChiSquare, since: float) -> Change:
         estimate = road._replace(ratio=found.ratio, changed_at=since)
         return Change(verdict, estimate, found.tire, now.total, found.chi_square.total)
 

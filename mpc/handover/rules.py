@@ -12,9 +12,6 @@ class Rules:
     """Times and evidence of handing over.
 
     Evidence is a difference of chi-squares, -2 ln of a ratio of likelihoods: 8 is one in 50.
-
-    Parameters
-    ----------
     every : time between two looks at the friction [s].
     learnt_every : time between two looks at what was learnt [s].
     seconds : that a learnt tire must explain better than the one in use [s].
@@ -36,6 +33,7 @@ class Rules:
         that was less than this before [s].
     blend, quick_blend : time in which weights move to those handed over [s], for a learnt tire and
         for another friction.
+    jump, quick_jump : largest change of the planned steering rate by such a move [rad/s].
     """
 
     every: float = 0.05
@@ -56,6 +54,8 @@ class Rules:
     relapse: float = 10.0
     blend: float = 0.4
     quick_blend: float = 0.08
+    jump: float = 0.05
+    quick_jump: float = 0.2
 
     def __post_init__(self) -> None:
         require_positive_fields(self)

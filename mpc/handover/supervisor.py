@@ -16,15 +16,12 @@ from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
 
-LEARNS = 0.005  # rad: below, a tire is a straight line in noise
-BEYOND = 1.2  # slip that is trusted over the largest one that was learnt from
+_LEARNS = 0.005  # rad: below, a tire is a straight line in noise
+_BEYOND = 1.2  # slip that is trusted over the largest one that was learnt from
 
 
 class Excitation:
     """What a drive had to teach: time of slip, and how much of it.
-
-    Parameters
-    ----------
     dt : sampling interval [s].
     least_time : with slip at both axles before anything may be handed over [s].
     """
@@ -41,7 +38,7 @@ class Excitation:
         r : yaw rate [rad/s].   delta : angle of the front road wheels [rad].
         """
         size = np.abs(slips(np.array([[v_x, v_y, r, delta]]), self._vehicle))[0]
-        self._time += self._dt * (size >= LEARNS)
+        self._time += self._dt * (size >= _LEARNS)
         self._largest += 0.1 * np.maximum(size - self._largest, 0.0)  # not of one noisy sample
 
     def complaint(self, model: TireModel, samples: Array) -> str | None:
@@ -59,7 +56,7 @@ class Excitation:
         if model.known_slip is not None:
             driven = np.quantile(np.abs(slips(samples, self._vehicle)), 0.95, axis=0)
             for i, axle in enumerate(("front", "rear")):
-                known = BEYOND * model.known_slip[i] + LEARNS
+                known = _BEYOND * model.known_slip[i] + _LEARNS
                 if driven[i] > known:
                     return (
                         f"the {axle} axle slips {driven[i]:.3f} rad, it is known to {known:.3f} rad"
@@ -73,7 +70,7 @@ class Excitation:
         """
         if tire.structure.saturates:
             return LARGEST_SLIP
-        return float(np.clip(BEYOND * self._largest.min(), 2.0 * LEARNS, LARGEST_SLIP))
+        return float(np.clip(_BEYOND * self._largest.min(), 2.0 * _LEARNS, LARGEST_SLIP))
 
 
 def slips(samples: Array, vehicle: Vehicle) -> Array:
@@ -85,7 +82,7 @@ def slips(samples: Array, vehicle: Vehicle) -> Array:
     return measured_slip(vehicle.l_f, vehicle.l_r, v_x=v_x, v_y=v_y, r=r, delta_f=delta)
 
 
-LOST = 5  # samples in a row after which a window is none
+_LOST = 5  # samples in a row after which a window is none
 
 
 class Supervisor:
@@ -97,9 +94,6 @@ class Supervisor:
     where that explains the last moments far better; it is corrected as more is seen.
 
     Attributes: target; decisions, those that changed it, and the last one.
-
-    Parameters
-    ----------
     judge : of chi-squares; None expects the usual errors.
     proven : whether that tire is one of this car, so that what it does not explain is the road;
         else a friction is looked for only after a learnt tire took over.
@@ -180,7 +174,7 @@ class Supervisor:
             self._lost += 1
             sample = self._sample  # for a moment the last one stands for it
         self._sample = sample
-        if self._lost > LOST or not sample[0] >= self.identifier.method.min_speed:
+        if self._lost > _LOST or not sample[0] >= self.identifier.method.min_speed:
             self._window.clear()
             return None
         self._window.add(sample)

@@ -11,48 +11,19 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from codegen.arrays import Array
 from models.sensors import is_shown
-from mpc.cars import Car, CarState
-from mpc.loop.dither import Dither
-from mpc.loop.lateral import TellsLateral
+from mpc.cars import CarState, DoubleTrackCar
+from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
-from mpc.realtime.instance import Command, Measurement
-
-
-class PathTracker(Protocol):
-    """Steers a car along a path, one control period at a time; `mpc.realtime.Tracker` is one."""
-
-    @property
-    def period(self) -> float:
-        """Control period [s]."""
-
-    @property
-    def times(self) -> Array:
-        """Times after the measurement at which it wants to know the road [s], (k,)."""
-
-    @property
-    def plan_times(self) -> Array:
-        """Times after the measurement of the states of its plan [s], (N + 1,)."""
-
-    def step(self, measurement: Measurement) -> Command:
-        """Return what to steer."""
-
-    def reset(self) -> None:
-        """Forget what was planned and steered."""
-
+from mpc.realtime.instance import Measurement
+from mpc.realtime.tracker import Tracker
 
 COMPLETED = "reached the end"
-GUIDES = (
-    "X",
-    "Y",
-    "psi",
-    "v_x",
-)  # channels without which a car does not know where it is, for long
-SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
-SLOWEST = 1.0  # m/s
+GUIDES = ("X", "Y", "psi", "v_x")  # without which a car does not know where it is, for long
+_SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
+_SLOWEST = 1.0  # m/s
 
 
 class LearningTires(Protocol):
@@ -64,16 +35,15 @@ class LearningTires(Protocol):
 
 def drive(
     path: Path,
-    car: Car,
-    tracker: PathTracker,
+    car: DoubleTrackCar,
+    tracker: Tracker,
     *,
     speed: SpeedProfile | float,
     sensors: Measures | None = None,
     delay: int = 1,
     rng: np.random.Generator,
     learner: LearningTires | None = None,
-    lateral: TellsLateral | None = None,
-    dither: Dither | None = None,
+    lateral: LateralVelocity | None = None,
     laps: float = 1.0,
     time_limit: float = 300.0,
     widest: float = 2.0,
@@ -88,7 +58,7 @@ def drive(
     speed : wanted along the path, [m/s] where it is a number.
     sensors : of the car; None measures exactly.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-    they show.   dither : weaves along the path to teach; None keeps to it.
+    they show.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
     widest : deviation at which the car has left the path [m].
@@ -111,7 +81,7 @@ def drive(
     waiting = deque([0.0] * delay)
     record = Recorder(plan_every)
     here, last_s = path.project(state.X, state.Y, 0.0), 0.0
-    place = Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
+    place = _Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
     ending = ""
     while not ending:
         shown = measured = sensors.measure(state, rng)
@@ -134,8 +104,6 @@ def drive(
             kappa=ahead.kappa,
             v_x=ahead.v_x,
         )
-        if dither is not None:
-            situation = dither.displaced(situation, state.t, tracker.times, tracker.period)
         command = tracker.step(situation)
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
@@ -162,7 +130,7 @@ def drive(
     )
 
 
-class Place(NamedTuple):
+class _Place(NamedTuple):
     """Where the car is taken to be, [m, rad], and how it moves, [m/s, rad/s].
 
     silent : for how long each of `GUIDES` has shown no number [s].
@@ -194,7 +162,7 @@ class Place(NamedTuple):
         return f"no number of {lost} for {blind:g} s" if lost else ""
 
 
-def _located(measured: Measured, last: Place, dt: float) -> Place:
+def _located(measured: Measured, last: _Place, dt: float) -> _Place:
     """Return the measured place; what shows no number goes on by dead reckoning."""
 
     def shown(channel: str, otherwise: float) -> float:
@@ -210,10 +178,10 @@ def _located(measured: Measured, last: Place, dt: float) -> Place:
         0.0 if is_shown(channel, getattr(measured, channel)) else time + dt
         for channel, time in zip(GUIDES, last.silent, strict=True)
     )
-    return Place(X, Y, psi, v_x, v_y, r, silent)
+    return _Place(X, Y, psi, v_x, v_y, r, silent)
 
 
-def _at_the_start(path: Path, car: Car, profile: SpeedProfile) -> CarState:
+def _at_the_start(path: Path, car: DoubleTrackCar, profile: SpeedProfile) -> CarState:
     """Return the car on the path, along it, at the wanted speed."""
     X, Y, psi = (float(value) for value in path.pose(0.0))
     return car.start(float(profile.at(0.0)), X=X, Y=Y, psi=psi)
@@ -225,10 +193,10 @@ def _ending(
     """Return why the drive is over, or nothing while it goes on."""
     if abs(here.e_y) > widest:
         return f"left the path by more than {widest:g} m"
-    if abs(math.atan2(state.v_y, state.v_x)) > SPUN:
+    if abs(math.atan2(state.v_y, state.v_x)) > _SPUN:
         return "spun"
-    if state.v_x < SLOWEST:
-        return f"slower than {SLOWEST:g} m/s"
+    if state.v_x < _SLOWEST:
+        return f"slower than {_SLOWEST:g} m/s"
     if here.s >= goal:
         return COMPLETED
     return f"not there after {time_limit:g} s" if state.t >= time_limit else ""

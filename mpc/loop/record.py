@@ -38,9 +38,6 @@ class Plan(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drive:
     """A drive of n periods along a path; signals without another word are the truth, SI, ISO axes.
-
-    Parameters
-    ----------
     period : control period [s].
     t : time [s], (n,).
     X, Y, psi : position [m] and heading [rad], (n,).
@@ -115,15 +112,12 @@ class Drive:
         )
 
 
-OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "axle_force")
-OTHERS = ("s", "e_y", "e_psi", "kappa", "v_ref", "command", "solve_time", "status")
+_OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "axle_force")
+_OTHERS = ("s", "e_y", "e_psi", "kappa", "v_ref", "command", "solve_time", "status")
 
 
 class Recorder:
     """What was driven so far.
-
-    Parameters
-    ----------
     plan_every : periods between two plans that are kept; 0 keeps none.
     """
 
@@ -193,7 +187,7 @@ class Recorder:
         ending: str,
     ) -> Drive:
         """Return the drive; its control period is given in s."""
-        others = dict(zip(OTHERS, np.array(self._others).T, strict=True))
+        others = dict(zip(_OTHERS, np.array(self._others).T, strict=True))
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
         given: dict[str, Array] = {}
         if self._told:
@@ -204,7 +198,7 @@ class Recorder:
             vehicle=vehicle,
             path=path,
             period=period,
-            **{key: np.array([getattr(car, key) for car in self._cars]) for key in OF_THE_CAR},
+            **{key: np.array([getattr(car, key) for car in self._cars]) for key in _OF_THE_CAR},
             status=others.pop("status").astype(np.int64),
             **others,
             measured=measured,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import NamedTuple, Protocol, cast
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from models.faults import FaultError, SensorFault
 from models.friction import Friction
-from models.maneuvers import SlowlyIncreasingSteer
+from models.maneuvers import StepSteer
 from models.plant import Plant
 from models.sensors import Sensor, SensorError
 from models.tires import Tire
@@ -20,7 +20,7 @@ from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import CarState
 from mpc.path.path import Path
 
-EXACT = Sensor()
+_EXACT = Sensor()
 
 
 class Measured(NamedTuple):
@@ -37,22 +37,12 @@ class Measured(NamedTuple):
     a_y: float
 
 
-CHANNELS = Measured._fields[1:]
-
-
-class Measures(Protocol):
-    """What a loop measures a car with."""
-
-    def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
-        """Return what is measured at one instant."""
+_CHANNELS = Measured._fields[1:]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarSensors:
     """The sensors of a car, one for each channel; the defaults are exact.
-
-    Parameters
-    ----------
     X, Y : position [m].
     psi : heading [rad].
     v_x, v_y : speed over ground [m/s]; v_y None where nothing measures it.
@@ -63,14 +53,14 @@ class CarSensors:
         in the plane of the road.
     """
 
-    X: Sensor = EXACT
-    Y: Sensor = EXACT
-    psi: Sensor = EXACT
-    v_x: Sensor = EXACT
-    v_y: Sensor | None = EXACT
-    r: Sensor = EXACT
-    delta: Sensor = EXACT
-    a_y: Sensor = EXACT
+    X: Sensor = _EXACT
+    Y: Sensor = _EXACT
+    psi: Sensor = _EXACT
+    v_x: Sensor = _EXACT
+    v_y: Sensor | None = _EXACT
+    r: Sensor = _EXACT
+    delta: Sensor = _EXACT
+    a_y: Sensor = _EXACT
     body_fixed: bool = False
 
     def __post_init__(self) -> None:
@@ -81,16 +71,16 @@ class CarSensors:
     @property
     def channels(self) -> tuple[str, ...]:
         """What there is a sensor for, in the order of `Measured`."""
-        return tuple(name for name in CHANNELS if getattr(self, name) is not None)
+        return tuple(name for name in _CHANNELS if getattr(self, name) is not None)
 
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
         """Return what is measured at one instant.
 
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
-        noise = rng.standard_normal(len(CHANNELS))
+        noise = rng.standard_normal(len(_CHANNELS))
         values = []
-        for name, draw in zip(CHANNELS, noise, strict=True):
+        for name, draw in zip(_CHANNELS, noise, strict=True):
             sensor: Sensor | None = getattr(self, name)
             if sensor is None:
                 values.append(math.nan)
@@ -123,7 +113,7 @@ def inertial_unit() -> CarSensors:
     )
 
 
-BIAS_A_Y, BIAS_R = 0.05, 0.001  # m/s², rad/s: standard deviations from one unit to the next
+_BIAS_A_Y, _BIAS_R = 0.05, 0.001  # m/s², rad/s: standard deviations from one unit to the next
 
 
 def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
@@ -138,7 +128,7 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     """
     if rng is None:
         return CarSensors(v_y=None, body_fixed=True)
-    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [BIAS_R, BIAS_A_Y])
+    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [_BIAS_R, _BIAS_A_Y])
     return replace(
         same,
         v_y=None,
@@ -150,9 +140,6 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
 
 class FaultySensors:
     """Sensors of which some channels break for some time; a stuck one shows its last good value.
-
-    Parameters
-    ----------
     faults : what breaks, where channels are those of `Measured`.
     """
 
@@ -183,13 +170,15 @@ class FaultySensors:
         return shown
 
 
+Measures: TypeAlias = CarSensors | FaultySensors  # what a loop measures a car with
+
 # The wanted speed along a path, and what a tracker is given of the road ahead.
 #
 # v(s): wanted speed [m/s] at the samples of the path. The car's speed v_x runs to it with the time
 # constant 1/k of the driver's gain, so that ahead it is v(s(t)) + (v_x - v(s)) exp(-k t).
 
 
-class Preview(NamedTuple):
+class _Preview(NamedTuple):
     """The road at some times ahead, each (k,): arc length [m], curvature [1/m], speed [m/s]."""
 
     s: Array
@@ -199,9 +188,6 @@ class Preview(NamedTuple):
 
 class SpeedProfile:
     """A wanted speed along a path.
-
-    Parameters
-    ----------
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
     """
 
@@ -236,7 +222,7 @@ class SpeedProfile:
         slope = 0.0 if beyond else float(self.path.along(self._acceleration, s))
         return float(self.at(s)) + slope / gain
 
-    def ahead(self, s: float, v_x: float, t: Array, gain: float) -> Preview:
+    def ahead(self, s: float, v_x: float, t: Array, gain: float) -> _Preview:
         """Return the road that the car will be on.
 
         s : arc length now [m].   v_x : speed now [m/s].   t : times from now [s], (k,).
@@ -244,7 +230,7 @@ class SpeedProfile:
         """
         error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
         there = self._place(self._time(s) + t) + error * (1.0 - fades) / gain
-        return Preview(there, self.path.curvature(there), self.at(there) + error * fades)
+        return _Preview(there, self.path.curvature(there), self.at(there) + error * fades)
 
     def _time(self, s: float) -> float:
         """Return the time at which a car at the wanted speed is at s, laps included."""
@@ -271,8 +257,8 @@ class SpeedProfile:
 # The driven axle also holds the speed against the drag of cornering, so that this limit lies a few
 # per cent below the sum of what the tires could give to the side alone.
 
-RAMP_TIME = 20.0  # s
-LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
+_RAMP_TIME = 20.0  # s
+_LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 
 
 def cornering_limit(
@@ -290,10 +276,8 @@ def cornering_limit(
 @cache
 def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, speed: float) -> float:
     """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
-    rate = LARGEST_ANGLE * mu / RAMP_TIME
-    ramp = SlowlyIncreasingSteer(
-        amplitude=LARGEST_ANGLE * mu, rate=rate, rate_limit=rate, onset=0.1, duration=RAMP_TIME
-    )
+    rate = _LARGEST_ANGLE * mu / _RAMP_TIME
+    ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
     plant = Plant(vehicle, cast(Tire | None, tire))
     run = plant.simulate(ramp, speed=speed, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

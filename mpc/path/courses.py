@@ -19,8 +19,6 @@ from mpc.path.path import Path
 # Over the easing of a turn, κ goes from 0 to 1/R as 3 u² - 2 u³: dκ/ds is continuous. The turn of
 # the heading over an easing is half that of the same length at 1/R.
 
-_SHORTEST_FREE = 1.0  # m, of a straight that closes a course
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straight:
@@ -46,7 +44,7 @@ class Straight:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
-    """A turn at constant radius between two easings.
+    """A turn at constant radius between two easings, which it must have room for.
     radius : of the constant part [m].
     angle : heading gained over all of it [rad], > 0 to the left.
     easing : length over which the curvature rises, and falls again [m].
@@ -55,15 +53,6 @@ class Turn:
     radius: float
     angle: float
     easing: float
-
-    def __post_init__(self) -> None:
-        if not (self.radius > 0.0 and self.easing > 0.0 and math.isfinite(self.length)):
-            raise PathError(f"radius and easing of a turn must be positive and finite: {self}")
-        if abs(self.angle) * self.radius < self.easing:
-            raise PathError(
-                f"a turn by {self.angle:.4g} rad at {self.radius} m has an easing of at most "
-                f"{abs(self.angle) * self.radius:.4g} m, it is {self.easing}"
-            )
 
     @property
     def length(self) -> float:
@@ -104,29 +93,6 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
         turned, kappa[inside] = section.heading(s[inside] - starts[i])
         psi[inside] = headings[i] + turned
     return line_from_heading(psi, kappa, float(starts[-1]) / steps)
-
-
-def close(sections: Sequence[Section], free: tuple[int, int]) -> list[Section]:
-    """Choose the lengths of two straights so that the course ends where it starts.
-    sections : in driving order; they must turn by a multiple of 2 pi altogether.
-    free : which two sections are straights of free length; they must not be parallel.
-    """
-    turned = sum(section.angle for section in sections)
-    if abs(math.remainder(turned, 2.0 * math.pi)) > 1e-9 or turned == 0.0:
-        raise PathError(f"a closed course must turn by 2 pi or a multiple, it turns by {turned}")
-    line = line_along(sections)
-    headings = np.append(0.0, np.cumsum([section.angle for section in sections]))[list(free)]
-    directions = np.array([np.cos(headings), np.sin(headings)])
-    if abs(np.linalg.det(directions)) < 0.1:
-        raise PathError(f"straights {free} must not be parallel, they head {headings.tolist()}")
-    missing = np.linalg.solve(directions, [-line.X[-1], -line.Y[-1]])
-    closed = list(sections)
-    for i, more in zip(free, missing, strict=True):
-        length = closed[i].length + float(more)
-        if not (isinstance(closed[i], Straight) and length >= _SHORTEST_FREE):
-            raise PathError(f"section {i} cannot close the course with a length of {length:.4g} m")
-        closed[i] = Straight(length=length)
-    return closed
 
 
 def constant_radius(
@@ -178,7 +144,7 @@ def handling_course(*, spacing: float = 0.25) -> Path:
     '802 m, tightest radius 12.0 m'
     """
     sections: list[Section] = [
-        Straight(length=50.0),
+        Straight(length=51.1838346911392),  # this one and the last close the course
         Turn(radius=30.0, angle=radians(110.0), easing=12.0),
         Straight(length=30.0),
         Turn(radius=12.0, angle=radians(-180.0), easing=7.0),
@@ -194,22 +160,19 @@ def handling_course(*, spacing: float = 0.25) -> Path:
         Turn(radius=45.0, angle=radians(55.0), easing=16.0),
         Straight(length=10.0),
         Turn(radius=35.0, angle=radians(-55.0), easing=14.0),
-        Straight(length=30.0),
+        Straight(length=21.593884724428456),
         Turn(radius=25.0, angle=radians(130.0), easing=10.0),
     ]
-    line = line_along(close(sections, (0, 16)), spacing=spacing)
+    line = line_along(sections, spacing=spacing)
     path = Path.from_line(line, name="handling course", closed=True)
-    return Path.from_line(line, name=path.name, closed=True, cones=pairs_beside(path))
+    return Path.from_line(line, name=path.name, closed=True, cones=_pairs_beside(path))
 
 
-def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Array:
-    """Return pairs of cones on both sides of a path, X and Y [m], (k, 2).
-    gap : about the distance from pair to pair along the path [m].
-    half_width : from the path to a cone [m].
-    """
-    s = np.linspace(0.0, path.length, max(2, round(path.length / gap)), endpoint=not path.closed)
+def _pairs_beside(path: Path) -> Array:
+    """Return pairs of cones, 2.5 m beside a path and about every 8 m, X and Y [m], (k, 2)."""
+    s = np.linspace(0.0, path.length, round(path.length / 8.0), endpoint=not path.closed)
     X, Y, psi = path.pose(s)
-    across = half_width * np.column_stack((-np.sin(psi), np.cos(psi)))
+    across = 2.5 * np.column_stack((-np.sin(psi), np.cos(psi)))
     middle = np.column_stack((X, Y))
     return np.vstack((middle + across, middle - across))
 

@@ -17,11 +17,13 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from codegen.arrays import Array
+from models.rules import require_positive
 from mpc.path.line import Line, PathError
 from mpc.path.path import Path
 from mpc.path.waypoints import sample
 
-DEGREE = 5
+_DEGREE = 5
+_KNOTS = 1.0  # m, about their distance
 _PER_INTERVAL = 4  # places between two knots where limits hold
 _GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
 _CONE_SPACING = 3.0  # m
@@ -64,23 +66,18 @@ def line_through_gates(
     clearance: float,
     easing: float,
     spacing: float = 0.25,
-    knots: float = 1.0,
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
     start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
     spacing : longest step of the samples [m].
-    knots : about the distance of the knots of the spline [m].
     """
-    numbers = {"easing": easing, "spacing": spacing, "knots": knots, "length": end[0] - start[0]}
-    for name, value in {**numbers, "clearance": clearance}.items():
-        if not (value > 0.0 and isfinite(value)):
-            raise PathError(f"gates: {name} must be positive and finite, it is {value}")
+    require_positive(PathError, clearance=clearance, spacing=spacing)
     for gate in gates:
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")
-    spline, inner = _straightest(tuple(gates), start, end, clearance, easing, knots)
+    spline, inner = _straightest(tuple(gates), start, end, clearance, easing)
     return sample(spline, inner, spacing, "gates")
 
 
@@ -91,15 +88,14 @@ def _straightest(
     end: tuple[float, float],
     clearance: float,
     easing: float,
-    knots: float,
 ) -> tuple[BSpline, Array]:
     """Return the line as a spline and its knots; a course is asked for once for each drive."""
-    intervals = max(DEGREE + 1, ceil((end[0] - start[0]) / knots))
+    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / _KNOTS))
     inner = np.linspace(start[0], end[0], intervals + 1)
-    t = np.concatenate((np.full(DEGREE, start[0]), inner, np.full(DEGREE, end[0])))
+    t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
     c = _coefficients(t, inner, gates, start, end, clearance, easing)
-    greville = np.array([t[i + 1 : i + DEGREE + 1].mean() for i in range(c.size)])  # of y = x
-    return BSpline(t, np.column_stack((greville, c)), DEGREE), inner
+    greville = np.array([t[i + 1 : i + _DEGREE + 1].mean() for i in range(c.size)])  # of y = x
+    return BSpline(t, np.column_stack((greville, c)), _DEGREE), inner
 
 
 def _coefficients(
@@ -111,7 +107,7 @@ def _coefficients(
     clearance: float,
     easing: float,
 ) -> Array:
-    n = t.size - DEGREE - 1
+    n = t.size - _DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
     x = np.unique(np.concatenate((x, edges[(edges > x[0]) & (edges < x[-1])])))
@@ -145,8 +141,8 @@ def _coefficients(
 
 def _basis(t: Array, x: Array, order: int) -> Any:
     """Return the sparse matrix from the coefficients to a derivative at x."""
-    n = t.size - DEGREE - 1
-    matrix = BSpline(t, np.eye(n), DEGREE)(x, nu=order)
+    n = t.size - _DEGREE - 1
+    matrix = BSpline(t, np.eye(n), _DEGREE)(x, nu=order)
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-12, 0.0, matrix)))
 
 
@@ -164,7 +160,7 @@ def _basis(t: Array, x: Array, order: int) -> Any:
 # ours is the one of smallest peak curvature, see the gates above.
 
 _CAR_WIDTH = 1.8  # m
-NARROWEST, WIDEST = 1.0, 2.6  # m, of a car
+_NARROWEST, _WIDEST = 1.0, 2.6  # m, of a car
 
 
 def iso_3888_1(
@@ -228,8 +224,8 @@ def iso_3888_2(
 
 
 def _checked(car_width: float) -> float:
-    if not NARROWEST <= car_width <= WIDEST:
-        raise PathError(f"car_width must be {NARROWEST} to {WIDEST} m, it is {car_width}")
+    if not _NARROWEST <= car_width <= _WIDEST:
+        raise PathError(f"car_width must be {_NARROWEST} to {_WIDEST} m, it is {car_width}")
     return car_width
 
 

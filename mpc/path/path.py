@@ -27,10 +27,10 @@ from mpc.path.waypoints import line_through, read_waypoints
 # s [m] -> X, Y [m], ψ [rad], κ [1/m]
 _PointOf: TypeAlias = Callable[[float], tuple[float, float, float, float]]
 
-LONGEST_STEP = 1.0  # m; shorter than any turn that a car can drive, so that no step skips a bend
+_LONGEST_STEP = 1.0  # m; shorter than any turn that a car can drive, so that no step skips a bend
 _SMALLEST_SLOPE = 0.3  # of 1 - κ e_y: near the center of a turn every s is as close as the next
-TOLERANCE = 1e-9  # m
-STEPS = 200
+_TOLERANCE = 1e-9  # m
+_STEPS = 200
 
 
 class Projection(NamedTuple):
@@ -68,15 +68,15 @@ def _walk_to_foot(
     deviation there.
     """
     s = near
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         X_s, Y_s, psi, kappa = point_of(s)
         cos_psi, sin_psi = math.cos(psi), math.sin(psi)
         along = (X - X_s) * cos_psi + (Y - Y_s) * sin_psi
         e_y = (Y - Y_s) * cos_psi - (X - X_s) * sin_psi
         step = along / max(1.0 - kappa * e_y, _SMALLEST_SLOPE)
-        step = min(max(step, -LONGEST_STEP), LONGEST_STEP)
+        step = min(max(step, -_LONGEST_STEP), _LONGEST_STEP)
         goal = min(max(s + step, near - search_distance), near + search_distance)
-        if abs(goal - s) < TOLERANCE:
+        if abs(goal - s) < _TOLERANCE:
             break
         s = goal
     return Projection(float(s), float(e_y), float(psi), float(kappa))

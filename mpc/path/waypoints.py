@@ -10,69 +10,35 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sparse
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
-from scipy.sparse.linalg import splu
+from scipy.interpolate import CubicSpline, splev, splprep
 
 from codegen.arrays import Array
 from codegen.escape import shown
 from models.schema import limits, read_text, require_few
 from mpc.path.line import Line, PathError, uniform_grid
 
-LEAST, MOST = -12.0, 18.0  # exponents of λ over the sixth power of the mean gap
-# Way-points that were measured, moved a little so that a line through them bends gently.
-#
-# Minimizes Σ |p - q|² + λ Σ g |D³ p|², D³ the third divided difference over the chord length: what
-# it leaves alone is a path of constant bending. λ is as large as the allowed distance permits.
-
-HALVINGS = 40
+_DEGREE = 5  # of the spline that smooths: its third derivative is continuous
 
 
-def smooth(points: Array, *, closed: bool, distance: float) -> Array:
-    """Move points so that their third differences get small.
+def _smoothed(points: Array, *, closed: bool, distance: float) -> Array:
+    """Move points that were measured a little, so that a line through them bends gently.
     points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
     distance : root mean square of how far they may move [m].
     """
-    if len(points) < 4 + closed:
-        return points
-    roughness = _roughness(points, closed)
-    q = points[:-1] if closed else points
-    one = sparse.identity(len(q), format="csc")
-    unit = float(np.mean(np.hypot(*np.diff(points, axis=0).T))) ** 6
-
-    def moved(exponent: float) -> Array:
-        return np.asarray(splu(one + 10.0**exponent * unit * roughness).solve(q))
-
-    low, high = LEAST, MOST
-    for _ in range(HALVINGS):  # the distance grows with λ
-        middle = 0.5 * (low + high)
-        apart = np.sqrt(np.mean(np.sum((moved(middle) - q) ** 2, axis=1)))
-        low, high = (middle, high) if apart < distance else (low, middle)
-    p = moved(low)
-    return np.vstack((p, p[:1])) if closed else p
-
-
-def _roughness(points: Array, closed: bool) -> Any:
-    """Return D' G D of the third divided differences D, weighted by the gaps G."""
-    gaps = np.hypot(*np.diff(points, axis=0).T)
-    if not closed:
-        gaps = np.append(gaps, np.inf)  # differences across the open ends become zero
-    n = gaps.size
-    D: Any = sparse.identity(n, format="csr")
-    around = sparse.csr_matrix((np.ones(n), (np.arange(n), (np.arange(n) + 1) % n)), (n, n))
-    span = np.zeros(n)
-    for order in range(3):
-        span = span + np.roll(gaps, -order)
-        D = sparse.diags(1.0 / span) @ (around @ D - D)
-    return (D.T @ sparse.diags(np.where(np.isfinite(span), span, 0.0) / 3.0) @ D).tocsc()
+    most = len(points) * distance**2
+    order = min(_DEGREE, len(points) - 1)
+    # Asked for all that it finds, it is silent where the distance is too small to be kept.
+    (spline, at), *_ = splprep(points.T, s=most, k=order, per=closed, quiet=1, full_output=1)
+    moved = np.column_stack(splev(at, spline))
+    return np.vstack((moved[:-1], moved[:1])) if closed else moved
 
 
 _FITS = 4
-FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
-SAME = 1e-6  # of the median gap: way-points as near as this are one
-PIECES = 8  # of every interval between knots, for its length
-_LOBES, SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
+_FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
+_SAME = 1e-6  # of the median gap: way-points as near as this are one
+_PIECES = 8  # of every interval between knots, for its length
+_LOBES, _SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
 
 
 class _Waypoints(NamedTuple):
@@ -112,7 +78,7 @@ def line_through(
     if not (smoothing >= 0.0 and np.isfinite(smoothing)):
         raise PathError(f"{name}: smoothing must be finite and not negative, it is {smoothing}")
     if smoothing > 0.0:
-        points = smooth(points, closed=closed, distance=smoothing)
+        points = _smoothed(points, closed=closed, distance=smoothing)
     spline = _fit(points, closed)
     line = sample(spline, spline.x, spacing, name)
     # A spike between two samples shows in the heading alone.
@@ -135,10 +101,10 @@ def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     """
     velocity, acceleration = spline.derivative(1), spline.derivative(2)
     # Quadrature needs pieces over which the speed changes little, even between far way-points.
-    t = np.interp(np.arange(PIECES * (knots.size - 1) + 1) / PIECES, np.arange(knots.size), knots)
+    t = np.interp(np.arange(_PIECES * (knots.size - 1) + 1) / _PIECES, np.arange(knots.size), knots)
     half = 0.5 * np.diff(t)
     nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)
-    length_at_t = np.append(0.0, np.cumsum(half * (_norm(velocity(nodes)) @ SHARES)))
+    length_at_t = np.append(0.0, np.cumsum(half * (_norm(velocity(nodes)) @ _SHARES)))
     try:
         s = uniform_grid(float(length_at_t[-1]), spacing)
     except PathError as error:
@@ -157,7 +123,7 @@ def _times(velocity: Any, t: Array, length_at_t: Array, s: Array) -> Array:
     for _ in range(20):
         half = 0.5 * (at - t[i])
         nodes = t[i][:, None] + half[:, None] * (1.0 + _LOBES)
-        error = half * (_norm(velocity(nodes)) @ SHARES) - rest
+        error = half * (_norm(velocity(nodes)) @ _SHARES) - rest
         at = np.clip(at - error / _norm(velocity(at)), t[i], t[i + 1])
         if np.abs(error).max() < 1e-12 * s[-1]:
             break
@@ -179,14 +145,14 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
         raise PathError(
             f"{name}: way-points must be finite, number {bad[0] + 1} is {points[bad[0]].tolist()}"
         )
-    far = np.flatnonzero(np.abs(points).max(axis=1) > FARTHEST)
+    far = np.flatnonzero(np.abs(points).max(axis=1) > _FARTHEST)
     if far.size:
         raise PathError(
-            f"{name}: way-points must lie within +-{FARTHEST:g} m, number {far[0] + 1} is "
+            f"{name}: way-points must lie within +-{_FARTHEST:g} m, number {far[0] + 1} is "
             f"{points[far[0]].tolist()}"
         )
     gaps = _norm(np.diff(points, axis=0))
-    if closed and gaps.size and _norm(points[0] - points[-1]) <= SAME * np.median(gaps):
+    if closed and gaps.size and _norm(points[0] - points[-1]) <= _SAME * np.median(gaps):
         points = points[:-1]
     fewest = 4 if closed else 2
     if len(points) < fewest:
@@ -198,7 +164,7 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
     if closed:
         points = np.vstack((points, points[:1]))
     gaps = _norm(np.diff(points, axis=0))
-    same = np.flatnonzero(gaps <= SAME * np.median(gaps))
+    same = np.flatnonzero(gaps <= _SAME * np.median(gaps))
     if same.size:
         raise PathError(
             f"{name}: neighboring way-points must differ, numbers {same[0] + 1} and "
@@ -214,7 +180,7 @@ def _fit(points: Array, closed: bool) -> Any:
         spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
         half = 0.5 * np.diff(t)
         nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)
-        lengths = half * (_norm(spline.derivative()(nodes)) @ SHARES)
+        lengths = half * (_norm(spline.derivative()(nodes)) @ _SHARES)
         t = np.append(0.0, np.cumsum(lengths))
     return spline
 

@@ -1,11 +1,9 @@
-"""Axle curves in closed form: Dugoff, Fiala, and the Magic Formula without E; F = curve(α) cos δ.
+"""Axle curves in closed form: linear, and the Magic Formula without E; F = curve(α) cos δ.
 
-Sources: Dugoff, Fancher and Segel, SAE 700377 (1970); Pacejka, Tyre and Vehicle Dynamics, ch. 3.2
-(Fiala's brush) and 2nd ed., (4.49). No longitudinal slip.
+Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49). No longitudinal slip.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,39 +11,6 @@ import numpy as np
 from codegen.arrays import Array
 from models.vehicle import Vehicle
 from mpc.tires.tire import Pair, Point, PredictionTire, SmallSlip, TireStructure
-
-
-def _dugoff(alpha: Any, C: Any, N: Any) -> Any:
-    demand = C * ca.tan(alpha)
-    half = 0.5 * N
-    lam = half / ca.fmax(ca.fabs(demand), half)
-    return demand * lam * (2 - lam)
-
-
-def _fiala(alpha: Any, C: Any, N: Any) -> Any:
-    demand = C * ca.tan(alpha)
-    x = ca.fmin(ca.fabs(demand) / (3 * N), 1)
-    gentle = demand * (1 - x + x * x / 3)
-    return ca.if_else(x < 1, gentle, N * ca.sign(demand))
-
-
-@dataclass(frozen=True, slots=True)
-class LimitedAxles(TireStructure):
-    """A curve by its stiffness and its largest force; w = [C_f, N_f, C_r, N_r].
-
-    C [N/rad] and N = μ F_z [N] are of an axle.
-    fiala : Fiala's brush, full sliding from C |tan α| = 3 N on; else Dugoff's C tan α f(λ),
-        f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1.
-    """
-
-    n_weights = 4
-
-    fiala: bool = False
-
-    def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body."""
-        curve, w = _fiala if self.fiala else _dugoff, at.w
-        return curve(slip[0], w[0], w[1]) * ca.cos(at.delta), curve(slip[1], w[2], w[3])
 
 
 @dataclass(frozen=True, slots=True)

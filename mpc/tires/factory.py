@@ -13,7 +13,7 @@ from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
-from mpc.tires.curves import LaggedAxles, LimitedAxles, MagicAxles, linear_tire
+from mpc.tires.curves import LaggedAxles, MagicAxles, linear_tire
 from mpc.tires.ladder import axle_tire, fit_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
 from mpc.tires.tire import PredictionTire
@@ -55,18 +55,12 @@ def _plain_curve(model: CurveModel) -> PredictionTire:
         return linear_tire(model.vehicle, q[:, 0])
     if model.curve == "magic_formula":
         return PredictionTire(MagicAxles(), q.ravel(), model.vehicle)
-    limit = q[:, 1] * np.array(model.vehicle.axle_loads)
-    return PredictionTire(LimitedAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
+    wheels = [DugoffTire(C_alpha=C / 2, C_kappa=C / 2, friction=friction) for C, friction in q]
+    return mounted_tire(model.vehicle, *wheels)
 
 
 def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
     return linear_tire(vehicle, np.full(2, 2.0 * tire.C_alpha))
-
-
-def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
-    structure = LimitedAxles(fiala=isinstance(tire, FialaTire))
-    pairs = [[2.0 * tire.C_alpha, tire.friction * load] for load in vehicle.axle_loads]
-    return PredictionTire(structure, np.array(pairs).ravel(), vehicle)
 
 
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
@@ -75,7 +69,5 @@ MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
 }  # fmt: skip
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,
-    DugoffTire: _limited,
-    FialaTire: _limited,
-    MagicFormula: mounted_tire,
+    **dict.fromkeys((DugoffTire, FialaTire, MagicFormula), mounted_tire),
 }

@@ -192,13 +192,6 @@ class CurveFitError(TireidError, ValueError):
     """A force curve is not one that a ladder of tanh can follow."""
 
 
-class Fit(NamedTuple):
-    """w_j [N] of an axle, (n,), and the largest error over the largest force [-]."""
-
-    W: Array
-    error: float
-
-
 def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
     largest : end of the grid [rad].
@@ -218,23 +211,16 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
         raise CurveFitError(f"force must rise with slip at zero, its slope is {stiffness} N/rad")
     narrowest = NARROWEST * float((peak / stiffness).min())
     ladder = np.array([narrowest * 2.0**j for j in range(UNITS)])
-    fits = [fitted(alpha, curve, ladder) for curve in force]
-    for name, fit in zip(("front", "rear"), fits, strict=True):
-        if not fit.error <= WORST:
-            raise CurveFitError(
-                f"the {name} force curve is fitted to {100 * fit.error:.2g} % of its peak only"
-            )
-    return ladder, np.stack([fit.W for fit in fits])
-
-
-def fitted(alpha: Array, force: Array, ladder: Array) -> Fit:
-    """Return the weights of one curve.
-    alpha : slips [rad], (k,).   force : at these slips [N], (k,).
-    ladder : slip scales [rad], (n,).
-    """
     T = np.tanh(alpha[:, None] / ladder)
-    W = np.asarray(np.linalg.lstsq(T, force, rcond=None)[0], dtype=np.float64)
-    return Fit(W, float(np.abs(T @ W - force).max() / np.abs(force).max()))
+    W = np.empty((2, UNITS))
+    for i, name in enumerate(("front", "rear")):
+        W[i] = np.linalg.lstsq(T, force[i], rcond=None)[0]
+        error = np.abs(T @ W[i] - force[i]).max() / peak[i]
+        if not error <= WORST:
+            raise CurveFitError(
+                f"the {name} force curve is fitted to {100 * error:.2g} % of its peak only"
+            )
+    return ladder, W
 
 
 # The true tire of a car as axle curves: what an MPC would use that knows what nobody can measure.
@@ -267,15 +253,15 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     return _fitted_tire(vehicle, alpha, force, lengths)
 
 
-def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
+def mounted_tire(vehicle: Vehicle, tire: Tire, rear: Tire | None = None) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
-    vehicle : the car; it needs no chassis.
+    vehicle : the car; it needs no chassis.   rear : tire of the rear axle; None takes the same.
     """
     alpha = slip_grid(LARGEST_SLIP)
     x = ca.SX.sym("alpha")
     force = []
-    for load in vehicle.axle_loads:
-        axle = ca.Function("axle", [x], [_both_sides(tire, x, 0.0, (0.5 * load, 0.5 * load), 1.0)])
+    for one, load in zip((tire, tire if rear is None else rear), vehicle.axle_loads, strict=True):
+        axle = ca.Function("axle", [x], [_both_sides(one, x, 0.0, (0.5 * load, 0.5 * load), 1.0)])
         force.append(np.array(axle(alpha[None])).ravel())
     return _fitted_tire(vehicle, alpha, np.stack(force), None)
 

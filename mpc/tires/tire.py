@@ -112,7 +112,7 @@ class SmallSlip(TireStructure):
 
 N_DOUBTS = 26
 DOUBT_STEP = 0.02  # rad
-RELATIVE, FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire misses at best
+_RELATIVE, _FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire misses at best
 
 
 class PredictionTire(NamedTuple):
@@ -136,8 +136,8 @@ class PredictionTire(NamedTuple):
         if self.doubt is not None:
             return self.doubt
         slip = DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)
-        floor = FLOOR * np.array(self.vehicle.axle_loads)[:, None]
-        return np.hypot(RELATIVE * curves_at(self, slip), floor)
+        floor = _FLOOR * np.array(self.vehicle.axle_loads)[:, None]
+        return np.hypot(_RELATIVE * curves_at(self, slip), floor)
 
 
 # How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
@@ -147,10 +147,10 @@ class PredictionTire(NamedTuple):
 # there. So it believes F(x) + rise (α - x) beyond the slip x that is of use: more slip never gives
 # less.
 
-FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
+_FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
 LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
 SLIPS = np.linspace(0.0, 0.5, 251)  # rad
-SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has downforce
+_SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has downforce
 
 
 class ValidSlip(NamedTuple):
@@ -183,7 +183,7 @@ def curves_at(tire: PredictionTire, slip: Array) -> Array:
     slip : of both axles [rad], (k,).
     """
     x = ca.SX.sym("slip")
-    at = Point(0.0, 0.0, 0.0, SPEED, Car(*tire.car), ca.SX(tire.weights))
+    at = Point(0.0, 0.0, 0.0, _SPEED, Car(*tire.car), ca.SX(tire.weights))
     force = ca.densify(ca.vertcat(*tire.structure.force((x, x), at)))
     return np.array(ca.Function("curves", [x], [force])(slip[None]))
 
@@ -230,7 +230,7 @@ def _extrapolated_force(
 
 
 def _useful(slopes: Array) -> Array:
-    flat = slopes < FLAT * slopes[:, :1]
+    flat = slopes < _FLAT * slopes[:, :1]
     found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
     return np.where(slopes[:, 0] > 0.0, found, np.inf)
 
@@ -239,7 +239,7 @@ def _useful(slopes: Array) -> Array:
 def _slopes(structure: TireStructure) -> ca.Function:
     """Return dF/dα (2, k) of slips (1, k), straight ahead."""
     slip, w, numbers = ca.SX.sym("slip"), ca.SX.sym("w", structure.n_weights), ca.SX.sym("car", 4)
-    at = Point(0.0, 0.0, 0.0, SPEED, Car(*ca.vertsplit(numbers)), w)
+    at = Point(0.0, 0.0, 0.0, _SPEED, Car(*ca.vertsplit(numbers)), w)
     force = ca.vertcat(*structure.force((slip, slip), at))
     slope = ca.Function("slope", [slip, numbers, w], [ca.densify(ca.jacobian(force, slip))])
     return slope.map(SLIPS.size, [False, True, True], [False])

@@ -3,8 +3,6 @@
 import json
 import logging
 import math
-from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ from benchmarks.beginnings import Begun
 from benchmarks.documents import complaints
 from benchmarks.fault_cases import Case, StraightOnly, biased, cases
 from benchmarks.faults import Late, Mirrored, Together
-from benchmarks.random_cars import CLASSES, random_beginning
+from benchmarks.random_cars import CLASSES
 from benchmarks.targets import Targets
 from benchmarks.verdicts import Judged
 from identifier.doctor import Diagnosis, Finding
@@ -110,14 +108,6 @@ def test_a_program_that_stops_is_no_valid_answer(drive, log, monkeypatch):
     assert found.worse == math.inf
 
 
-def test_a_car_that_never_drives_is_refused_and_nothing_stopped(drive, log):
-    slow = replace(log, v_x=0.02 * log.v_x)
-    found = answer(slow, drive.car.told, drive.exact)
-    assert found.codes == (REFUSED,)
-    assert not found.stopped
-    assert not is_dead(found, (1e5, 1e5))
-
-
 def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
     class Finding:
         def __init__(self, code, refuses):
@@ -146,13 +136,6 @@ def test_what_the_doctor_warns_of_is_kept(drive, log, monkeypatch):
     assert not logging.getLogger("tireid.doctor").filters
 
 
-def test_drives_of_one_seed_are_of_one_car_and_differ(drive):
-    again, other = drawn("sedan", 7), drawn("sedan", 7, number=1)
-    np.testing.assert_array_equal(again.exact.v_y, drive.exact.v_y)
-    assert other.car == drive.car
-    assert other.exact.v_y[-1] != drive.exact.v_y[-1]
-
-
 def test_judged_is_what_stays_wrong_without_what_passes(drive):
     exact, noise = drive.exact, SensorFault(channel="r", kind="noisy", size=0.1)
     bias = biased("v_y", 0.2)
@@ -165,26 +148,7 @@ def test_judged_is_what_stays_wrong_without_what_passes(drive):
     np.testing.assert_array_equal(both.judged(exact).r, exact.r)
 
 
-def test_a_straight_drive_has_next_to_no_force_and_all_of_the_noise(drive):
-    good = drive.car.sensors
-    shown = StraightOnly(sensors=good).apply(drive.exact)
-    assert np.abs(shown.axle_force).max() < 0.006 * np.abs(drive.exact.axle_force).max()
-    assert np.std(shown.v_y) == pytest.approx(good.v_y.noise, rel=0.1)
-    assert np.std(shown.r) == pytest.approx(good.r.noise, rel=0.1)
-
-
 # Beginnings.
-
-
-def test_beginnings_compare_with_the_same_drive_begun_in_a_corner():
-    found = beginnings.begun(("sedan", 0))
-    assert [one.beginning for one in found] == ["straight", "biased", "fading", "banked"]
-    assert all(math.isfinite(one.learnt.worse) for one in found)
-    straight = found[0]
-    assert straight.ratio == pytest.approx(
-        max(straight.learnt.worse, 1.0) / max(straight.corner.worse, 1.0)
-    )
-    assert 0.5 < straight.ratio < 1.3
 
 
 def test_a_bad_beginning_is_counted():
@@ -202,13 +166,6 @@ def test_a_bad_beginning_is_counted():
     assert missed(NONE) == ["beyond", "ratio/median", "wrong", "dead", "stopped"]
 
 
-def test_verdicts_of_beginnings_are_counted_with_those_at_the_door():
-    door = GOOD._replace(valid=False, codes=(REFUSED,))
-    answers = [GOOD, BAD, TOLD, door, GOOD._replace(valid=False, codes=("prior",))]
-    found = [Begun("sedan", "rough", 1000, one, GOOD, False) for one in answers]
-    assert beginnings.Verdicts.of(found) == (2, 1, 3, 2, 1)
-
-
 # Noisy runs.
 
 
@@ -220,29 +177,6 @@ def shared(drive, monkeypatch):
 @pytest.mark.usefixtures("shared")
 def test_noisy_runs_end_well():
     assert noisy_runs.chunk(range(30)) == []
-
-
-def test_noisy_logs_are_noisy_by_what_is_said_and_short(drive):
-    times, steps = [], set()
-    for seed in range(200):
-        rng = np.random.default_rng(seed)
-        sensors = noisy_runs.noisy(drive.car.sensors, rng)
-        times.append(sensors.v_y.noise / drive.car.sensors.v_y.noise)
-        log, _, _ = noisy_runs.noisy_log(drive, rng)
-        assert log.axle_force is None
-        assert log.t[0] == 0.0
-        assert 1.5 < log.duration < 14.5
-        steps.add(log.dt)
-    assert min(times) < 0.02
-    assert max(times) > 60.0
-    assert steps == set(noisy_runs.SAMPLED)
-
-
-def test_a_drive_sampled_anew_is_the_same_drive(drive):
-    part = drive.exact.between(10.0, 15.0)
-    fine = noisy_runs.sampled(part, 0.002)
-    assert fine.dt == 0.002
-    np.testing.assert_allclose(fine.r[::5], part.r[:-1], atol=1e-9)
 
 
 @pytest.mark.usefixtures("shared")
@@ -294,14 +228,6 @@ def test_an_error_that_doubles_must_be_told(found, told):
     assert fault_table.is_told(found, GOOD) is told
 
 
-def test_what_the_doctor_says_of_the_drive_without_the_fault_tells_nothing_of_the_fault():
-    late, both = BAD._replace(doctor=("delay delta_f",)), ("delay delta_f", "offset r")
-    assert not fault_table.is_told_by_doctor(BAD, GOOD)
-    assert fault_table.is_told_by_doctor(late, GOOD)
-    assert not fault_table.is_told_by_doctor(late, GOOD._replace(doctor=late.doctor))
-    assert fault_table.is_told_by_doctor(late._replace(doctor=both), late)
-
-
 def test_a_wrong_mass_is_forgiven_what_it_adds_to_all_forces_and_no_more():
     off = fault_table.UNSEEN["mass/1.2"]
     assert off == pytest.approx(100.0 * (1.2 - 1.0))
@@ -331,22 +257,6 @@ def test_an_answer_is_silent_where_neither_verdict_nor_doctor_says_something():
     assert targets.values["late/80/silent_with_doctor"] == targets.values["clean/doctor"] == 0
 
 
-def test_a_dead_axle_that_is_called_valid_is_told_from_one_that_is_not():
-    table, dead = (
-        dict.fromkeys(cases(fault_table.CARMAKER), GOOD),
-        GOOD._replace(stiffness=(1e5, 9.0)),
-    )
-    table["late/20"], table["late/50"] = dead, dead._replace(valid=False)
-    targets = Targets("fault_table")
-    fault_table.report({name: [table] for name in (*fault_table.RUNS, *CLASSES)}, targets)
-    assert (targets.values["dead"], targets.values["dead_valid"]) == (12, 6)
-
-
-def test_every_case_has_a_label_of_its_own():
-    labels = [fault_table.label_of(name) for name in cases(fault_table.CARMAKER)]
-    assert len(set(labels)) == len(labels)
-
-
 # Verdicts.
 
 
@@ -366,44 +276,3 @@ def test_the_verdict_is_judged_on_answers_that_are_wrong_and_on_those_that_are_r
     assert missed(refused, TOLD) == ["answers within 8 % and refused"]
     assert missed(*[GOOD] * 40, refused, TOLD) == []
     assert missed(TOLD) == ["answers right, and wrong"]
-
-
-def test_refused_right_answers_are_told_by_group_by_cause_and_where_nothing_was_wrong():
-    refused = GOOD._replace(valid=False, codes=("prior", "at_bound"))
-    door, targets = GOOD._replace(valid=False, codes=(REFUSED,)), Targets("verdicts")
-    between = GOOD._replace(error=(15.0, 3.0))
-    found = [Judged("sedan", k, "", GOOD) for k in range(6)]
-    found += [Judged("race", 1, "", refused, True), Judged("race", 2, "", between)]
-    found += [Judged("recordings", 1, "", door), Judged("recordings", 2, "", BAD)]
-    verdicts.report(found, targets)
-    values = targets.values
-    assert (values["plants/right"], values["plants/right_refused"]) == (7, 1)
-    assert (values["plants/clean_refused"], values["recordings/clean_refused"]) == (1, 0)
-    assert (values["recordings/right_refused"], values["recordings/door"], values["door"]) == (
-        1,
-        1,
-        1,
-    )
-    assert (values["between"], values["between_valid"], values["plants/between"]) == (1, 1, 1)
-    assert values["plants/refused_share"] == pytest.approx(100.0 / 7.0)
-    assert values["refused_share"] == pytest.approx(25.0)
-    by = {key: value for key, value in values.items() if key.startswith("right_refused_by/")}
-    assert by == {f"right_refused_by/{code}": 1 for code in ("prior", "at_bound", REFUSED)}
-
-
-def test_each_third_of_the_answers_has_its_fate(monkeypatch):
-    monkeypatch.setattr(verdicts, "answer", lambda *_: GOOD)
-    fates = [one.what for seed in range(3) for one in verdicts.plant_answers(("sedan", seed))]
-    assert sum(fate == "nothing wrong" for fate in fates) == 5
-    assert sum(fate.startswith("beginning: ") for fate in fates) == 5
-
-
-def test_parts_of_recordings_are_those_in_which_the_car_drives(drive):
-    exact = drive.exact
-    stands = replace(exact, v_x=np.where(exact.t < 15.0, 0.0, exact.v_x))
-    part = partial(verdicts.part_of, stands, drive.car.told)
-    for seed in range(10):
-        one = part(np.random.default_rng(seed))
-        assert np.mean(one.v_x > 1.0) >= 0.55
-        assert one.t[0] == 0.0
-    assert drawn("sedan", 7, partial(random_beginning, "standing")).car == drive.car

@@ -49,27 +49,11 @@ def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
         np.testing.assert_allclose((float(ours.F_x), float(ours.F_y)), expected, rtol=2e-3)
 
 
-def test_its_stiffnesses_are_its_slopes_at_zero():
-    tire, h = CommonRoadTire.read(), 1e-5
-    for F_z in (2000.0, 5000.0):
-        ahead, back = (tire.forces(s, 0.0, 0.0, F_z).F_y for s in (h, -h))
-        assert tire.cornering_stiffness(F_z) == pytest.approx(float(ahead - back) / 2 / h, rel=0.01)
-        ahead, back = (tire.forces(0.0, s, 0.0, F_z).F_x for s in (h, -h))
-        assert tire.slip_stiffness(F_z) == pytest.approx(float(ahead - back) / 2 / h, rel=0.01)
-
-
 def test_the_repair_moves_unsprung_mass_until_both_axles_balance():
     plain, repaired = bmw_parameters(), bmw_parameters(repaired=True)
     assert repaired.m_uf + repaired.m_ur == pytest.approx(plain.m_uf + plain.m_ur)
     assert repaired.m_uf * repaired.a == pytest.approx(repaired.m_ur * repaired.b)
     assert repaired.m_uf - plain.m_uf == pytest.approx(6.6, abs=0.1)
-
-
-def test_friction_scales_both_directions_of_a_parameter_set():
-    slippery, tire = bmw_parameters(0.4).tire, bmw_tire()
-    assert slippery.p_dx1 == pytest.approx(0.4 * tire["p_dx1"])
-    assert slippery.p_dy1 == pytest.approx(0.4 * tire["p_dy1"])
-    assert tire == bmw_tire(), "the package's own set is not changed"
 
 
 def test_a_tire_slips_by_the_velocity_of_its_axle():

@@ -8,7 +8,7 @@ interior point there.
 import numpy as np
 import pytest
 
-from benchmarks.converged import NotConvergedError, build_errors, iterated, numbers, solve_converged
+from benchmarks.converged import build_errors, iterated, solve_converged
 from models.vehicle import sedan
 from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
@@ -114,23 +114,3 @@ def test_the_cases_press_against_what_they_say(tire, tracker):
     assert np.abs(rate.plan_u).max() > 0.999 * limits.steering_rate
     assert np.abs(rate.plan_x[1:, 0]).max() > limits.e_y
     assert np.abs(angle.plan_x[:, 4]).max() > 0.999 * limits.steering
-
-
-def test_another_tire_has_another_answer(tire):
-    kappa, v_x = road(20.0, 0.006)
-    x0 = start_of(tire, "rate and deviation are active")
-    weaker = tire._replace(weights=0.8 * tire.weights)
-    costs = [solve_converged(one, PROBLEM, x0, kappa, v_x).cost for one in (tire, weaker)]
-    assert abs(costs[0] / costs[1] - 1.0) > 1e-3
-
-
-def test_ipopt_says_when_it_gives_up():
-    tire = prediction_tire(sedan())
-    with pytest.raises(NotConvergedError, match="IPOPT ended with"):
-        solve_converged(tire, PROBLEM, [0.0, 0.0, 0.0, 0.0, 0.5], 0.0, 20.0)  # wheels beyond
-
-
-def test_a_number_serves_for_every_stage():
-    tire = prediction_tire(sedan())
-    whole = numbers(PROBLEM, tire, np.full(PROBLEM.horizon, 0.01), np.full(PROBLEM.horizon, 20.0))
-    np.testing.assert_array_equal(numbers(PROBLEM, tire, 0.01, 20.0), whole)

@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from benchmarks import doctor_answers
 from benchmarks.doctor import drawn
-from benchmarks.doctor_answers import PARTS, WHOLE, Clean, judge_clean, parts_of, rank_of
+from benchmarks.doctor_answers import PARTS, WHOLE, Clean, judge_clean, rank_of
 from benchmarks.targets import Targets
 from identifier.doctor import Diagnosis, Finding
 
@@ -24,16 +23,6 @@ def test_a_fault_is_named_by_its_code_and_one_of_its_channels():
     assert rank_of(listed, (("sign", ""),)) == 2
     assert rank_of(listed, (("sign", "r"),)) == 0
     assert rank_of([], (("sign", "r"),)) == 0
-
-
-def test_a_drive_is_asked_as_a_whole_and_in_halves(drive):
-    log, _, _ = drive
-    parts = parts_of(log)
-    assert set(parts) == {WHOLE, *PARTS}
-    assert parts[WHOLE].duration == log.duration
-    for name in PARTS:
-        assert parts[name].duration == pytest.approx(0.5 * log.duration, abs=2.0 * log.dt)
-    assert parts["first half"].t[-1] < parts["second half"].t[0]
 
 
 def test_only_a_half_may_be_called_straight(drive, monkeypatch):
@@ -62,10 +51,3 @@ def test_alarms_are_counted_by_drive_and_by_half(capsys):
     assert targets.values["alarms/halves"] == pytest.approx(100.0 / 4.0)
     assert targets.missed == ["halves of clean drives with an alarm"]
     assert "race 2, second half" in capsys.readouterr().out
-
-
-def test_drives_of_classes_and_seeds_are_their_own(drive):
-    log, _, exact = drive
-    again, _, _ = drawn("sedan", 1)
-    np.testing.assert_array_equal(again.r, log.r)
-    assert log.axle_force is None and exact.axle_force is not None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks import c_loops
-from benchmarks.export_cost import LOOP, NUMPY, PACKAGE, check, steps
+from benchmarks.export_cost import LOOP, check, steps
 from benchmarks.targets import Targets
 from codegen import find_compiler
 from identifier.export.package import build_package
@@ -42,16 +42,3 @@ def test_a_hand_written_step_that_computes_something_else_is_seen(
     monkeypatch.setattr(c_loops, "HAND_WRITTEN", wrong)
     with pytest.raises(AssertionError, match=LOOP):
         check(steps(package), samples, Targets("export_cost"))
-
-
-def test_the_flags_are_those_of_the_package(package):
-    flags = c_loops.release_flags(package)
-    assert "-ffp-contract=off" in flags and "-std=c99" in flags and "-O3" in flags
-
-
-def test_missed_targets_are_kept(capsys):
-    targets = Targets()
-    targets.at_least(f"{NUMPY} over {PACKAGE}", 150.0, 200.0, "")
-    targets.at_most("ratio", 0.5, 0.7, "")
-    assert targets.missed == [f"{NUMPY} over {PACKAGE}"]
-    assert "MISSED" in capsys.readouterr().out

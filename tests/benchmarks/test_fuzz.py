@@ -4,14 +4,12 @@ import os
 import random
 import signal
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 import tireid.commands.check
 from benchmarks.fuzz import server
-from benchmarks.fuzz.__main__ import main
 from benchmarks.fuzz.cases import MUTATORS, Case, draw, lay_out
 from benchmarks.fuzz.doors import DOORS
 from benchmarks.fuzz.session import Session
@@ -205,14 +203,3 @@ def test_a_mutator_takes_whatever_an_earlier_one_made(ending):
         for _ in range(3):
             data = MUTATORS[ending](rng, data)[:100_000]
         assert isinstance(data, bytes)
-
-
-def test_fifty_cases_at_the_doors_of_check_find_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("PATH", os.environ["PATH"])  # which the run replaces
-    monkeypatch.setenv("TIREID_CACHE", os.environ.get("TIREID_CACHE", str(tmp_path / "cache")))
-    began = time.perf_counter()
-    words = ["--cases", "50", "--door", "check ", "--workers", "1", "--out", str(tmp_path)]
-    assert main(words) == 0, capsys.readouterr().out
-    told = capsys.readouterr().out
-    assert "50 of 50, 0 findings" in told
-    assert time.perf_counter() - began < 600.0

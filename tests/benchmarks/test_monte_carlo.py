@@ -6,7 +6,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from benchmarks import monte_carlo as module
 from benchmarks.monte_carlo import (
     Beginning,
     Drives,
@@ -18,7 +17,6 @@ from benchmarks.monte_carlo import (
     random_drives,
     residuals,
     saturating_bicycle,
-    slips,
 )
 from identifier.certificate import Certificate, statement
 from identifier.driving import natural_driving
@@ -128,58 +126,6 @@ def test_drives_stay_within_what_is_judged():
     assert found.residual.max() <= operation.disturbance.residual
     assert found.outside > 0
     assert found.diverged == 0
-
-
-def test_the_same_seed_gives_the_same_drives_and_progress_reaches_the_end():
-    design = PaperIdentifier.for_vehicle(CAR)
-    told = []
-    first, again = (
-        monte_carlo(
-            design,
-            CAR,
-            DRIVING,
-            40,
-            beginning=FRESH,
-            rng=np.random.default_rng(2),
-            progress=told.append,
-        )
-        for _ in range(2)
-    )
-    np.testing.assert_array_equal(first.xi_tilde, again.xi_tilde)
-    assert told[-1] == 40
-
-
-def test_driving_that_hardly_a_drive_keeps_to_is_refused(monkeypatch):
-    monkeypatch.setattr(module, "TRIES", 1)
-    design = PaperIdentifier.for_vehicle(CAR)
-    with pytest.raises(ValueError, match="judge harder driving"):
-        monte_carlo(
-            design,
-            CAR,
-            replace(DRIVING, bandwidth=1e-3),
-            5,
-            beginning=FRESH,
-            rng=np.random.default_rng(0),
-        )
-
-
-def test_slips_are_those_of_the_paper(drives):
-    recording = recording_of(drives, 2)
-    small = np.abs(slips(CAR, drives)[2]) < 0.05
-    alpha = recording.alpha(CAR.l_f, CAR.l_r)
-    np.testing.assert_allclose(slips(CAR, drives)[2][small], alpha[small], atol=2e-4)
-
-
-def test_first_weights_of_V_are_shrunk_to_the_largest_that_a_drive_may_begin_with():
-    """Drawn larger they keep their direction, drawn smaller they stay as they were drawn."""
-    design, norms = PaperIdentifier.for_vehicle(CAR), {}
-    for largest in (2.0, 100.0):
-        begun = first_weights(design, COUNT, Beginning(W=0.0, V=largest), np.random.default_rng(8))
-        norms[largest] = begun.V, np.linalg.norm(begun.V, axis=(1, 2))
-    (shrunk, short), (drawn, long) = norms[2.0], norms[100.0]
-    assert long.min() > 2.0
-    np.testing.assert_allclose(short, 2.0, rtol=1e-12)
-    np.testing.assert_allclose(shrunk * (long / 2.0)[:, None, None], drawn, rtol=1e-12)
 
 
 def observed(xi_tilde):

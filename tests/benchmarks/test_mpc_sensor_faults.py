@@ -69,13 +69,6 @@ def test_the_first_alarm_after_the_fault_is_its_detection_and_one_before_it_is_f
     assert targets.values["r/noticed"] == 1 and targets.values["worse"] == 0
 
 
-def test_a_drive_that_learning_alone_loses_misses_the_target():
-    targets = Targets("mpc_sensor_faults")
-    judge([row([KEPT, LEFT], [KEPT, KEPT])], [KEPT], targets)
-    assert targets.values["worse"] == 1 and targets.finish(keep=False) == 1
-    assert targets.values["r/noticed"] == 0 and "r/latest" not in targets.values
-
-
 def test_caution_may_neither_leave_the_path_nor_go_far_off_where_frozen_tires_do_not():
     near, far = KEPT._replace(peak=0.5), KEPT._replace(peak=0.51)
     for cautious, frozen, worse in (
@@ -91,9 +84,3 @@ def test_caution_may_neither_leave_the_path_nor_go_far_off_where_frozen_tires_do
         judge([row([KEPT, KEPT], [KEPT, frozen], [KEPT, cautious])], [KEPT], targets)
         assert targets.values["worse_cautious"] == targets.values["r/worse_cautious"] == worse
         assert targets.finish(keep=False) == worse
-
-
-def test_a_cautious_drive_is_one_on_frozen_tires_with_all_caution():
-    words = cases_of(FAULTS[0], CAUTIOUS)[0].words
-    options = options_of([*words, *DRIVERS[CAUTIOUS]])
-    assert options.tires == [FROZEN] and conditions_of(options).caution == 1.0

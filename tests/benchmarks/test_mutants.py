@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.mutants import PLANTED, plant, written_fault
 from benchmarks.mutation.c_faults import c_faults, changes_tokens, tokens
-from benchmarks.mutation.draw import C_FOLDERS, changes, draw, package_of, shares, strata
-from benchmarks.mutation.faults import Fault, function_at
+from benchmarks.mutation.draw import changes, draw, package_of, strata
+from benchmarks.mutation.faults import Fault
 from benchmarks.mutation.python_faults import changes_bytecode, python_faults
 from benchmarks.mutation.selection import Traced
 from benchmarks.mutation.workshop import Workshop
@@ -195,36 +195,6 @@ def test_drawing_is_deterministic_and_covers_every_package_and_its_c():
 
 def lines_of(file: str) -> int:
     return len((ROOT / file).read_bytes().splitlines())
-
-
-def test_one_package_is_drawn_from_alone():
-    assert package_of("identifier/plan/search.py") == "identifier/plan"
-    assert package_of("identifier/run.py") == "identifier"
-    assert package_of("models/tires/a/b.py") == "models/tires"
-    assert package_of("mpc/c/tracker.c") == "mpc, C"
-    faults = draw(ROOT, seed=7, count=12, only="identifier/plan")
-    assert len(faults) == 12 and {package_of(one.file) for one in faults} == {"identifier/plan"}
-    assert strata(ROOT, "identifier/plan/plan.py") == {
-        "identifier/plan": ["identifier/plan/plan.py"]
-    }
-    with pytest.raises(ValueError, match="identifier/pla is no file or folder"):
-        draw(ROOT, seed=7, count=1, only="identifier/pla")
-
-
-def test_every_c_folder_has_files_and_every_share_is_given():
-    files = strata(ROOT)
-    for folder in C_FOLDERS:
-        assert any(name.startswith(folder) for names in files.values() for name in names), folder
-    assert shares({"a": 2, "b": 1, "c": 1}, 10) == {"a": 5, "b": 3, "c": 2}
-    assert sum(shares({"a": 1, "b": 1, "c": 1}, 100).values()) == 100
-
-
-def test_the_function_of_a_line_is_the_innermost():
-    path = ROOT / "benchmarks" / "mutation" / "python_faults.py"
-    lines = path.read_text().splitlines()
-    at = next(k for k, line in enumerate(lines, 1) if "yield new" in line)
-    assert function_at(str(path), at) == "_Rules._other_names"
-    assert function_at(str(path), 1) == "<module>"
 
 
 def test_every_fault_that_was_written_down_follows_the_code():

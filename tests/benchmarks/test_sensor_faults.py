@@ -54,18 +54,6 @@ def test_the_compiled_run_is_that_of_a_car_sample_by_sample(drive, name):
         assert sensor_faults.noticed_after(history, fault) == pytest.approx(first)
 
 
-def test_a_fault_that_is_none_is_not_noticed_and_leaves_no_error(drive):
-    none = SensorFault(channel="v_y", kind="biased", start=18.0, duration=2.0, size=0.0)
-    history = identify(
-        shown(drive.recording, none, drive.car), drive.car, make_method(LIVE, drive.car)
-    )
-    np.testing.assert_array_equal(history.axle_force, drive.forces)
-    assert sensor_faults.after_fault(drive, none, history.axle_force) == 0.0
-    assert sensor_faults.after_fault(drive, none, 1.1 * drive.forces) == pytest.approx(
-        10.0, rel=0.5
-    )
-
-
 def test_a_plain_fault_is_noticed_soon_and_harms_where_nobody_doubts(drive):
     fault = SensorFault(channel="v_y", kind="biased", start=18.0, duration=2.0, size=3.0)
     design = make_method(LIVE, drive.car)

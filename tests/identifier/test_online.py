@@ -11,6 +11,7 @@ from identifier.method import CannotFreezeError
 from identifier.methods import DEFAULT, METHODS, make_method
 from identifier.run import DivergedError, OnlineIdentifier, identify
 from tests.identifier.conftest import felt
+from tests.rivals import NAMES, rival
 
 
 def driven(identifier, recording):
@@ -19,7 +20,10 @@ def driven(identifier, recording):
     return np.array([identifier.update(*sample) for sample in samples])
 
 
-@pytest.mark.parametrize("name", [name for name in METHODS if name != DEFAULT])
+ONLINE = [*(name for name in METHODS if name != DEFAULT), *map(rival, NAMES)]
+
+
+@pytest.mark.parametrize("name", ONLINE)
 def test_every_method_learns_the_same_bits_as_over_the_recording(name, car, drive):
     recording, method = felt(drive(n=300)), make_method(name, car)
     history = identify(recording, car, method)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from models.friction import Friction, FrictionChange, FrictionError, place_change
-from models.maneuvers import RandomSteer, Slalom, SlowlyIncreasingSteer, StepSteer
+from models.maneuvers import RandomSteer, Slalom, StepSteer
 from models.plant import Driver, Plant, PlantError, tire_of
 from models.plant.dynamics import _relax, _tire_force, wheel_loads
 from models.sensors import Sensor, Sensors
@@ -264,7 +264,7 @@ def test_the_integration_is_of_fourth_order():
 @pytest.mark.parametrize("scale", [1.0, 0.7, 0.4])
 def test_friction_sets_the_limit_of_the_front_axle(scale):
     """The largest axle force is what the two tires can do at best at their loads and camber."""
-    turn = SlowlyIncreasingSteer(amplitude=0.15, rate=0.02, onset=0.2, rate_limit=1.0, duration=9.0)
+    turn = StepSteer(amplitude=0.15, onset=0.2, rate_limit=0.02, duration=9.0)
     rear_drive = replace(CAR, chassis=replace(CHASSIS, drive_front_share=0.0))
     run = Plant(rear_drive).simulate(turn, speed=20.0, friction=Friction(scale=scale))
     k = int(np.argmax(run.axle_force[:, 0]))

@@ -25,7 +25,7 @@ from tireid.cli import main
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 HEAVY = {"matplotlib", "control", "scipy", "casadi", "numpy"}
-KINDS = ("axle", "integral", "linear", "magic_formula_ekf", "joint_ekf")
+KINDS = ("axle", "integral", "linear", "magic_formula_ekf")
 STATES = ((0.0, 0.0, 0.02), (0.3, 0.4, 0.05), (-1.2, 0.2, -0.1))  # v_y, r, delta
 
 

@@ -4,22 +4,26 @@ import csv
 import html
 import json
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from identifier.compare.course import INFINITE, Shares
-from identifier.methods import METHODS
+from identifier.methods import METHODS, make_method
 from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
+from tests.rivals import INSTALLED, needs_rivals
 from tests.tireid.conftest import refusal
 from tireid.cli import main
 from tireid.commands.compare_results import ERROR_COLUMNS
 from tireid.figures.compare import short_names
 from tireid.output import write_json
 
-METHODS_TRIED = ("integral", "linear", "linear_kf", "fit")
+ROOT = Path(__file__).resolve().parents[2]
+SIGNAL = ("linear_kf",) * INSTALLED  # which has nothing to freeze
+METHODS_TRIED = ("integral", "linear", *SIGNAL, "fit")
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +77,7 @@ def test_the_linear_tire_has_the_error_of_stiffness_times_slip(numbers, logs):
     )
 
 
+@needs_rivals
 def test_a_signal_estimator_has_no_frozen_error(numbers, result):
     signal = numbers["methods"]["linear_kf"]
     assert signal["frozen_N"] is None
@@ -158,7 +163,8 @@ def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
     with (result / "compare.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == ERROR_COLUMNS
-    assert len(rows) == 4 * 2 + 3 * 4  # online, and frozen where there is a model
+    online, frozen = 2 * len(METHODS_TRIED), 4 * (len(METHODS_TRIED) - len(SIGNAL))
+    assert len(rows) == online + frozen
     for row in rows:
         method = numbers["methods"][row["method"]]
         if row["kind"] == "frozen":
@@ -197,7 +203,7 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
 @pytest.mark.parametrize(
     ("extra", "said"),
     [
-        (["--method", "magic"], "--method magic is none of fit, axle, "),
+        (["--method", "magic"], "method must be one of fit, axle, "),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["slalom"], "slalom is given twice"),
     ],
@@ -249,8 +255,21 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
 
 def test_the_registry_has_every_name_that_is_promised():
     promised = "linear magic_formula_ekf textbook_ekf lagged_ekf integral instantaneous "
-    promised += "instantaneous_scaled pi_lead fit axle inertial linear_kf joint_ekf washout mhe"
+    promised += "instantaneous_scaled pi_lead fit axle inertial"
     assert set(METHODS) == set(promised.split())
+
+
+def test_a_rival_that_is_not_installed_is_told_where_it_is(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("identifier.methods._installed", dict)
+    told = "method washout is not installed: pip install ./benchmarks/rivals"
+    words = ["--method", "washout", "--out", tmp_path / "out"]
+    assert told in refusal(capsys, ["compare", *words])
+    with pytest.raises(SystemExit):
+        main(["identify", "log.csv", "--vehicle", "car.toml", *map(str, words)])
+    assert told in capsys.readouterr().err
+    with pytest.raises(ValueError, match=told):
+        make_method("washout", sedan())
+    assert (ROOT / "benchmarks/rivals/pyproject.toml").is_file()
 
 
 def test_runs_of_one_file_are_named_by_the_run_alone():

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from models.faults import SensorFault
-from tireid.cli import build_parser, main
+from tireid.cli import build_parser
 from tireid.commands.drive_case import conditions_of, parse_drop, parse_fault, parse_speed
 from tireid.driving.runs import BacksOff
 from tireid.driving.setup import SpeedWish
@@ -93,12 +93,6 @@ def test_what_is_no_fault_is_refused_with_its_rule(text, said):
     with pytest.raises(ValueError, match=r"^--fault") as refusal:
         parse_fault(text)
     assert said in str(refusal.value)
-
-
-@pytest.mark.parametrize("word", ["-0.1", "0.6", "nan"])
-def test_a_weave_that_is_none_is_refused_before_anything_is_driven(tmp_path, capsys, word):
-    assert main(["drive", "--dither", word, "--out", str(tmp_path / "out")]) == 2
-    assert "--dither in m must lie between 0 and 0.5" in capsys.readouterr().err
 
 
 def test_caution_is_a_share_and_zero_by_default():

@@ -16,6 +16,7 @@ from identifier.tire_model import load_model
 from identifier.verdict import calibrated
 from models.recordings import read_recording
 from models.vehicle import sedan
+from tests.rivals import rival
 from tests.tireid.conftest import refusal
 from tireid import exporting
 from tireid.cli import main
@@ -135,7 +136,7 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
         (["--method", "linear"], "formula without state"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
         (["--weights", "missing.json"], "missing.json"),
-        (["--method", "washout", "--onnx"], "--onnx"),
+        rival(["--method", "washout", "--onnx"], "--onnx"),
         (["--method", "magic_formula_ekf", "--with-a-y"], "has no use for a_y"),
     ],
 )

@@ -18,6 +18,7 @@ from identifier.tire_model import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
+from tests.rivals import needs_rivals
 from tests.tireid.conftest import refusal
 from tireid.cli import main
 
@@ -500,6 +501,7 @@ def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result
     assert not (tmp_path / "out").exists()
 
 
+@needs_rivals
 def test_a_filter_of_forces_has_nothing_to_freeze(logs, tmp_path, capsys):
     words = [
         "identify",
@@ -548,11 +550,7 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name, 
     assert set(frozen) == {"carmaker:slalom1_14_5ms", "carmaker:experiment2_40kmh"}
 
 
-SIGNALS = {"washout", "linear_kf"}  # which estimate no tire
-MODELS = [name for name in METHODS if name not in SIGNALS]
-
-
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", METHODS)
 def test_every_method_with_a_model_writes_all_of_its_files(logs, tmp_path, name, undrawn):
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--replay", str(logs / "quick.csv"), "--method", name, "--accept"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from identifier.compare.study import cannot_learn, run_comparison
 from identifier.method import Method
-from identifier.methods import DEFAULT, methods
+from identifier.methods import DEFAULT, methods, require_method
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
 from identifier.run import History
@@ -44,7 +44,11 @@ def add_parser(commands: Any) -> None:
         "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
     )
     parser.add_argument(
-        "--method", nargs="+", action="extend", metavar="NAME", help="these only (all)"
+        "--method",
+        nargs="+",
+        action="extend",
+        metavar="NAME",
+        help="these only (all)",
     )
     shared.add_seed(parser, "sensor noise, and the weights of networks")
     shared.add_log_reading(parser)
@@ -56,11 +60,9 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what the default learns on a recording is not valid."""
-    seed, known = shared.seed_of(options), methods()
-    names = list(dict.fromkeys(options.method or known))
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"--method {unknown[0]} is none of {', '.join(known)}")
+    seed, names = shared.seed_of(options), list(dict.fromkeys(options.method or methods()))
+    for name in names:
+        require_method(name)
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()

@@ -67,11 +67,6 @@ def add_parser(commands: Any) -> None:
             20.0,
             "from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
         ),
-        "--dither M": (
-            0.0,
-            "largest weave about the path, for excitation; with learning tires it fades as "
-            "their uncertainty falls (%(default)g: off)",
-        ),
         "--caution SHARE": (
             0.0,
             "share of the tires' uncertainty that the tracker plans for: 0 none, 1 the least "

@@ -112,7 +112,6 @@ def labels_of(words: Sequence[str]) -> list[str]:
 def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_within(ValueError, *runs.WEAVES, **{"--dither in m": options.dither})
     require_within(ValueError, *FRICTIONS, **{"--mu": options.mu})
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     path = _named_path(options.path)
@@ -137,7 +136,6 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
         faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
         caution=options.caution,
         kind=options.sensors,
-        dither=options.dither,
     )
 
 

@@ -59,7 +59,6 @@ def headline(conditions: Conditions) -> str:
     noise = "sensor noise" if conditions.noise else "no noise"
     noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
     noise += ", no v_y" if conditions.kind == IMU else ""
-    noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
@@ -95,7 +94,6 @@ def inputs_of(
         "period_ms": 1e3 * PERIOD,
         "noise": conditions.noise,
         **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
-        **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
         **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
         "faults": [finite(asdict(fault)) for fault in conditions.faults],
         "seed": conditions.seed,

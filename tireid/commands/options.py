@@ -23,6 +23,7 @@ from identifier.methods import (
     draws_weights,
     make_method,
     methods,
+    require_method,
 )
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
@@ -179,13 +180,28 @@ def number_with_unit(text: str, *units: str) -> tuple[float, str | None]:
         return math.nan, None
 
 
+def method_name(text: str) -> str:
+    """Return the name of a method, for argparse.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        Where there is none of that name.
+    """
+    try:
+        require_method(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return text
+
+
 def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
     usual : the default.
     """
     text = f"what learns: {', '.join(methods())} (default: {usual})"
-    parser.add_argument("--method", choices=methods(), metavar="NAME", help=text)
+    parser.add_argument("--method", type=method_name, metavar="NAME", help=text)
     add_options(parser, bool, {"--paper": f"the paper's network and law: --method {REFERENCE}"})
     add_options(parser, Path, {"--design FILE": "design.toml, in place of --method"})
 

@@ -8,8 +8,8 @@ import numpy as np
 from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
-from mpc.cars import Car, DoubleTrackCar
-from mpc.loop.lateral import TellsLateral
+from mpc.cars import DoubleTrackCar
+from mpc.loop.lateral import LateralVelocity
 from mpc.loop.sensing import Measured, Measures, cornering_limit, inertial_unit
 from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
@@ -26,13 +26,13 @@ RATE_LIMIT = 1.0  # rad/s at the road wheels
 
 
 def learning_drive(
-    car: Car,
+    car: DoubleTrackCar,
     sensors: Measures,
     rng: np.random.Generator,
     *,
     grip: float,
     seed: int,
-    lateral: TellsLateral | None = None,
+    lateral: LateralVelocity | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.

@@ -1,6 +1,6 @@
 """One drive for each tire that a tracker is given: linear, frozen, true, or learnt on the way."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,9 +8,8 @@ import numpy as np
 
 from codegen import find_compiler
 from identifier.inertial import InertialIdentifier
-from identifier.method import CannotFreezeError
 from identifier.methods import continuing
-from identifier.run import DivergedError, OnlineIdentifier
+from identifier.run import OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.friction import Friction
@@ -18,7 +17,6 @@ from models.rules import require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
-from mpc.loop.dither import Dither
 from mpc.loop.drive import LearningTires
 from mpc.loop.drive import drive as drive_tracker
 from mpc.loop.lateral import LateralVelocity
@@ -112,37 +110,9 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
-PROBED = 0.03  # rad: slip at which curves are asked how unsure they are
-SURE, UNSURE = 0.1, 0.25  # standard deviations over the prior's, between which a weave begins
-ASKED = 0.5  # s between two looks
-
-
-def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
-    """Return what tells how much of the tires is unknown, 0 to 1; None where nobody learns."""
-    if not isinstance(learner, Learner):
-        return None
-    last, calls = 1.0, 0
-
-    def unknown() -> float:
-        nonlocal last, calls
-        if calls % round(ASKED / PERIOD) == 0:
-            try:
-                sd = learner.supervisor.identifier.model().relative_sd(np.array([PROBED]))
-            except (DivergedError, CannotFreezeError, ValueError):  # no model now
-                sd = None
-            if sd is not None:
-                unsure = float(sd.max())
-                last = min(max((unsure - SURE) / (UNSURE - SURE), 0.0), 1.0)
-        calls += 1
-        return last
-
-    return unknown
-
-
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
 FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
-WEAVES = (0.0, 0.5)  # m
 PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
@@ -153,7 +123,6 @@ class Conditions:
     Parameters
     ----------
     kind : of the sensors, of `SENSORS`; imu measures no v_y.
-    dither : deviation that a weave may make which teaches [m]; 0 keeps to the path.
     caution : share of what is not known of the tires that the tracker fears, from 0 to 1.
     """
 
@@ -164,7 +133,6 @@ class Conditions:
     laps: float
     faults: tuple[SensorFault, ...] = ()
     kind: str = FULL
-    dither: float = 0.0
     caution: float = 0.0
 
     @property
@@ -251,14 +219,6 @@ def run_drive(
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
     learner = _learner(label, setup, learnt)
-    weave = None
-    if conditions.dither > 0.0:
-        weave = Dither(
-            vehicle=setup.vehicle,
-            amplitude=conditions.dither,
-            grip=setup.grip,
-            need=unknown_of(learner),
-        )
     witness = Witness(learner, PERIOD) if isinstance(learner, Learner) else None
     beside: LearningTires | None = witness or learner
     with Progress(f"driving on {label} tires") as progress:
@@ -272,7 +232,6 @@ def run_drive(
             rng=np.random.default_rng([conditions.seed, 2]),
             learner=BacksOff(beside) if conditions.caution > 0.0 else beside,
             lateral=conditions.lateral(learnt),
-            dither=weave,
             laps=conditions.laps,
             widest=WIDEST,
             plan_every=PLAN_EVERY,
@@ -313,7 +272,6 @@ def drive(
     noise: bool = True,
     sensors: str = FULL,
     laps: float = 1.0,
-    dither: float = 0.0,
     seed: int = 0,
     caution: float = 0.0,
 ) -> Run:
@@ -334,8 +292,6 @@ def drive(
     sensors : full, or imu: gyro, accelerometer, wheel speed, steering and a localization of
         position and heading, but no v_y, which an inertial identifier tells.
     laps : of a closed path.
-    dither : deviation that a weave may make which teaches [m], at most 0.5; 0 keeps to the path.
-        With learning tires it fades as their uncertainty falls.
     seed : of the noise.
     caution : share of the tires' uncertainty that the tracker plans for, from 0 to 1, the least
         grip that the motion leaves possible.
@@ -365,7 +321,6 @@ def drive(
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_within(ValueError, *WEAVES, **{"dither in m": dither})
     require_within(ValueError, *FRICTIONS, friction=friction)
     require_within(ValueError, 0.0, 1.0, caution=caution)
     vehicle.require_chassis()
@@ -383,7 +338,6 @@ def drive(
         seed=seed,
         laps=laps,
         kind=sensors,
-        dither=dither,
         caution=caution,
     )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN

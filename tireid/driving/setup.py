@@ -14,7 +14,7 @@ from codegen.arrays import Array
 from models.friction import Friction, FrictionChange
 from models.tires import Tire
 from models.vehicle import Vehicle
-from mpc.cars import Car, DoubleTrackCar
+from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import SpeedProfile, cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
@@ -49,7 +49,7 @@ class Setup:
     drops: tuple[tuple[float, float], ...]
     wish: SpeedWish
 
-    def car(self, *, open_field: bool = False) -> Car:
+    def car(self, *, open_field: bool = False) -> DoubleTrackCar:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
         return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.floor import share_of_force
-from identifier.baselines import CurveModel, magic_formula_ekf
+from identifier.baselines import magic_formula_ekf
 from identifier.baselines.ports import LAG_PORTS
 from identifier.run import identify
 from tests.identifier.baselines.conftest import MAGIC, magic
@@ -60,30 +60,8 @@ def test_lag_and_offsets_are_found_on_a_car_that_has_them(car, curve_drive, rng)
     assert (share_of_force(plain, read) > 3.0 * share_of_force(found, read)).all()
 
 
-def test_a_stored_lag_and_offsets_begin_the_next_run(car, drive):
-    recording, method = drive(n=600), magic_formula_ekf(car)
-    model = identify(recording, car, method).freeze(99.0)
-    again = identify(recording, car, method, start=model).freeze(0.0)
-    assert model.lagged and np.abs(model.offset).min() > 0.0
-    np.testing.assert_allclose(again.relaxation_length, model.relaxation_length, rtol=1e-9)
-    np.testing.assert_allclose(again.offset, model.offset, rtol=1e-9)
-
-
-def test_stored_parameters_begin_the_next_run(car, drive):
-    recording, method = drive(n=600), magic_formula_ekf(car)
-    model = identify(recording, car, method).freeze(99.0)
-    again = identify(recording, car, method, start=model).freeze(0.0)
-    np.testing.assert_allclose(again.parameters, model.parameters, rtol=1e-9)
-    other = CurveModel(vehicle=car, curve="linear", parameters=np.ones((2, 1)), min_speed=1.0)
-    with pytest.raises(ValueError, match="stored model is not a curve"):
-        identify(recording, car, method, start=other)
-
-
-@pytest.mark.parametrize("shape", [0.5, 2.5])
-def test_a_stored_shape_that_no_filter_reaches_is_no_start(shape, car, drive):
+def test_it_begins_afresh_and_with_no_stored_curve(car, drive):
     recording, method = drive(n=200), magic_formula_ekf(car)
     model = identify(recording, car, method).freeze(99.0)
-    parameters = model.parameters.copy()
-    parameters[0, 1] = shape
-    with pytest.raises(ValueError, match="a curve to begin with must have positive stiffness"):
-        identify(recording, car, method, start=replace(model, parameters=parameters))
+    with pytest.raises(ValueError, match="goes on from no stored model"):
+        identify(recording, car, method, start=model)

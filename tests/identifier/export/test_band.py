@@ -100,7 +100,7 @@ def test_the_manifest_keeps_the_calibration_and_says_what_is_told(package, packa
     assert "band" not in json.loads(packages["axle"].files["tireid.json"])
 
 
-@pytest.mark.parametrize("law", ["integral", "inertial", "linear_kf"])
+@pytest.mark.parametrize("law", ["integral", "inertial"])
 def test_a_method_that_cannot_tell_how_sure_it_is_has_no_band(law):
     with pytest.raises(ValueError, match="cannot tell how sure it is: it has no band"):
         specialize(make_method(law, CAR), CAR, with_band=True)

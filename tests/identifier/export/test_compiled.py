@@ -16,6 +16,7 @@ from identifier.run import identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
+from tests.rivals import needs_rivals
 
 CAR = sedan()
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
@@ -202,6 +203,7 @@ def test_amounts_that_are_negative_are_refused(learnt, law, name):
         assert refused(run, {**weights, name: spoilt})
 
 
+@needs_rivals
 def test_a_signal_has_no_weights(packages, slalom):
     run = CompiledPackage.of(packages["linear_kf"])
     assert run.weights == {}

@@ -14,6 +14,7 @@ from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
 from tests.kept import Kept
+from tests.rivals import needs_rivals
 
 fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
 validation = pytest.importorskip("fmpy.validation")
@@ -123,6 +124,7 @@ def test_what_is_told_is_to_the_last_bit_what_the_step_tells(paths, version, ste
     assert np.ptp(told[:, 2]) > 0.1
 
 
+@needs_rivals
 @pytest.mark.parametrize("law", ["linear_kf", "washout"])
 def test_an_fmu_tells_as_much_of_side_slip_as_its_step(law, tmp_path, monkeypatch):
     """Not every method knows how sure it is, or whether anything can be seen."""

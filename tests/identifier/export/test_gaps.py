@@ -15,11 +15,13 @@ from identifier.run import OnlineIdentifier, identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
+from tests.rivals import INSTALLED
 
 CAR = sedan()
-OTHERS = ("magic_formula_ekf", "linear_kf", "washout")
+TOLD = ("linear_kf", "washout") * INSTALLED
+OTHERS = ("magic_formula_ekf", *TOLD)
 LAWS = ("axle", "integral", *OTHERS, BANKED, "inertial")
-TELL_V_Y = ("linear_kf", "washout", "inertial")
+TELL_V_Y = (*TOLD, "inertial")
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 

@@ -17,6 +17,7 @@ from identifier.run import identify
 from models.recordings import write_recording
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED, STRICT
+from tests.rivals import NAMES, rival
 
 CAR = sedan()
 MISRA_FINDINGS = 2  # may only become fewer: one operator ##, one macro for users alone
@@ -211,7 +212,7 @@ def test_the_self_test_sees_a_wrong_sign_and_a_wrong_vector(
     assert "FAILED: forces are those of the vectors" in answer.stdout
 
 
-@pytest.mark.parametrize("law", [law for law in METHODS if law not in ("linear", "mhe")])
+@pytest.mark.parametrize("law", [*(one for one in METHODS if one != "linear"), *map(rival, NAMES)])
 def test_every_method_passes_its_own_test_without_a_warning(law, packages, write, run):
     folder = write(packages[law])
     library = ["src/tireid.c", "src/tireid_equations.c"]

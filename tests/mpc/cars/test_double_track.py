@@ -43,16 +43,6 @@ def test_the_road_wheels_follow_the_command_with_the_lag_of_the_chassis():
     assert column(states, "delta") == pytest.approx(0.02 * (1.0 - np.exp(-t / lag)), abs=1e-7)
 
 
-def test_half_the_friction_carries_half_the_acceleration():
-    largest = []
-    for scale in (1.0, 0.5):
-        car = DoubleTrackCar(sedan(), friction=Friction(scale=scale))
-        states = driven(car, 300, lambda k: min(0.0025 * k, 0.25), v_x=20.0)
-        largest.append(np.abs(column(states, "a_y")).max())
-    assert largest[1] / largest[0] == pytest.approx(0.5, abs=0.05)
-    assert largest[0] > 8.0
-
-
 def test_the_road_turns_slippery_where_it_is_said_to():
     road = Friction(changes=(FrictionChange(scale=0.3, at_time=1.0),))
     slippery = DoubleTrackCar(sedan(), friction=road)

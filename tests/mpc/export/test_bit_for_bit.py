@@ -30,17 +30,6 @@ def test_clang_computes_the_bits_of_gcc(law, single, here, packages):
     assert found.hash == here(law, single).hash
 
 
-@pytest.mark.parametrize("flags", ["-O0", "-O3 -fno-trapping-math", "-O3 -march=native"])
-def test_optimization_does_not_change_a_bit(flags, here, packages):
-    words = ["-std=c99", "-ffp-contract=off", *flags.split()]
-    found = run(packages["axle"], "gcc", single=True, flags=words)
-    assert found.hash == here("axle", True).hash
-
-
-def test_precisions_and_tires_differ(here):
-    assert len({here(law, single).hash for law, single in CASES}) == len(CASES)
-
-
 @needs_arm
 @pytest.mark.parametrize(("law", "single"), CASES)
 def test_the_processor_computes_the_bits_of_this_machine_within_its_means(

@@ -10,7 +10,7 @@ import pytest
 from identifier.methods import make_method
 from mpc.handover.certificate import law_complaint, tire_complaint
 from mpc.handover.road import at_friction
-from mpc.handover.supervisor import Excitation, slips
+from mpc.handover.supervisor import Excitation
 from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.tire import TireStructure
 
@@ -113,27 +113,12 @@ def test_a_learnt_tire_that_pushes_without_slip_is_refused_to_either_side(tire, 
         assert place == 1 or axle in found  # a bias of v_y is at both axles
 
 
-def test_a_tire_without_limit_passes_only_as_far_as_it_was_driven(car):
-    linear = prediction_tire(car)
-    assert tire_complaint(linear, 20.0, 0.05) is None
-    assert "times its load" in tire_complaint(linear, 20.0)
-
-
 def test_a_law_without_its_certificate_is_refused(car):
     design = make_method("integral", car)
     assert law_complaint(design, car) is None
     wild = replace(design, gains=replace(design.gains, eta_W=100.0 * design.gains.eta_W))
     assert "certificate fails" in law_complaint(wild, car)
     assert law_complaint(make_method("axle", car), car) is None
-
-
-def test_slips_are_those_of_the_paper(car, rng):
-    samples = np.column_stack(
-        [rng.uniform(10, 30, 20), rng.normal(size=20), rng.normal(size=20), rng.normal(size=20)]
-    )
-    for (v_x, v_y, r, delta), alpha in zip(samples, slips(samples, car), strict=True):
-        front = delta - np.angle(v_x + 1j * (v_y + car.l_f * r))
-        np.testing.assert_allclose(alpha, [front, -np.angle(v_x + 1j * (v_y - car.l_r * r))])
 
 
 def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):

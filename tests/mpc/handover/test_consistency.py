@@ -128,22 +128,6 @@ def test_without_a_word_of_what_was_asked_the_steering_is_not_judged():
     assert all(watch.observe(broken.measure(state, rng)) for state in states(3.0))
 
 
-def test_a_stuck_sensor_shows_its_last_good_value_and_disturbs_no_other():
-    fault = SensorFault(channel="r", kind="stuck", start=1.0, duration=0.5)
-    rngs = [np.random.default_rng(4) for _ in range(2)]
-    broken, good = FaultySensors(inertial_unit(), [fault]), inertial_unit()
-    held = None
-    for state in states(2.0):
-        shown, right = broken.measure(state, rngs[0]), good.measure(state, rngs[1])
-        assert shown._replace(r=0.0) == right._replace(r=0.0)
-        if fault.active(state.t):
-            assert shown.r == held
-        else:
-            assert shown.r == right.r
-            held = right.r
-    assert isinstance(shown, Measured)
-
-
 @pytest.mark.parametrize("channel", Measured._fields[1:])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e308])
 def test_one_sample_that_is_no_number_is_noticed_and_forgotten(channel, value):

@@ -8,7 +8,7 @@ import pytest
 from identifier.methods import make_method
 from identifier.paper.network import Network
 from mpc.handover.judge import Judge, axle_forces
-from mpc.handover.road import at_friction, can_scale, fit_friction
+from mpc.handover.road import at_friction, fit_friction
 from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import DROP, samples_of
 
@@ -58,7 +58,6 @@ def test_a_network_of_slip_is_stretched_exactly(car, rng):
 
 def test_what_reads_the_speed_or_knows_no_limit_cannot_be_told_for_a_friction(car):
     linear = prediction_tire(car)
-    assert not can_scale(linear)
     with pytest.raises(ValueError, match="LinearAxles cannot be scaled to another friction"):
         at_friction(linear, 0.5)
     with pytest.raises(ValueError, match="must be positive"):

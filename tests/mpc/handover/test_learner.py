@@ -95,9 +95,3 @@ def test_a_preview_writes_no_memory_of_what_steers(learnt):
     before = [one.tobytes() for one in every]
     tracker.previewed_rate(at_friction(tire, 0.4))
     assert [one.tobytes() for one in every] == before
-
-
-def test_jumps_must_be_positive(car, learnt):
-    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
-    with pytest.raises(ValueError, match="jumps must be positive"):
-        Learner(Supervisor(identifier, prediction_tire(learnt)), quick_jump=0.0)

@@ -10,7 +10,7 @@ from identifier.methods import make_method
 from identifier.paper.network import Network
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
-from models.maneuvers import RandomSteer, Slalom
+from models.maneuvers import RandomSteer
 from mpc.handover import supervisor as supervisor_module
 from mpc.handover.judge import ChiSquare, Judge
 from mpc.handover.road import at_friction
@@ -87,23 +87,6 @@ def test_a_friction_that_comes_back_is_regained_up_to_what_was_learnt(car, learn
     assert max(d.friction for d in supervisor.decisions) <= 1.0
 
 
-def test_the_dry_tire_comes_back_after_another_was_learnt_in_between(car, learnt):
-    steer = Slalom(amplitude=0.05, frequency=0.4, onset=0.2, rate_limit=1.0, duration=10.0)
-    changes = (FrictionChange(scale=0.5, at_time=2.0), FrictionChange(scale=1.0, at_time=8.0))
-    _, recording = drive(steer, friction=Friction(changes=changes))
-    supervisor = watched(supervisor_of(car, learnt), recording)
-    made = [(d.verdict, d.t) for d in supervisor.decisions]
-    assert any(verdict is Verdict.LEARNT and 2.5 < t < 8.0 for verdict, t in made)
-    back = [t for verdict, t in made if verdict is Verdict.RECOVERY]
-    assert 8.0 < back[0] < 9.5
-    n = supervisor.target.structure.units
-    grip = [
-        tire.weights[3 + n :].reshape(2, -1)[:, 2:].sum()
-        for tire in (supervisor.target, prediction_tire(learnt))
-    ]
-    assert grip[0] > 0.8 * grip[1]
-
-
 def test_what_is_not_better_is_not_handed_over(car, learnt, dry):
     """An identifier that begins with the tire in use, on the road that it was learnt on."""
     supervisor = watched(supervisor_of(car, learnt, rules=Rules(evidence=1e3)), dry[1])
@@ -119,15 +102,6 @@ def test_what_was_not_excited_is_not_handed_over(car, learnt):
         supervisor.observe(*row)
     assert supervisor.decisions == []
     assert "axle was identified for" in supervisor.last.reason
-
-
-def test_a_lost_sample_now_and_then_hides_no_drop(car, learnt, dropped):
-    supervisor = supervisor_of(car, learnt)
-    for k, row in enumerate(samples_of(dropped[1])):
-        supervisor.observe(*(np.full(4, np.nan) if k % 20 < 3 else row))
-    lost = [d.t for d in supervisor.decisions if d.verdict is Verdict.FRICTION]
-    assert DROP < lost[0] < DROP + 0.7
-    assert supervisor.identifier.counts.refused == 3 * 45 + 1
 
 
 @pytest.mark.parametrize("broken", [np.full(4, np.nan), np.zeros(4)])

@@ -2,32 +2,11 @@ import numpy as np
 import pytest
 
 from mpc.path import BUILT_IN, PathError, constant_radius, handling_course
-from mpc.path.courses import pairs_beside
 
 
 @pytest.fixture(scope="module")
 def course():
     return handling_course()
-
-
-def crossings(X, Y):
-    """Pairs of steps of a polygon that cross, by the signs of the areas to both ends."""
-    a = np.column_stack((X[:-1], Y[:-1]))
-    b = np.column_stack((X[1:], Y[1:]))
-
-    def side(p, q, r):
-        along, to = (q - p)[:, None], r[None] - p[:, None]
-        return np.sign(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0])
-
-    apart = side(a, b, a) * side(a, b, b) < 0
-    i, j = np.nonzero(apart & apart.T)
-    return [(m, n) for m, n in zip(i, j, strict=True) if n > m + 1]
-
-
-def test_the_course_never_crosses_itself(course):
-    assert not crossings(course.X[::4], course.Y[::4])
-    planted = crossings(np.array([0.0, 10.0, 10.0, 5.0]), np.array([0.0, 0.0, 5.0, -5.0]))
-    assert planted == [(0, 2)]
 
 
 def test_other_legs_of_the_course_keep_a_width_of_the_road(course):
@@ -64,17 +43,11 @@ def test_a_circle_is_entered_and_left_gently_on_either_side():
 
 
 def test_cones_stand_beside_the_path(course):
-    cones = pairs_beside(course, gap=10.0, half_width=2.0)
+    cones = course.cones
     near = [course.project(x, y).e_y for x, y in cones]
     half = len(cones) // 2
-    assert near == pytest.approx([2.0] * half + [-2.0] * half, abs=1e-6)
-    assert len(cones) == 2 * round(course.length / 10.0)
-
-
-def test_the_samples_of_a_course_lie_a_quarter_of_a_meter_apart_at_most(course):
-    for path in (course, constant_radius(30.0)):
-        steps = np.hypot(np.diff(path.X), np.diff(path.Y))
-        assert 0.2 < steps.max() <= 0.25 + 1e-9
+    assert near == pytest.approx([2.5] * half + [-2.5] * half, abs=1e-6)
+    assert len(cones) == 2 * round(course.length / 8.0)
 
 
 def test_the_names_of_the_command_line_build_paths():

@@ -72,13 +72,6 @@ def test_files_that_are_none_are_named(tmp_path):
         Path.from_csv(tmp_path / "binary.csv")
 
 
-def test_the_tightest_turn_that_is_allowed_is_that_of_the_caller(tmp_path):
-    file = write(tmp_path, f"x,y\n{rows(RING)}")
-    assert Path.from_csv(file, minimum_radius=25.0).peak_curvature == pytest.approx(1 / 30, rel=0.1)
-    with pytest.raises(PathError, match="tighter than 40"):
-        Path.from_csv(file, minimum_radius=40.0)
-
-
 def test_spacing_and_smoothing_are_those_of_the_caller(tmp_path):
     rng = np.random.default_rng(3)
     rough = [(x + 0.05 * rng.normal(), y + 0.05 * rng.normal()) for x, y in RING]

@@ -84,12 +84,6 @@ def test_an_open_path_goes_straight_on_beyond_its_ends():
         assert path.curvature(end + beyond) == 0.0
 
 
-def test_pose_keeps_the_shape_of_its_argument(path):
-    for shape in ((), (3,), (2, 4)):
-        assert {values.shape for values in path.pose(np.full(shape, 1.5))} == {shape}
-        assert path.curvature(np.full(shape, 1.5)).shape == shape
-
-
 def test_values_along_a_path_wrap_with_the_laps_and_hold_at_open_ends(course):
     speed = 10.0 + 0.01 * course.s
     speed[-1] = speed[0]

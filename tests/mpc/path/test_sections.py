@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mpc.path import Path, PathError
-from mpc.path.courses import Straight, Turn, close, line_along
+from mpc.path import PathError
+from mpc.path.courses import Straight, Turn, line_along
 from mpc.path.line import line_from_heading
 
 RIGHT = Turn(radius=20.0, angle=-1.2, easing=8.0)
@@ -34,57 +34,11 @@ def test_sections_end_where_quadrature_says():
     assert line.s[-1] == pytest.approx(10.0 + RIGHT.length + 5.0)
 
 
-def corners(last):
-    turn = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
-    return [
-        Straight(length=40.0), turn, Straight(length=25.0), turn, Straight(length=10.0), turn,
-        Straight(length=10.0), last,
-    ]  # fmt: skip
-
-
-def test_two_straights_close_a_course():
-    course = close(corners(Turn(radius=15.0, angle=np.pi / 2, easing=6.0)), (4, 6))
-    assert [course[4].length, course[6].length] == pytest.approx([40.0, 25.0], abs=1e-6)
-    Path.from_line(line_along(course), name="rectangle", closed=True)
-
-
-def test_a_straight_of_less_than_a_meter_does_not_close_a_course():
-    turn = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
-    for length, closes in ((1.5, True), (0.5, False)):
-        sections = [Straight(length=length), *corners(turn)[1:]]
-        if closes:
-            assert close(sections, (4, 6))[4].length == pytest.approx(length, abs=1e-6)
-        else:
-            with pytest.raises(PathError, match="section 4 cannot close"):
-                close(sections, (4, 6))
-
-
-def test_courses_that_cannot_close_are_refused():
-    right = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
-    with pytest.raises(PathError, match="must turn by 2 pi"):
-        close(corners(Turn(radius=15.0, angle=1.5, easing=6.0)), (4, 6))
-    with pytest.raises(PathError, match="must not be parallel"):
-        close(corners(right), (0, 4))
-    with pytest.raises(PathError, match="section 6 cannot close"):
-        close(
-            [
-                Straight(length=4.0), *corners(right)[1:2], Straight(length=2.0),
-                *corners(right)[3:4], Straight(length=99.0), right, Straight(length=9.0),
-                Turn(radius=50.0, angle=np.pi / 2, easing=6.0),
-            ],
-            (4, 6),
-        )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("build", "message"),
     [
         (lambda: Straight(length=0.0), "length of a straight"),
         (lambda: Straight(length=np.nan), "length of a straight"),
-        (lambda: Turn(radius=-3.0, angle=1.0, easing=1.0), "radius and easing"),
-        (lambda: Turn(radius=3.0, angle=np.nan, easing=1.0), "radius and easing"),
-        (lambda: Turn(radius=10.0, angle=0.5, easing=6.0), "easing of at most 5 m"),
-        (lambda: line_along([]), "0 sections"),
         (lambda: line_along([Straight(length=5.0)], spacing=0.0), "every 0.0 m"),
         (lambda: line_from_heading(np.zeros(7), np.zeros(7), 1.0), r"4 n \+ 1 samples"),
     ],

@@ -19,13 +19,6 @@ def test_points_on_a_circle_give_a_circle_however_they_are_spaced(rng):
         assert path.lap_turn == pytest.approx(2 * np.pi, abs=1e-9)
 
 
-def test_the_other_way_round_turns_right():
-    X, Y = circle(40)
-    path = Path.from_waypoints(X, -Y, closed=True)
-    assert path.kappa.max() < 0.0
-    assert path.lap_turn == pytest.approx(-2 * np.pi)
-
-
 def test_the_path_of_a_sine_has_its_curvature_and_converges_with_the_way_points():
     errors = []
     for n in (40, 80):

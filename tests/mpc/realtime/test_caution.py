@@ -63,17 +63,6 @@ def test_a_road_of_half_the_friction_is_planned_for_and_the_dry_one_is_not_feare
     assert 0.35 < wet[-1] < 0.75
 
 
-def test_half_the_caution_fears_half_as_much(lagging):
-    state = []
-    for caution in (1.0, 0.5):
-        tracker = make(lagging, caution)
-        tracker.instance.params["prior"][1:4] = 0.0  # these may be, before anything is seen
-        tracker.step(Measurement(0.0, 0.0, 0.0, 0.0, np.zeros(21), np.full(21, V_X)))
-        state.append(1.0 - tracker.grip)
-    assert state[0] == pytest.approx(1.0 - GRIPS[3], abs=1e-12)
-    assert state[1] == pytest.approx(0.5 * state[0], abs=1e-12)
-
-
 def test_wheels_that_are_off_what_is_commanded_are_found_and_not_taken_for_ice(lagging):
     tracker = make(lagging, 1.0)
     grips = slalom(tracker, lagging, zero=0.01, peak=0.004)
@@ -294,13 +283,6 @@ def test_a_sample_that_is_no_number_leaves_what_is_believed_as_it_was(lagging):
     assert tracker.step(broken).status == Status.NOT_FINITE
     assert tracker.grip == before
     assert np.isfinite(tracker.instance.state["cost"]).all()
-
-
-def test_caution_is_a_share(lagging):
-    with pytest.raises(ValueError, match=r"caution must lie between 0 and 1, it is 1\.5"):
-        make(lagging, 1.5)
-    with pytest.raises(ValueError, match="it is nan"):
-        make(lagging, np.nan)
 
 
 def test_a_tire_of_no_other_friction_is_driven_with_its_own(linear):

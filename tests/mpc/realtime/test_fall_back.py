@@ -1,6 +1,5 @@
 """Steering without a plan: its gains by another road, and the built-in car at low and top speed."""
 
-import ctypes
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,16 +8,13 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.export.package import build_mpc_package
 from mpc.loop.drive import drive
 from mpc.path.path import Path
 from mpc.problem import Problem
-from mpc.realtime import Guards, Measurement, Status, Tracker
+from mpc.realtime import Guards, Status, Tracker
 from mpc.realtime.fall_back import fall_back, feedback, motion, steady_turn
-from mpc.realtime.instance import c_types
 from mpc.tires import prediction_tire
 
 CAR = sedan()
@@ -143,45 +139,3 @@ def test_without_a_plan_the_built_in_car_keeps_its_path(v_x):
     assert len(tracker.seen) > 400
     assert max(abs(m.e_y) for m in tracker.seen) < 0.5
     assert max(abs(m.kappa[0]) * m.v_x[0] ** 2 for m in tracker.seen) > 0.7  # there are bends
-
-
-class Exported:
-    """The C of a package, compiled alone, called with the same measurements."""
-
-    def __init__(self, folder):
-        package = build_mpc_package(prediction_tire(CAR), PROBLEM, period=PERIOD, delay=PERIOD)
-        for path, text in package.files.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_text(text)
-        sources = sorted(str(path) for path in (folder / "src").glob("*.c"))
-        flags = ["-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared"]
-        words = [*find_compiler(), *flags, f"-I{folder / 'include'}", *sources]
-        subprocess.run([*words, "-lm", "-o", str(folder / "tracker.so")], check=True)
-        self.library = ctypes.CDLL(str(folder / "tracker.so"))
-        types = c_types(package.tire.structure, PROBLEM.horizon, single=False)
-        self.params, self.state, self.input = (
-            np.zeros((), types[name]) for name in ("params", "state", "input")
-        )
-        self.work, self.steering = np.zeros(100_000, np.uint8), np.zeros(1)
-        assert self.library.tireid_mpc_default_params(self.at(self.params)) == 0
-        self.params["hold_time"] = 0.0
-        assert self.library.tireid_mpc_init(self.at(self.state)) == 0
-
-    @staticmethod
-    def at(array):
-        return ctypes.c_void_p(array.ctypes.data)
-
-    def __call__(self, m: Measurement):
-        for name, value in m._asdict().items():
-            self.input[name] = value
-        arrays = (self.state, self.params, self.work, self.input, self.steering)
-        assert self.library.tireid_mpc_step(*map(self.at, arrays)) == Status.NOT_FINITE
-        return self.steering[0]
-
-
-@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-@pytest.mark.parametrize("v_x", SPEEDS)
-def test_the_exported_c_steers_the_same_and_keeps_the_path_too(v_x, tmp_path):
-    tracker = Blind(Exported(tmp_path))
-    came = drive(bends(v_x), DoubleTrackCar(CAR), tracker, speed=v_x, rng=np.random.default_rng(0))
-    assert came.completed, came.ending

@@ -67,14 +67,6 @@ def test_at_the_center_of_a_turn_there_is_no_place_on_the_path(tracker, measure,
     assert tracker.step(near).status != Status.OFF_PATH
 
 
-def test_where_the_center_comes_later_the_equations_stay_finite(tracker, measure):
-    for e_y in np.linspace(0.5, 4.9, 40):
-        told = measure(e_y=e_y, kappa=1.0 / e_y)
-        told.kappa[0] = 0.0
-        tracker.step(told)
-        assert np.abs(numbers(tracker)).max() < 1e12
-
-
 def test_the_stage_is_finite_beyond_the_center_and_as_before_on_this_side(tire, problem):
     stage = build_stage(tire.structure)
     n_x = 7 if tire.structure.lagged else 5

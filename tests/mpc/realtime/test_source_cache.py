@@ -20,13 +20,6 @@ def test_a_second_start_generates_nothing_and_has_the_same_text(own_cache, linea
     assert [path.suffix for path in own_cache.iterdir()] == [".c"]
 
 
-def test_generation_is_deterministic(own_cache, linear):
-    first = tracker_source(linear.structure, 10, single=False)
-    for path in own_cache.iterdir():
-        path.unlink()
-    assert tracker_source(linear.structure, 10, single=False) == first
-
-
 def test_whatever_the_text_depends_on_is_in_its_key(own_cache, monkeypatch):
     inputs = ("v_y", "r", "delta_f")
     small, large = (NetworkAxles(hidden=n, inputs=inputs) for n in (2, 3))

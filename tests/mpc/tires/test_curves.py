@@ -5,14 +5,13 @@ import numpy as np
 import pytest
 
 from identifier.baselines.curves import CurveModel
-from models.tires import DugoffTire, FialaTire, LinearTire
+from models.tires import DugoffTire, LinearTire
 from mpc.tires import prediction_tire
 from mpc.tires.tire import Point
 
 CURVES = {
     "linear": np.array([[1.2e5], [1.0e5]]),
     "magic_formula": np.array([[11.0, 1.4, 7600.0], [12.0, 1.35, 6000.0]]),
-    "dugoff": np.array([[1.2e5, 0.9], [1.0e5, 1.1]]),
 }
 
 
@@ -67,21 +66,14 @@ def test_offsets_without_a_lag_add_no_states(car, motions, forces, at):
     np.testing.assert_allclose(force, model.axle_force(motions), rtol=1e-9, atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", [DugoffTire, FialaTire])
-def test_two_tires_an_axle_make_the_force(car, motions, forces, at, kind):
-    tire = kind(C_alpha=6.0e4, C_kappa=8.0e4, friction=0.9)
-    predicted, slip = forces(prediction_tire(tire, car), *at(motions))
-    expected = np.array(
-        [
-            [2.0 * float(tire.forces(a, 0.0, 0.0, 0.5 * load).F_y) for a, load in pairs]
-            for pairs in (zip(row, car.axle_loads, strict=True) for row in slip)
-        ]
-    )
-    expected[:, 0] *= np.cos(motions.delta_f)
-    np.testing.assert_allclose(predicted, expected, rtol=1e-6, atol=1e-3)
-    limit = 0.9 * np.array(car.axle_loads)
-    assert (np.abs(predicted) <= limit * (1.0 + 1e-9)).all()
-    assert (np.abs(predicted).max(axis=0) > 0.95 * limit).all()  # the motions reach it
+def test_a_frozen_dugoff_curve_is_fitted_by_a_ladder(car, forces):
+    alpha, none = np.linspace(-0.3, 0.3, 61), np.zeros(61)
+    parameters = np.array([[1.2e5, 0.9], [1.0e5, 1.1]])
+    model = CurveModel(vehicle=car, curve="dugoff", parameters=parameters, min_speed=1.0)
+    slips = np.column_stack([alpha, alpha])
+    predicted = forces(prediction_tire(model), 20.0, none, none, none, lagged=slips)[0]
+    limit = parameters[:, 1] * np.array(car.axle_loads)
+    assert (np.abs(predicted - model.force_at(alpha)) < 0.013 * limit).all()
 
 
 def test_slip_is_the_angle_between_wheel_and_travel(car, motions, forces, at):

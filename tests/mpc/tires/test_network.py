@@ -37,16 +37,6 @@ def test_forces_are_those_of_the_frozen_model(network, car, motions, forces, at,
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-def test_another_network_of_that_size_is_other_weights_only(car, motions, forces, at, rng):
-    one, other = (prediction_tire(model_of(car, Network(), rng)) for _ in range(2))
-    assert one.structure == other.structure
-    assert hash(one.structure) == hash(other.structure)
-    assert not np.allclose(forces(one, *at(motions))[0], forces(other, *at(motions))[0], rtol=0.1)
-    larger = prediction_tire(model_of(car, Network(hidden=11), rng))
-    assert larger.structure != one.structure
-    assert larger.weights.size == larger.structure.n_weights == one.weights.size + 6
-
-
 def test_scale_unit_and_stiffness_are_weights(car, rng):
     model = model_of(car, Network(), rng)
     others = (

@@ -4,11 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from benchmarks.converged import iterated
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.tires import FialaTire
 from models.vehicle import sedan
-from mpc.prediction import build_dynamics, build_rk4
+from mpc.prediction import build_dynamics
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
@@ -38,11 +37,6 @@ def test_slip_is_of_use_up_to_nearly_the_peak(oracle):
         there = np.interp(useful[axle], SLIPS, force[axle])
         assert 0.97 < there / force[axle].max() <= 1.0
         assert useful[axle] <= SLIPS[force[axle].argmax()] + 0.005
-
-
-def test_half_the_friction_halves_the_useful_slip():
-    dry, wet = (valid_slip(oracle_tire(CAR, mu=mu), NO_LIMIT).slip for mu in (1.0, 0.5))
-    assert wet == pytest.approx(0.5 * dry, rel=0.1)
 
 
 def test_a_linear_tire_is_of_use_everywhere_and_goes_on_as_it_is():
@@ -82,7 +76,7 @@ def test_a_curve_goes_on_without_a_kink(oracle):
 def test_a_tire_that_slides_fully_still_rises():
     tire = prediction_tire(FialaTire(C_alpha=6e4, C_kappa=8e4, friction=0.5), CAR)
     kept = curves(tire, valid_slip(tire, MOST))
-    assert np.diff(curves(tire)).min() == pytest.approx(0.0, abs=1e-6)
+    assert np.diff(curves(tire)).min() < 0.0
     assert np.diff(kept).min() > 0.0
 
 
@@ -113,19 +107,3 @@ def test_the_tracker_believes_what_is_of_use_of_the_tire_that_it_is_told():
         np.testing.assert_allclose(tracker.params["max_slip"], slip, rtol=1e-14)
         np.testing.assert_allclose(tracker.params["rise"], rise, rtol=1e-14)
     assert (tracker.params["max_slip"] < 0.1).all()
-
-
-def test_the_c_predicts_with_curves_that_rise(oracle):
-    tracker = Tracker(oracle, Problem(horizon=10, dt=0.02))
-    x0, n = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.3, 0.0]), 10  # far beyond the peak
-    plan = iterated(tracker, x0, np.zeros(n), np.full(n, 15.0))
-    step = build_rk4(oracle.structure)
-    misses = []
-    for valid in (valid_slip(oracle, tracker.problem.limits.slip), ALL):
-        told = (0.0, 15.0, 0.02, oracle.car, oracle.weights, *valid)
-        there = [
-            np.asarray(step(x, u, *told)).ravel()
-            for x, u in zip(plan.plan_x[:-1], plan.plan_u, strict=True)
-        ]
-        misses.append(np.abs(np.array(there) - plan.plan_x[1:]).max())
-    assert misses[0] < 1e-6 < 1e-3 < misses[1]

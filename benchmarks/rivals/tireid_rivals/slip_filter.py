@@ -1,6 +1,6 @@
 """Kalman filters of v_y and yaw rate that hear r and a_y: on known linear tires, and learning.
 
-State [v_y, r, θ], all as in `identifier.baselines.without_v_y`. The linear filter has no θ: the
+State [v_y, r, θ], all as in `tireid_rivals.without_v_y`. The linear filter has no θ: the
 tires are those of the vehicle file. The joint one learns a tire of Dugoff for each axle alongside,
 θ = [ln C/C_0 front and rear, ln μ/μ_0 front and rear], as random walks, and knows nothing of bank,
 bias, roll, lag or offsets: the naive filter that a textbook suggests (Simon, Optimal State
@@ -19,26 +19,24 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel
-from identifier.baselines.kalman import FilteredTire
-from identifier.baselines.ports import axle_loads
-from identifier.baselines.without_v_y import (
-    MOST_SLIDING,
-    OVER,
-    V_Y,
-    V_Y_SD,
-    axle_force,
-    corrected,
-    expected,
-    given_ports,
-    predicted,
-    steady_v_y,
-)
+from identifier.baselines.kalman import corrected
+from identifier.baselines.ports import WITH_A_Y, axle_loads, given_ports
 from identifier.method import Method, resumed
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
+from tireid_rivals.without_v_y import (
+    MOST_SLIDING,
+    V_Y,
+    V_Y_SD,
+    FilteredTire,
+    axle_force,
+    expected,
+    predicted,
+    steady_v_y,
+)
 
 CARRY = ("estimate", "P", "before", "running")
 PORTS = (
@@ -88,7 +86,7 @@ def _tire(curve: str, force: Any, unknowns: int) -> FilteredTire:
         del known, theta
         return CURVES[curve].slip(p, v_x, x, u)
 
-    return FilteredTire(slip=slip, force=force, lag=None, unknowns=unknowns, prior=1)
+    return FilteredTire(slip=slip, force=force, unknowns=unknowns)
 
 
 TIRES: Mapping[str, FilteredTire] = {
@@ -148,7 +146,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
             ca.if_else(s.moving, following[0], 0),
             ca.sqrt(P_next[0, 0]),
         ],
-        [*CARRY, *OVER, "vehicle", "sampling", "numbers"],
+        [*CARRY, *WITH_A_Y, "vehicle", "sampling", "numbers"],
         [*(f"{port}_next" for port in CARRY), "axle_force", "v_y", "v_y_sd"],
         {"cse": True},
     )
@@ -156,7 +154,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
 
 @cache
 def _scan(tire: str) -> Scan:
-    return Scan(build_step(f"slip_filter_{tire}", TIRES[tire]), carry=CARRY, over=OVER)
+    return Scan(build_step(f"slip_filter_{tire}", TIRES[tire]), carry=CARRY, over=WITH_A_Y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -270,20 +268,3 @@ class SlipFilter(Method):
             parameters=np.column_stack([stiffness, friction]),
             min_speed=self.min_speed,
         )
-
-
-# Both filters by their names.
-
-
-def linear_kf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
-    """Return the linear filter of v_y and r on the stiffnesses of the vehicle file.
-    dt : sampling interval [s].
-    """
-    return SlipFilter.for_vehicle(vehicle, tire="linear", dt=dt)
-
-
-def joint_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> SlipFilter:
-    """Return the naive joint filter of v_y, r and a tire of Dugoff per axle.
-    vehicle : the car; its stiffness is the prior.   dt : sampling interval [s].
-    """
-    return SlipFilter.for_vehicle(vehicle, tire="dugoff", dt=dt)

@@ -6,48 +6,38 @@ A steady turn needs F_r = l_f m v_x r/L, so that on a linear tire its v_y is
 l_r r + v_x (δ_r - F_r/C_r): what every one of them begins with.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.baselines.kalman import FilteredTire, midpoint
-from identifier.baselines.ports import Sample, motion_rate, sample_ports, turning_force
+from identifier.baselines.kalman import midpoint
+from identifier.baselines.ports import motion_rate
 from identifier.setup import Port
 from models.bicycle import BicycleParameters
 
-OVER = ("x", "u", "v_x", "a_y")  # of x the yaw rate alone
 V_Y = Port("v_y", "m/s", "lateral velocity at the center of gravity, positive to the left")
 V_Y_SD = Port("v_y_sd", "m/s", "standard deviation of v_y")
-_MOST_FELT = 98.0  # m/s²: no car feels more
 MOST_SLIDING = 0.7  # |v_y|/v_x beyond which an estimate is none
 
 
-class _Given(NamedTuple):
-    """A sample without v_y: the ports of it, and a_y [m/s²], 0 where there is none.
-    has_a_y : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
+class FilteredTire(NamedTuple):
+    """What makes the forces by θ: functions of symbols.
+
+    slip(bicycle parameters, friction, θ, v_x, x, u) -> α (2,) [rad].
+    force(bicycle parameters, friction, θ, α, u) -> axle forces (2,) [N].   unknowns : size of θ.
     """
 
-    sample: Sample
-    a_y: Any
-    has_a_y: Any
-    a_y_port: Any
-
-    @property
-    def ports(self) -> list[Any]:
-        """The ports of `OVER`, then vehicle and sampling."""
-        s = self.sample
-        return [s.x, s.u, s.v_x, self.a_y_port, s.vehicle, s.sampling]
-
-    @property
-    def r(self) -> Any:
-        """The measured yaw rate [rad/s]."""
-        return self.sample.x[1]
+    slip: Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
+    force: Callable[[BicycleParameters, Any, Any, Any, Any], Any]
+    unknowns: int
 
 
-def given_ports() -> _Given:
-    a_y = ca.SX.sym("a_y")
-    has_a_y = ca.fabs(a_y) < _MOST_FELT  # NaN is not
-    return _Given(sample_ports(), ca.if_else(has_a_y, a_y, 0), has_a_y, a_y)
+def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
+    """Return n, the axle forces of a steady turn (2,) [N].
+    v_x : longitudinal speed [m/s].   x : [v_y, r] (2,).
+    """
+    return p.m * v_x * x[1] / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
 
 
 def steady_v_y(p: BicycleParameters, v_x: Any, r: Any, u: Any) -> Any:
@@ -86,31 +76,3 @@ def expected(
     """Return what the sensors should show of an estimate: r [rad/s] and a_y [m/s²], (2,)."""
     F = axle_force(tire, p, known, estimate, v_x, u)
     return ca.vertcat(estimate[1], (F[0] + F[1]) / p.m)
-
-
-class _Corrected(NamedTuple):
-    """What a measurement makes of an estimate.
-    move : of the estimate (n,).   P : covariance after (n, n).   keep : I - K H (n, n).
-    pull : Hᵀ S⁻¹ times the innovation (n,).
-    """
-
-    move: Any
-    P: Any
-    keep: Any
-    pull: Any
-
-
-def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> _Corrected:
-    """Return what a measurement of two numbers makes of an estimate, in Joseph's form.
-    P : covariance before (n, n).
-    H : what the numbers are of the estimate (2, n); a row of zeros measures nothing.
-    R : covariance of the numbers (2, 2).   innovation : (2,).
-    """
-    S = H @ P @ H.T + R
-    S_inverse = ca.inv_minor(S)
-    most = outlier * ca.sqrt(ca.diag(S))
-    trusted = ca.fmin(ca.fmax(innovation, -most), most)
-    K = P @ H.T @ S_inverse
-    keep = ca.SX.eye(P.size1()) - K @ H
-    after = keep @ P @ keep.T + K @ R @ K.T
-    return _Corrected(K @ trusted, (after + after.T) / 2, keep, H.T @ S_inverse @ trusted)

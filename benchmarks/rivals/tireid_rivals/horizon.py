@@ -1,6 +1,6 @@
 """Moving-horizon estimation of v_y, yaw rate and, for each axle, stiffness and capacity of force.
 
-z = [v_y, r, θ] and the tires are those of the joint filter, `identifier.baselines.slip_filter`. The
+z = [v_y, r, θ] and the tires are those of the joint filter, `tireid_rivals.slip_filter`. The
 window holds r, a_y, v_x and steering of the last N samples; what came before them is in the arrival
 cost, a mean and a covariance. Each sample a fixed number of Gauss-Newton steps minimizes
 
@@ -26,22 +26,21 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CurveModel
-from identifier.baselines.slip_filter import LIMITS, PORTS, TIRES, Numbers, SlipFilter, joint_ekf
-from identifier.baselines.without_v_y import (
-    MOST_SLIDING,
-    OVER,
-    axle_force,
-    corrected,
-    expected,
-    given_ports,
-    predicted,
-    steady_v_y,
-)
+from identifier.baselines.kalman import corrected
+from identifier.baselines.ports import WITH_A_Y, given_ports
 from identifier.method import Method
 from identifier.setup import COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
+from tireid_rivals.slip_filter import LIMITS, PORTS, TIRES, Numbers, SlipFilter
+from tireid_rivals.without_v_y import (
+    MOST_SLIDING,
+    axle_force,
+    expected,
+    predicted,
+    steady_v_y,
+)
 
 TIRE = TIRES["dugoff"]
 Z = 2 + TIRE.unknowns  # numbers of z
@@ -209,12 +208,12 @@ def build_step(samples: int, iterations: int) -> ca.Function:
     rows |= {"P": (Z, Z), "arrival_P": (Z, Z), "estimate": (Z, 1), "arrival": (Z, 1)}
     rows |= {"x": (2, 1), "u": (2, 1), "vehicle": (6, 1), "sampling": (2, 1)}
     rows |= {"numbers": (len(Numbers._fields), 1)}
-    names = [*CARRY, *OVER, *constants]
+    names = [*CARRY, *WITH_A_Y, *constants]
     port = {name: ca.MX.sym(name, *rows.get(name, (1, 1))) for name in names}
     known = [port[name] for name in constants]
     old_at, old = ca.horzsplit(port["trajectory"]), ca.horzsplit(port["window"])
     first = [port["estimate"], port["P"], port["running"], old[-1]]
-    begun = Begun(*_build_beginning()(*first, *(port[name] for name in OVER), *known))
+    begun = Begun(*_build_beginning()(*first, *(port[name] for name in WITH_A_Y), *known))
 
     def forward(at: list[Any], columns: list[Any], z: Any, P: Any) -> list[Stage]:
         found: list[Stage] = []
@@ -260,7 +259,7 @@ def build_step(samples: int, iterations: int) -> ca.Function:
 
 @cache
 def _scan(samples: int, iterations: int) -> Scan:
-    return Scan(build_step(samples, iterations), carry=CARRY, over=OVER)
+    return Scan(build_step(samples, iterations), carry=CARRY, over=WITH_A_Y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -308,7 +307,7 @@ class HorizonEstimator(Method):
         steps, errs no less there.
         """
         window = max(vehicle.froude_time, 2.0 * dt)
-        joint = joint_ekf(vehicle, dt=dt)
+        joint = SlipFilter.for_vehicle(vehicle, tire="dugoff", dt=dt)
         return cls(
             filter=replace(
                 joint, a_y_noise=1.3 * joint.a_y_noise, r_disturbance=0.36 * joint.r_disturbance

@@ -14,12 +14,13 @@ import numpy as np
 
 from codegen import Scan
 from identifier.baselines.curves import CURVES
-from identifier.baselines.without_v_y import OVER, V_Y, given_ports, steady_v_y
+from identifier.baselines.ports import WITH_A_Y, given_ports
 from identifier.method import Method
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive_fields
 from models.vehicle import Vehicle
+from tireid_rivals.without_v_y import V_Y, steady_v_y
 
 CARRY = ("washed", "rate", "running")
 PORTS = (
@@ -58,14 +59,14 @@ def build_step() -> ca.Function:
             ca.if_else(s.moving, force, 0),
             ca.if_else(s.moving, v_y, 0),
         ],
-        [*CARRY, *OVER, "vehicle", "sampling", "cutoff"],
+        [*CARRY, *WITH_A_Y, "vehicle", "sampling", "cutoff"],
         [*(f"{port}_next" for port in CARRY), "axle_force", "v_y"],
     )
 
 
 @cache
 def _scan() -> Scan:
-    return Scan(build_step(), carry=CARRY, over=OVER)
+    return Scan(build_step(), carry=CARRY, over=WITH_A_Y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,15 +1,12 @@
 """Estimators that never read v_y, against textbooks in numpy, and over drives that are known."""
 
 from dataclasses import fields, replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.baselines import HorizonEstimator, SlipFilter, Washout, joint_ekf, linear_kf
-from identifier.baselines.horizon import LONGEST, build_stage
-from identifier.baselines.slip_filter import LIMITS, TIRES, Numbers
-from identifier.baselines.without_v_y import expected, predicted
 from identifier.method import CannotFreezeError
 from identifier.methods import make_method
 from identifier.run import identify
@@ -18,8 +15,18 @@ from models.bicycle import BicycleParameters, bicycle
 from models.recordings import RecordingError
 from models.vehicle import Vehicle
 from tests.identifier.conftest import felt
+from tests.rivals import INSTALLED, REASON
 
-NAMES = ("linear_kf", "joint_ekf", "washout", "mhe")
+if not INSTALLED:
+    pytest.skip(REASON, allow_module_level=True)
+
+from tireid_rivals import NAMES, HorizonEstimator, SlipFilter, Washout
+from tireid_rivals.horizon import LONGEST, build_stage
+from tireid_rivals.slip_filter import LIMITS, TIRES, Numbers
+from tireid_rivals.without_v_y import expected, predicted
+
+linear_kf = partial(SlipFilter.for_vehicle, tire="linear")
+joint_ekf = partial(SlipFilter.for_vehicle, tire="dugoff")
 LEARNING = ("joint_ekf", "mhe")
 
 

@@ -1,0 +1,15 @@
+"""The distribution of benchmarks/rivals: `make` installs it, another environment may lack it."""
+
+import pytest
+
+from identifier.methods import methods
+
+REASON = "needs the rivals: pip install ./benchmarks/rivals"
+NAMES = ("linear_kf", "joint_ekf", "washout")
+INSTALLED = set(NAMES) <= set(methods())
+needs_rivals = pytest.mark.skipif(not INSTALLED, reason=REASON)
+
+
+def rival(name: str, *values: object) -> object:
+    """A case of a parametrized test that is left out where the rivals are not installed."""
+    return pytest.param(name, *values, marks=needs_rivals)
