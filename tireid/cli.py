@@ -20,7 +20,7 @@ from tireid.commands import (
     INTERRUPTED,
     NOT_TOLD,
     add_command,
-    installed,
+    added,
     summary,
 )
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
@@ -55,7 +55,7 @@ def build_parser(words: Sequence[str]) -> _Parser:
         else:
             commands.add_parser(name, help=text)
     if named not in COMMANDS:
-        for name in installed():
+        for name in added():
             if name == named:
                 add_command(name, commands)
             else:

@@ -7,15 +7,15 @@ begins with one line of help. Fleets come in that way, too.
 """
 
 import ast
-import importlib
 from collections.abc import Mapping
-from functools import cache
+from importlib import import_module
 from importlib.abc import InspectLoader
 from importlib.machinery import ModuleSpec
-from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, cast
+
+from codegen.plugins import installed
 
 COMMANDS: Mapping[str, str] = MappingProxyType(
     {
@@ -47,15 +47,14 @@ NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could
 INTERRUPTED = 130
 
 
-@cache
-def installed() -> Mapping[str, EntryPoint]:
-    """Return the commands that distributions add, by name."""
-    return {one.name: one for one in entry_points(group=GROUP) if one.name not in COMMANDS}
+def added() -> list[str]:
+    """Return the names of the commands that distributions add."""
+    return [name for name in installed(GROUP) if name not in COMMANDS]
 
 
 def summary(name: str) -> str:
     """Return a line on an installed command, of its module's docstring; the module is not run."""
-    module = installed()[name].module
+    module = installed(GROUP)[name].module
     try:
         source = cast(InspectLoader, cast(ModuleSpec, find_spec(module)).loader).get_source(module)
         text = ast.get_docstring(ast.parse(source or "")) or ""
@@ -73,9 +72,9 @@ def add_command(name: str, commands: Any) -> None:
         Where a distribution's command cannot be imported.
     """
     if name in COMMANDS:
-        importlib.import_module(f"tireid.commands.{name}").add_parser(commands)
+        import_module(f"tireid.commands.{name}").add_parser(commands)
         return
-    point = installed()[name]
+    point = installed(GROUP)[name]
     try:
         add_parser = point.load().add_parser
     except Exception as error:  # of another's code
