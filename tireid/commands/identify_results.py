@@ -39,8 +39,7 @@ from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
 from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
-from tireid.figures.thinned import DrawnRun
-from tireid.figures.tires import drawn_tracks, learnt_axles_figure, slip_figure
+from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 from tireid.reports.identify import guaranteed_sentence
@@ -237,14 +236,11 @@ class Results:
             model.save(folder / f"weights{end}.json", valid=valid)
             columns = _curve_columns(model, [run.recording for run in self.runs])
             write_csv(folder / f"curve{end}.csv", columns)
-        tracks = None if NETWORK in self.models else drawn_tracks(self.runs[0])
-        self._write_curves(folder, curves, progress or Progress("curves"), tracks)
+        self._write_curves(folder, curves, progress or Progress("curves"))
         say("drawing figures")
-        return save_figures(folder, self._figures(tracks))
+        return save_figures(folder, self._figures())
 
-    def _write_curves(
-        self, folder: Path, curves: str, progress: Progress, tracks: DrawnRun | None
-    ) -> None:
+    def _write_curves(self, folder: Path, curves: str, progress: Progress) -> None:
         learnt, count = self.runs[0], len(self.runs)
         for k, run in enumerate(self.runs):
             replays = {
@@ -260,9 +256,9 @@ class Results:
             found = (_error_columns(learnt, one) for one in learnt.blocks())
             write_table(folder / f"errors.{curves}", found)
         if learnt.online:
-            write_table(folder / f"weights.{curves}", _weight_columns(learnt, tracks))
+            write_table(folder / f"weights.{curves}", _weight_columns(learnt))
 
-    def _figures(self, tracks: DrawnRun | None) -> dict[str, Figure]:
+    def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
         recording, name = learnt.recording, learnt.recording.name
         figures = {"inputs": inputs_figure(recording)}
@@ -282,8 +278,8 @@ class Results:
                 figures["weights"] = weights_figure(learnt, list(own))
             if slip is not None:
                 figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
-            if tracks is not None:
-                figures["learnt"] = learnt_axles_figure(learnt, list(own), tracks)
+            if learnt.tracks_over(next(learnt.blocks())):
+                figures["learnt"] = learnt_axles_figure(learnt, list(own))
         for run in asked:
             drawn = prediction_figure(self.replays[run.recording.name], _beside(run))
             figures[f"replay_{file_name(run.recording)}"] = drawn
@@ -348,12 +344,10 @@ def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
     }
 
 
-def _weight_columns(learnt: History, tracks: DrawnRun | None) -> Iterator[dict[str, Array]]:
+def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
     """Yield the columns of weights.csv: of a long run a row for each of at most `LONG` samples."""
     each = thinning(len(learnt.recording))
     for block in learnt.blocks():
-        if tracks is not None:  # beside it: a long run is computed again for each look at it
-            tracks.take(block)
         rows = slice(-block.part.start % each, None, each)
         weights = {"t_s": learnt.recording.t[block.part][rows]}
         for matrix in [name for name in WEIGHTS if name in block.state]:
