@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -29,6 +29,7 @@ from tireid.driving.runs import (
     WIDEST,
     Conditions,
     Run,
+    run_drive,
 )
 from tireid.driving.setup import PERIOD, PLANT, Setup
 from tireid.figures.drive import (
@@ -43,7 +44,6 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import axle_columns, finite, text_table, write_csv, write_json
 from tireid.progress import say
-from tireid.reports.drive import SCORES, score_rows
 
 NO_FILM = "none"
 
@@ -110,46 +110,90 @@ def _chassis(vehicle: Vehicle) -> dict[str, Any]:
     return {**asdict(chassis), "tire": tire}
 
 
-def write_drives(
-    folder: Path,
-    conditions: Conditions,
-    runs: Sequence[Run],
-    learnt: TireModel | None,
-    inputs: Mapping[str, Any],
-    film: str,
-) -> dict[str, Figure]:
-    """Write everything about drives along one path; return the figures by the name of their file.
+class Drives(NamedTuple):
+    """Drives along one path on several tires, the first of which leads.
 
-    inputs : of `inputs_of`.   film : webp, gif, mp4 or none.
+    learnt : the frozen tires, None where none drives on them.   source : where they are from.
     """
-    first, drops, faults = runs[0], conditions.setup.drops, conditions.faults
-    curves = known_curves(runs, conditions.setup, learnt)
-    write_json(folder / "summary.json", _summarize_drives(runs, inputs))
+
+    conditions: Conditions
+    runs: Sequence[Run]
+    learnt: TireModel | None
+    source: str
+
+    @classmethod
+    def driven(
+        cls, conditions: Conditions, labels: Sequence[str], learnt: TireModel | None, source: str
+    ) -> "Drives":
+        """Drive once on each tire."""
+        runs = [run_drive(label, conditions, learnt) for label in labels]
+        return cls(conditions, runs, learnt, source)
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All that went in, ready for JSON."""
+        labels = [run.label for run in self.runs]
+        return inputs_of(self.conditions, labels, self.source, self.learnt)
+
+    def write(self, folder: Path, film: str) -> dict[str, Figure]:
+        """Write everything about the drives; return the figures by the name of their file.
+
+        film : webp, gif, mp4 or none.
+        """
+        first, setup, faults = self.runs[0], self.conditions.setup, self.conditions.faults
+        curves = _known_curves(self.runs, setup, self.learnt)
+        write_json(folder / "summary.json", _summarize_drives(self.runs, self.inputs))
+        for run in self.runs:
+            name = "drive.csv" if run is first else f"drive_{run.label}.csv"
+            write_csv(folder / name, _drive_columns(run.drive))
+        say("drawing figures")
+        drives = {run.label: run.drive for run in self.runs}
+        on_the_way: dict[str, Any] = {"drops": setup.drops, "faults": faults}
+        limits = first.problem.limits
+        figures = {
+            "path": drive_path_figure(drives),
+            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
+            "steering": drive_steering_figure(
+                drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
+            ),
+            "tires": drive_tires_figure(first.drive, curves),
+            "solve_times": drive_solve_figure(first.drive),
+        }
+        if first.drive.estimates:
+            figures["lateral"] = drive_lateral_figure(first.drive)
+        save_figures(folder, figures)
+        if film != NO_FILM:
+            title, v_x = f"{first.drive.path.name}: {first.label} tires", first.drive.v_x.mean()
+            known = known_over_time(first.known, first.model, float(v_x))
+            path = folder / f"drive.{film}"
+            write_film(path, drives, curves, drops=setup.drops, title=title, known=known)
+        return figures
+
+    def text(self) -> str:
+        """Return the case and the scores of the drives as lines of text."""
+        lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
+        lines += [
+            f"{run.label}: {_estimate_words(run)}" for run in self.runs if run.drive.estimates
+        ]
+        for run in self.runs:
+            lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
+        return "\n".join(lines)
+
+
+SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
+
+
+def score_rows(runs: Sequence[Run]) -> list[list[str]]:
+    """Return the scores of drives under `SCORES`."""
+    rows = []
     for run in runs:
-        name = "drive.csv" if run is first else f"drive_{run.label}.csv"
-        write_csv(folder / name, _drive_columns(run.drive))
-    say("drawing figures")
-    drives = {run.label: run.drive for run in runs}
-    on_the_way: dict[str, Any] = {"drops": drops, "faults": faults}
-    limits = first.problem.limits
-    figures = {
-        "path": drive_path_figure(drives),
-        "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
-        "steering": drive_steering_figure(
-            drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
-        ),
-        "tires": drive_tires_figure(first.drive, curves),
-        "solve_times": drive_solve_figure(first.drive),
-    }
-    if first.drive.estimates:
-        figures["lateral"] = drive_lateral_figure(first.drive)
-    save_figures(folder, figures)
-    if film != NO_FILM:
-        title, v_x = f"{first.drive.path.name}: {first.label} tires", first.drive.v_x.mean()
-        known = known_over_time(first.known, first.model, float(v_x))
-        path = folder / f"drive.{film}"
-        write_film(path, drives, curves, drops=drops, title=title, known=known)
-    return figures
+        score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
+        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
+        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
+        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
+        completed = "yes" if score.completed else end
+        rows.append([run.label, *off, completed, failures, f"{times} ms"])
+    return rows
 
 
 def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -180,16 +224,14 @@ _COLUMNS_ESTIMATED = {
     "inertial_v_y": "v_y_inertial_m_s",
     "inertial_v_y_sd": "v_y_inertial_sd_m_s",
 }
-
-
-UNITS = {  # of signals of a drive, by their name
+_UNITS = {  # of signals of a drive, by their name
     **dict.fromkeys(("s", "X", "Y", "e_y"), "m"),
     **dict.fromkeys(("psi", "delta", "command", "e_psi"), "rad"),
     **dict.fromkeys(("v_x", "v_y", "v_ref"), "m_s"),
     **dict.fromkeys(("a_x", "a_y"), "m_s2"),
     **{"t": "s", "r": "rad_s", "kappa": "1_m"},
 }
-SIGNALS = (
+_SIGNALS = (
     *("t", "s", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "command"),
     *("e_y", "e_psi", "kappa", "v_ref"),
 )
@@ -199,17 +241,17 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
     slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
     return {
-        **{f"{name}_{UNITS[name]}": getattr(drive, name) for name in SIGNALS},
+        **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _SIGNALS},
         **axle_columns("alpha_{}_rad", slip),
         **axle_columns("Fy{}_N", drive.axle_force),
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
-        **{f"{name}_measured_{UNITS[name]}": values for name, values in measured if name != "t"},
+        **{f"{name}_measured_{_UNITS[name]}": values for name, values in measured if name != "t"},
         **{_COLUMNS_ESTIMATED[name]: values for name, values in drive.estimates.items()},
     }
 
 
-def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
+def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
     """Return the tires of the trackers, and the linear and the true tire beside it."""
     models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
@@ -225,15 +267,6 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
     v_x = float(setup.speeds().mean())
     return [steady_curve(label, model, v_x) for label, model in models.items()]
-
-
-def drive_lines(runs: Sequence[Run]) -> str:
-    """Return the scores of drives as lines of text."""
-    lines = [text_table([SCORES, *score_rows(runs)], "<>><>>")]
-    lines += [f"{run.label}: {_estimate_words(run)}" for run in runs if run.drive.estimates]
-    for run in runs:
-        lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
-    return "\n".join(lines)
 
 
 def _estimate_words(run: Run) -> str:

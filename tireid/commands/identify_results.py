@@ -8,14 +8,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array, blocks, thinning
 from codegen.escape import visible
-from identifier.axle.guarantee import ForceBound
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
 from identifier.methods import certify
@@ -32,7 +31,7 @@ from identifier.reproducibility import (
 from identifier.run import History
 from identifier.setup import Block
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, guaranteed
+from identifier.verdict import Verdict
 from models.recordings import Recording
 from tireid import __version__
 from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
@@ -42,7 +41,6 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
-from tireid.reports.identify import guaranteed_sentence
 
 NETWORK = "network"
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
@@ -56,27 +54,6 @@ _OWN_PAST = "  its past, against online"
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 _CURVE_POINTS = 201
 _FARTHER = 1.25  # than the slip that was driven, or is known
-
-
-class AskedBound(NamedTuple):
-    """A request for a guaranteed band; given: its bound, None estimates it."""
-
-    given: ForceBound | None
-
-    @classmethod
-    def of(cls, numbers: Sequence[float]) -> "AskedBound":
-        """Return what words of the command ask.
-
-        numbers : error [static axle loads] and lateness [s], or the first of them, or none.
-        """
-        if len(numbers) > 2:
-            raise ValueError(
-                f"--bound takes an error and a lateness, it was given {len(numbers)} numbers"
-            )
-        if not numbers:
-            return cls(None)
-        error, late = (*numbers, 0.0)[:2]
-        return cls(ForceBound(error=(error, error), lateness=(late, late)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,20 +82,18 @@ class Results:
         method: str,
         runs: Sequence[History],
         times: Sequence[float],
+        tire: TireModel,
         verdict: Verdict,
         asked: Mapping[str, Verdict],
         parts: Sequence[History] = (),
-        bound: AskedBound | None = None,
     ) -> "Results":
         """Return what the first run learnt.
 
-        times : of freezes, rising [s].   bound : of the guaranteed band of the last, where asked.
+        times : of freezes, rising [s].   tire : that of the last.
         """
-        learnt, last, others = runs[0], times[-1], [*parts, *runs[1:]]
-        tire = calibrated(learnt, last, verdict)
-        if bound is not None:
-            tire = guaranteed(learnt, bound.given, last, tire)
-        models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]} | {freeze_key(last): tire}
+        learnt, others = runs[0], [*parts, *runs[1:]]
+        models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]}
+        models[freeze_key(times[-1])] = tire
         frozen = {
             key: {learnt.recording.name: reproduce(learnt, t)} | _replays(model, others)
             for t, (key, model) in zip(times, models.items(), strict=True)
@@ -297,14 +272,6 @@ def _numbers(error: AxleRmse | None) -> dict[str, float] | None:
 def _beside(run: History) -> History | None:
     """Return a run where it has forces of its own to compare with."""
     return run if run.online else None
-
-
-def guaranteed_text(model: TireModel) -> str:
-    sentence = guaranteed_sentence(model)
-    return sentence or (
-        "no guaranteed band: it takes --method axle, a lateral velocity that "
-        "was measured, and enough driving"
-    )
 
 
 def file_name(recording: Recording) -> str:

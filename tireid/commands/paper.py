@@ -26,6 +26,7 @@ from tireid.figures.scheme import scheme_figure
 from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, say, tell
+from tireid.report import Table, printed
 
 # What the paper prints in its Tables I and II: RMSE of the axle force [kN].
 #
@@ -97,7 +98,7 @@ def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
     }
 
 
-def rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
+def _rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     """Return the cells of a table: the label, and ours and the paper's value for each law.
 
     Medians and quartiles are those of the seeds that did not diverge; the last row counts those
@@ -123,7 +124,7 @@ def rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     return [*cells, ["seeds that diverged", *(cell for pair in counts for cell in pair)]]
 
 
-def header() -> list[str]:
+def _header() -> list[str]:
     """Return the head of the table's columns."""
     names = ["condition"]
     for law in paper_study.LAWS:
@@ -131,9 +132,15 @@ def header() -> list[str]:
     return names
 
 
+def study_table(maneuver: str, study: paper_study.Study, caption: str) -> Table:
+    """Return a table for a report."""
+    head = [printed(word) for word in _header()]
+    return Table(caption=caption, header=head, rows=_rows(maneuver, study))
+
+
 def table_text(maneuver: str, study: paper_study.Study) -> str:
     """Return a table as lines of text, with the number of seeds."""
-    lines = [header(), *rows(maneuver, study)]
+    lines = [_header(), *_rows(maneuver, study)]
     seeds = len(study.errors[maneuver]["integral"])
     title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
     return "\n".join([title, text_table(lines, indent="  "), ""])

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from matplotlib.figure import Figure
 
 from models.files import digest
 from mpc.handover.rules import Verdict
 from mpc.loop.record import estimate_scores
+from tireid.commands.drive_results import SCORES, Drives, headline, score_rows
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
@@ -16,20 +16,14 @@ from tireid.reports.common import READ, REPORT, drawings, origin
 
 
 def write_drive_report(
-    folder: Path,
-    runs: Sequence[Run],
-    inputs: Mapping[str, Any],
-    figures: Mapping[str, Figure],
-    *,
-    headline: str,
-    film: Path | None,
-    command: str,
+    folder: Path, drives: Drives, figures: Mapping[str, Figure], film: Path | None, command: str
 ) -> None:
     """Write the report of drives along one path."""
+    runs = drives.runs
     first = runs[0]
     report = Report(
         title=f"{first.drive.path.name} on {first.label} tires",
-        summary=f"{headline}.",
+        summary=f"{headline(drives.conditions)}.",
         numbers=_drive_headlines(runs),
         warnings=_drive_warnings(runs),
         sections=[
@@ -43,8 +37,8 @@ def write_drive_report(
                 command,
                 first.drive.vehicle,
                 (),
-                tires=str(inputs["frozen"]),
-                all_inputs=f"hash {digest(inputs)}, listed in summary.json",
+                tires=drives.source,
+                all_inputs=f"hash {digest(drives.inputs)}, listed in summary.json",
             ),
         ],
     )
@@ -110,22 +104,6 @@ def _drive_warnings(runs: Sequence[Run]) -> list[str]:
 
 def _bad(text: str) -> bool:
     return text.startswith(Verdict.FAULT.value) or "dead reckoning" in text
-
-
-SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
-
-
-def score_rows(runs: Sequence[Run]) -> list[list[str]]:
-    """Return the scores of drives under `SCORES`."""
-    rows = []
-    for run in runs:
-        score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
-        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
-        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
-        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
-        completed = "yes" if score.completed else end
-        rows.append([run.label, *off, completed, failures, f"{times} ms"])
-    return rows
 
 
 def _drive_blocks(
