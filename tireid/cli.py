@@ -32,7 +32,6 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all errors of tireid."""
 
     def error(self, message: str) -> NoReturn:
-        """Print one line and exit with code 2."""
         complain(f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
 

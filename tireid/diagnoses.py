@@ -60,7 +60,6 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def _finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
-    """Return what was found as rows: what, size, confidence, repair."""
     return [
         [
             " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
@@ -102,14 +101,12 @@ def _tone_of(diagnosis: Diagnosis) -> page.Tone:
 
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
-    """Return what was found as warnings of a report."""
     return [page.printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
 def diagnosis_section(
     diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Doctor"
 ) -> page.Section:
-    """Return the section of a report that holds a diagnosis."""
     rows = _finding_rows(diagnosis)
     blocks: list[page.Block] = [
         page.Paragraph(

@@ -19,7 +19,6 @@ class _OwnPackages:
 
     @staticmethod
     def find_spec(name: str, *_: object) -> ModuleSpec | None:
-        """Return where a package lies."""
         return PathFinder.find_spec(name, [HOME]) if name in PACKAGES else None
 
 

@@ -49,7 +49,6 @@ class Written(NamedTuple):
 
 
 def require_free(path: Path, *, force: bool) -> None:
-    """Refuse to replace a file that is there."""
     if path.exists() and not force:
         raise OutputError(f"{path} exists: choose another, or add --force to replace it")
 
@@ -354,7 +353,6 @@ def require_curves(kind: str) -> None:
 
 
 def _parquet() -> tuple[Any, Any]:
-    """Return pyarrow, and what of it writes Parquet."""
     try:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError:

@@ -207,7 +207,6 @@ def report_html(report: Report) -> str:
 
 
 def write_report(path: Path, report: Report) -> None:
-    """Write a report; the file is complete or as it was before."""
     write_atomically(path, report_html(report))
 
 

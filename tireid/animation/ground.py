@@ -130,14 +130,12 @@ class Ground:
         self._names = ["path", "plan", *drives]
 
     def legend(self) -> tuple[list[Artist], list[str]]:
-        """Return what a legend shows, and what it says of it."""
         more = [self._cones] * bool(len(self._path.cones)) + [line for _, line in self._drops]
         names = [*self._names, *(str(line.get_label()) for line in more)]
         marks = [self._line, self._plan, *self._tracks, *more, self._forces]
         return marks, [*names, "forces"]
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is."""
         drive, (k, t, view) = self._drives[0], now
         self._grid.set_segments(self._grid_lines(view))
         around = drive.s[k] + np.linspace(-SHOWN, SHOWN, 121)

@@ -93,13 +93,11 @@ class _ForcePanel:
         (self._now,) = axes.plot([], [], marker="o", markersize=5.0, color=PURPLE, linestyle="")
 
     def legend(self) -> tuple[list[Artist], list[str]]:
-        """Return what a legend shows of curves that no other panel names, and what it says."""
         marks = [*self._moving, *list(self._true.values())[:1]]
         names = [str(line.get_label()) for line in self._moving] + ["true tire"] * bool(self._true)
         return marks, names
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is, and curves to what was known then."""
         part = slice(max(0, now.k - TAIL), now.k + 1)
         self._tail.set_data(self._alpha[part], self._force[part])
         self._now.set_data(self._alpha[now.k : now.k + 1], self._force[now.k : now.k + 1])
@@ -156,7 +154,6 @@ class _DeviationPanel:
         _small(axes, "Deviation from the path [m]", "arc length [m]")
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is."""
         for drive, line in zip(self._drives, self._lines, strict=True):
             part = drive.t <= now.t
             line.set_data(drive.s[part], drive.e_y[part])
@@ -179,7 +176,6 @@ class _Overview:
         self._dots = [axes.plot([], [], "o", ms=4.0, color=color)[0] for color in colors]
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is."""
         for drive, dot in zip(self._drives, self._dots, strict=True):
             k = sample_at(drive, now.t)
             dot.set_data([drive.X[k]], [drive.Y[k]])
@@ -250,7 +246,6 @@ class Scene:
             self._says = self.figure.text(0.988, 0.955, "", ha="right", **mono)
 
     def show(self, t: float) -> None:
-        """Move the picture to an instant [s]."""
         drive = self._drive
         k = sample_at(drive, t)
         now = Instant(k, float(drive.t[k]), self._camera.at(float(drive.s[k])))

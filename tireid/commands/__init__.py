@@ -48,7 +48,6 @@ INTERRUPTED = 130
 
 
 def added() -> list[str]:
-    """Return the names of the commands that distributions add."""
     return [name for name in installed(GROUP) if name not in COMMANDS]
 
 

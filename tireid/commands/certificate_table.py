@@ -47,7 +47,6 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
 
 
 def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: Driving) -> str:
-    """Return what is certified of a method without gains: its properties and its boxes."""
     default = ", the default in a car" if name == LIVE else ""
     rows = [
         [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
@@ -73,7 +72,6 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
 
 
 def advised(certificate: Certificate) -> list[Property]:
-    """Return the properties that do not pass and say what to do."""
     return [e for e in certificate.properties if e.advice and e.status != "pass"]
 
 

@@ -131,7 +131,6 @@ def _head(log: LogFile, run: str | None) -> list[str]:
 def _seen(
     log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
 ) -> dict[str, Channel]:
-    """Return the channels whose ranges are given, by name."""
     names = [one.name for one in listed]
     if sum(one.samples for one in listed) > _MOST_NUMBERS:
         likely = {channel for signal in signals.values() for channel in signal.channel}
@@ -146,7 +145,6 @@ def _channels_text(
     proposal: Proposal,
     known: frozenset[str] = frozenset(),
 ) -> str:
-    """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for."""
     rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
     for one in listed:
         channel = seen.get(one.name)
@@ -193,7 +191,6 @@ def _meaning(
 
 
 def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
-    """Return which signals have cells without a value; nothing where none has."""
     said = []
     for name, signal in signals.items():
         for channel in (seen[one] for one in signal.channel if one in seen):
@@ -210,7 +207,6 @@ def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> s
 def missing_text(
     log: str, missing: Sequence[str], proposal: Proposal, signals: Mapping[str, Signal]
 ) -> str:
-    """Return what is missing, and the words that would tell it."""
     if not missing:
         there = given_by(signals)
         needed = [name for name in NEEDED if name in there]

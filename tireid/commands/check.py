@@ -55,7 +55,6 @@ BOUNDS = {
 def draw_check(
     folder: Path, history: History, operation: Operation, certificate: Certificate
 ) -> None:
-    """Draw locus.png and bounds.png of a run of the paper's identifier."""
     design = paper_design(history)
     chosen = LAWS[design.law]
     law = chosen.error(design.gains.lead)
@@ -255,7 +254,6 @@ def _overrides(options: argparse.Namespace) -> dict[str, float]:
 
 
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
-    """Return where the conditions come from."""
     changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
     stored = options.design is not None and design.driving is not None
     origin = "none stored in the design, those of the car" if options.design else "of the car"
@@ -282,7 +280,6 @@ def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, sai
 
 
 def _radii(gains: Gains) -> str:
-    """Return the balls that the weights are kept in, as far as there are any."""
     radii = {name: getattr(gains, name) for name in ("W_free", "V_free", "W_max", "V_max")}
     return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
 

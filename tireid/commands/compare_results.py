@@ -36,10 +36,10 @@ from tireid.progress import say
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
     """Return the means over recordings of every method, best on other recordings first."""
-    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *SLIP, "step"]]
+    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *_SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
-        time = NOT_TOLD
+        time = _NOT_GIVEN
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         pairs = same_and_other(trial.frozen or {})
@@ -51,8 +51,8 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
     return lines
 
 
-SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
-NOT_TOLD = "-"
+_SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
+_NOT_GIVEN = "-"
 _NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recorded one"
 
 
@@ -62,17 +62,16 @@ def _slip_cells(trial: Trial) -> list[str]:
     errors = [one.rms for one in notes if one.rms is not None]
     shares = [one.within for one in notes if one.within is not None]
     return [
-        f"{np.mean(errors):.3f}" if errors else NOT_TOLD,
-        f"{np.mean(shares):.0f} %" if shares else NOT_TOLD,
+        f"{np.mean(errors):.3f}" if errors else _NOT_GIVEN,
+        f"{np.mean(shares):.0f} %" if shares else _NOT_GIVEN,
     ]
 
 
 def summary_table(comparison: Comparison) -> str:
-    """Return the same as text."""
-    n, lines = len(comparison.names), summary_rows(comparison)
-    measure = comparison.course.measure
+    n, measure = len(comparison.names), comparison.course.measure
     title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
-    return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
+    rows = _text(title, summary_rows(comparison))
+    return rows + "".join(f"  {line}\n" for line in remarks(comparison))
 
 
 def remarks(comparison: Comparison) -> list[str]:
@@ -90,7 +89,6 @@ def remarks(comparison: Comparison) -> list[str]:
 
 
 def pair_tables(comparison: Comparison) -> str:
-    """Return one table for each recording identified on and recording replayed."""
     blocks = []
     for learnt in comparison.names:
         for replayed in comparison.names:
@@ -131,7 +129,7 @@ def _text(title: str, lines: list[list[str]]) -> str:
     return "\n".join([title, text_table(lines, indent="  "), ""])
 
 
-Row = tuple[str | float | int, ...]
+_Row = tuple[str | float | int, ...]
 
 
 def write_comparison(
@@ -162,7 +160,6 @@ def write_comparison(
 
 
 def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
-    """Return what compare.json holds."""
     course = comparison.course
     return {
         "recordings": {
@@ -210,10 +207,10 @@ ERROR_COLUMNS = (
 )
 
 
-def _error_rows(comparison: Comparison) -> Iterator[Row]:
+def _error_rows(comparison: Comparison) -> Iterator[_Row]:
     sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
 
-    def row(method: str, kind: str, learnt: str, name: str, error: AxleRmse) -> Row:
+    def row(method: str, kind: str, learnt: str, name: str, error: AxleRmse) -> _Row:
         front, rear = error.front / sizes[name].front, error.rear / sizes[name].rear
         both = comparison.course.share(name, error)
         return method, kind, learnt, name, error.front, error.rear, 100 * front, 100 * rear, both

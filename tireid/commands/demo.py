@@ -211,7 +211,7 @@ def _paper_study(
                 "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
                 "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
                 "median error); all errors count from the onset on.",
-                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median error).",
+                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (likewise).",
             },
         ),
         page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),

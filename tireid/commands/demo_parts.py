@@ -67,7 +67,6 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
 
 
 def drive_text(driven: Mapping[str, Driven]) -> str:
-    """Return what came of the drives, as lines of text."""
     blocks = [one.drives.text() for one in driven.values()]
     return "\n\n".join(["Driving on the identified tires:", *blocks]) if blocks else NOT_DRIVEN
 
@@ -166,7 +165,6 @@ def ship(story: Story, folder: Path) -> Shipped:
 
 
 def shipped_text(shipped: Shipped) -> str:
-    """Return what came of the package, as lines of text."""
     lines = [f"As a C package ({FOLDER}/, hash {shipped.exported.package.about['hash']}):"]
     lines += [
         f"  {check.precision:8} self-test {check.verdict.verdict}; over the slalom within "

@@ -84,7 +84,6 @@ class Story:
         return list(rows.values())
 
     def text(self) -> str:
-        """Return the rows as lines of text."""
         cells = ["online", "frozen", "of rms"]
         head = ["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in cells)]
         return (

@@ -70,7 +70,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
-    """Say what the repair is, and what is left after it."""
     if after is None:
         tell(f"no sure repair: with {options.repair} the log stays as it is")
         return

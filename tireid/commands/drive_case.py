@@ -152,7 +152,6 @@ def _periods(delay: float) -> int:
 
 
 def _named_path(name: str) -> Path:
-    """Return a built-in path, or one from way-points in a file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:

@@ -131,7 +131,6 @@ class Drives(NamedTuple):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """All that went in, ready for JSON."""
         labels = [run.label for run in self.runs]
         return inputs_of(self.conditions, labels, self.source, self.learnt)
 
@@ -170,7 +169,6 @@ class Drives(NamedTuple):
         return figures
 
     def text(self) -> str:
-        """Return the case and the scores of the drives as lines of text."""
         lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
         lines += [
             f"{run.label}: {_estimate_words(run)}" for run in self.runs if run.drive.estimates
@@ -184,7 +182,6 @@ SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: m
 
 
 def score_rows(runs: Sequence[Run]) -> list[list[str]]:
-    """Return the scores of drives under `SCORES`."""
     rows = []
     for run in runs:
         score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
@@ -270,7 +267,6 @@ def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -
 
 
 def _estimate_words(run: Run) -> str:
-    """Return the error of the estimated v_y, in one line."""
     got = estimate_scores(run.drive)
     assert got is not None
     return (

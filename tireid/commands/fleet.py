@@ -35,7 +35,6 @@ _SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "fleet",
         help=str(__doc__)[:-1].lower(),
@@ -292,7 +291,6 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    """Write a page on what a store holds."""
     from tireid.reports import fleet as page
 
     watching, used = _watching(options), _Used(options)
@@ -307,7 +305,6 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _merge(options: argparse.Namespace) -> int:
-    """Merge the logs of each group into a model."""
     groups = _Used(options).groups
     with output_folder(options.out, force=options.force) as folder:
         table = []
@@ -353,7 +350,6 @@ def _table(groups: list[Merged]) -> str:
 
 
 def _prior(options: argparse.Namespace) -> int:
-    """Write prior for the next car."""
     require_free(options.out, force=options.force)
     vehicle = Vehicle.from_toml(options.vehicle)
     prior = fleet_prior(_Used(options).groups)

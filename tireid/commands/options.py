@@ -76,7 +76,6 @@ def read_vehicle(options: argparse.Namespace) -> Vehicle:
 
 
 def say_estimates(vehicle: Vehicle, source: Path | None) -> None:
-    """Say which numbers of a car are estimated, where any are: once in a command."""
     if vehicle.estimates:
         say(f"{source}: {vehicle.estimates}")
 
@@ -108,7 +107,6 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
-    """Add the option that takes an answer as it is."""
     text = f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}"
     parser.add_argument("--accept", action="store_true", help=text)
 
@@ -131,7 +129,6 @@ def car_of(options: argparse.Namespace, model: TireModel | None, source: Path | 
 
 
 def require_toml(path: Path) -> None:
-    """Refuse a file to write whose name does not say that it is TOML."""
     if path.suffix.lower() != ".toml":
         raise ValueError(f"{path}: the name must end in .toml")
 
@@ -345,7 +342,6 @@ _CONVENTIONS = (
 
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option and what belongs to it."""
     group = parser.add_argument_group("your tire network", _CONVENTIONS)
     add_options(group, Path, {"--network FILE.onnx": what})
     text = f"what its columns are, in order, of {', '.join(SIGNALS)}"

@@ -72,7 +72,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return 0."""
     area, speed = parse_area(options.area), parse_speed(options.speed)
     ratio, rate = options.steering_ratio, options.steering_rate
     if ratio is not None and not 1.0 <= ratio <= 100.0:
@@ -215,7 +214,6 @@ def _path_columns(found: Plan, k: int) -> dict[str, Array]:
 
 
 def _write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
-    """Write steering.csv, a path for each pass and summary.json."""
     write_csv(folder / "steering.csv", _steering_columns(found, ratio))
     for k in range(len(found.passes)):
         name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
@@ -224,7 +222,6 @@ def _write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float 
 
 
 def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds."""
     slips, before, after = found.deviations()
     hold = hold_of(found.tires, found.space.speed)
     return {

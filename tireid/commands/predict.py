@@ -192,7 +192,6 @@ def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str,
 
 
 def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Figure]:
-    """Write the figures of a prediction; return them by the name of their file."""
     figures = {
         "slip": slip_figure(prediction.model, prediction.recording),
         "forces": prediction_figure(prediction),
@@ -205,7 +204,6 @@ def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Fi
 
 
 def error_table(prediction: Prediction) -> str:
-    """Return the errors against the true forces as a table; empty where there are none."""
     error, size = prediction.against_truth, prediction.true_force
     if error is None:
         return ""
@@ -260,7 +258,6 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
 
 
 def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
-    """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
         return "no moment of the drive contradicts the guaranteed forces"
     front, rear = 100.0 * broken.mean(axis=0)

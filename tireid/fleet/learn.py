@@ -269,7 +269,6 @@ def _learn_log(task: _Task, telling: Telling, car: Car, known: Set[str] = frozen
 
 
 def row_of(task: _Task, car: Car) -> LogRow:
-    """Return the row of a log of which nothing was read yet."""
     tags = dict(task.tags)
     return LogRow(
         log=task.log,
@@ -284,7 +283,6 @@ def row_of(task: _Task, car: Car) -> LogRow:
 
 
 def _content_of(path: Path) -> str:
-    """Return the hash of what a file holds."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, partial(hashlib.blake2b, digest_size=16)).hexdigest()
 
@@ -413,7 +411,6 @@ class LearnSome:
     known: Set[str] = frozenset()
 
     def __call__(self, tasks: Sequence[_Task]) -> Learnt:
-        """Return the rows of some logs."""
         each = [_learn_log(one, self.telling, self.cars[one.vehicle], self.known) for one in tasks]
         return Learnt(
             [row for one in each for row in one.rows], [two for one in each for two in one.copies]
@@ -488,7 +485,6 @@ def learn_fleet(
 
 
 def _portions(tasks: Sequence[_Task]) -> list[tuple[_Task, ...]]:
-    """Return logs in portions, small ones where there are few."""
     size = min(max(len(tasks) // _PORTIONS, 1), TOGETHER)
     return [tuple(tasks[k : k + size]) for k in range(0, len(tasks), size)]
 

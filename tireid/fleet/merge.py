@@ -101,7 +101,6 @@ def _value(row: LogRow, name: str) -> str:
 
 
 def day_of(row: LogRow) -> date:
-    """Return the day of a log."""
     try:
         return date.fromisoformat(row.date[:10])
     except ValueError:

@@ -152,7 +152,6 @@ class LogRow:
 
     @property
     def declared_car(self) -> Vehicle:
-        """The car as given."""
         try:
             return vehicle_from(json.loads(self.car))
         except ValueError as error:
@@ -160,7 +159,6 @@ class LogRow:
 
     @property
     def frozen(self) -> FittedModel:
-        """The frozen model."""
         return FittedModel.from_dict(json.loads(self.model), self.name)
 
     @property
@@ -262,7 +260,6 @@ class Store:
             raise StoreError(f"{self.address} holds something else: choose another folder")
 
     def require(self) -> None:
-        """Refuse an address without rows."""
         if not self.exists:
             raise StoreError(f"{self.address} is no store: tireid fleet learn LOGS --out makes one")
 
@@ -434,7 +431,6 @@ class Store:
 
 
 def protocols(fs: Any) -> set[str]:
-    """Return the names of a file system's protocol."""
     return {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
 
 
@@ -501,7 +497,6 @@ def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def schema() -> Any:
-    """Return the columns of a store with their types."""
     pyarrow = needed("pyarrow")
     kinds = {
         "size": pyarrow.int64(),

@@ -125,7 +125,6 @@ class Alarm:
 
     @property
     def cause(self) -> str:
-        """What it is likely due to, in words."""
         front, rear, friction = self.change
         clear = [abs(value) > 3.0 * sd for value, sd in zip(self.change, self.sd, strict=True)]
         softer = min(front, rear)
@@ -141,7 +140,6 @@ class Alarm:
 
     @property
     def line(self) -> str:
-        """The alarm as a line of text."""
         percent = 100.0 * math.expm1(self.change[self.statistic])
         sd = 100.0 * self.sd[self.statistic]
         when = f"; over since {self.ended}" if self.ended else ""
@@ -230,7 +228,6 @@ class _Compared(NamedTuple):
 
 
 def parts_of(row: LogRow) -> list[Part]:
-    """Return the parts of a log that tell of the tires."""
     day_of(row)
     return [
         Part(row.name, row.date, begin, given)
@@ -314,7 +311,6 @@ def _alarms(car: str, seen: Seen) -> list[Alarm]:
 
 
 def _lasts(g: Array, first: int, k: int, h: float) -> bool:
-    """Return whether the alarm was there before."""
     return bool((g[first:k] >= h * (1.0 - 1e-12)).any())
 
 

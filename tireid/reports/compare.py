@@ -1,6 +1,6 @@
 """The report of `tireid compare`: which method knows the tires best where it has not learnt."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import freeze_key
 from identifier.verdict import Verdict
+from tireid.commands.compare_results import remarks, summary_rows
 from tireid.report import Block, Headline, Report, Section, Table, write_report
 from tireid.reports.common import REPORT, drawings, origin
 from tireid.verdicts import verdict_warnings, verdicts_headline
@@ -17,18 +18,15 @@ from tireid.verdicts import verdict_warnings, verdicts_headline
 def write_compare_report(
     folder: Path,
     comparison: Comparison,
-    rows: Sequence[Sequence[str]],
     figures: Mapping[str, Figure],
     verdicts: Mapping[str, Verdict],
-    *,
-    remarks: Sequence[str],
     command: str,
 ) -> None:
     """Write the report of a comparison.
 
     verdicts : on what the default learns, by recording.
     """
-    course, learnt = comparison.course, "recordings with a valid model of the default"
+    course, rows, said = comparison.course, summary_rows(comparison), remarks(comparison)
     captions = {
         "methods": "Errors of every method.",
         "matrix": "Identified on one recording, validated on another.",
@@ -37,12 +35,13 @@ def write_compare_report(
     blocks: list[Block] = [
         Table(
             caption=f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
-            f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in remarks),
+            f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in said),
             header=rows[0],
             rows=rows[1:],
-        )
+        ),
+        *drawings(figures, captions),
     ]
-    blocks += drawings(figures, captions)
+    learnt = "recordings with a valid model of the default"
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Each method is identified on each recording, frozen at its end and replayed on "
@@ -65,7 +64,6 @@ def write_compare_report(
 
 
 def _compare_headlines(comparison: Comparison) -> list[Headline]:
-    """Return the frozen error of the best methods on recordings that they did not learn on."""
     numbers = []
     elsewhere = len(comparison.names) > 1
     for name in ranking(comparison):
@@ -80,7 +78,6 @@ def _compare_headlines(comparison: Comparison) -> list[Headline]:
 
 
 def _compare_warnings(comparison: Comparison) -> list[str]:
-    """Return what speaks against a comparison."""
     vehicle = comparison.course.vehicle
     said = [f"{vehicle.estimates}."] if vehicle.estimates else []
     if comparison.course.by_motion:

@@ -46,7 +46,6 @@ def write_drive_report(
 
 
 def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
-    """Return how far the cars were off, and how long a step took."""
     first = runs[0].scores
     numbers = [
         Headline(
@@ -82,7 +81,6 @@ def _end(run: Run) -> str:
 
 
 def _drive_warnings(runs: Sequence[Run]) -> list[str]:
-    """Return what went wrong on the way."""
     said = []
     for run in runs:
         scores = run.scores
@@ -109,7 +107,6 @@ def _bad(text: str) -> bool:
 def _drive_blocks(
     runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
-    """Return film, table and figures of drives."""
     blocks: list[Block] = [
         Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
     ]

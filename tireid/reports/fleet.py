@@ -40,7 +40,6 @@ def write_fleet_report(
     *,
     command: str,
 ) -> None:
-    """Write what a store holds."""
     learnt = [row for row in rows if not row.error]
     refused = [row for row in learnt if row.valid is False]
     hours = sum(row.seconds or 0.0 for row in learnt) / 3600.0
@@ -89,7 +88,6 @@ def write_fleet_report(
 
 
 def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str) -> None:
-    """Write whose tires changed."""
     lasting = [alarm for alarm in watched.alarms if not alarm.ended]
     report = Report(
         title=f"Changes in the fleet of {store}",
@@ -109,7 +107,6 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
 
 
 def _watch_blocks(watched: Watch) -> list[Block]:
-    """Return what was seen over time, as table and figures."""
     driven = f"{len(watched.seen)} cars were driven beyond their baseline"
     short = f"; {len(watched.short)} were not, and are not watched yet" if watched.short else ""
     blocks: list[Block] = [Paragraph(text=f"{driven}{short}.")]

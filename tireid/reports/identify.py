@@ -190,7 +190,6 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
 
 
 def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[page.Block]:
-    """Return the numbers and the figures of a frozen model."""
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[page.Block] = [
         page.Paragraph(
@@ -259,7 +258,6 @@ def guaranteed_text(model: TireModel) -> str:
 
 
 def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
-    """Return the verdicts on a model over drives that it was of validation, as a table."""
     rows: list[list[page.Cell]] = []
     for name, verdict in asked.items():
         missed = verdict.force_missed or (None, None)

@@ -114,7 +114,6 @@ def write_plan_report(
 
 
 def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
-    """Return what to know before somebody drives a plan."""
     said = [
         "Drive on a closed field only, at half the speed first: tires outside of what was taken "
         "for possible, a wet place or a lower speed change the way."
@@ -167,7 +166,6 @@ def rival_rows(found: Plan) -> list[list[str]]:
 
 
 def _rivals(found: Plan) -> Table:
-    """Return the plan beside slalom and random steering."""
     return Table(
         caption="The plan and maneuvers of the same length at the same share of the grip, error "
         "over the grip; their room is that on an open field, without margins; random is the "
