@@ -12,6 +12,7 @@ from typing import Any
 from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
+from identifier.method import Method
 from identifier.methods import LIVE, REFERENCE, certify
 from identifier.paper.design import (
     PHASE_MARGIN,
@@ -181,7 +182,7 @@ def run(options: argparse.Namespace) -> int:
     return FAILS if certificate.verdict == "fail" else DONE
 
 
-def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
+def _method(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
         return shared.chosen_method(options, vehicle, online=True)
@@ -196,7 +197,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
     margin = options.phase_margin or PHASE_MARGIN
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
     known = found.operation(vehicle, driving)
-    return shared.Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
+    return law, with_keeping(found, known, options.keep or DEFAULT_KEEPING)
 
 
 def _refuse_gains(options: argparse.Namespace, name: str) -> None:
@@ -273,15 +274,17 @@ def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, sai
         f"{driving.noise_v_x:.3g} and {driving.noise_v_y:.3g} m/s, {driving.noise_r:.3g} rad/s, "
         f"{driving.noise_delta:.3g} rad\n{said}\n"
         f"{design.law} law, {design.network.hidden} units, {design.integrator} at "
-        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, lambda "
-        f"{gains.forgetting:.4g}, eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W "
-        f"{gains.rho_W:.4g}, rho_V {gains.rho_V:.4g}{_radii(gains)}\n"
+        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, {_rates(gains)}\n"
     )
 
 
-def _radii(gains: Gains) -> str:
-    radii = {name: getattr(gains, name) for name in ("W_free", "V_free", "W_max", "V_max")}
-    return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
+def _rates(gains: Gains) -> str:
+    """Return the rates of a law, and the radii that its weights are kept in, if any."""
+    names = ("W_free", "V_free", "W_max", "V_max")
+    radii = {name: r for name in names if 0.0 < (r := getattr(gains, name)) < math.inf}
+    rates = {name: getattr(gains, name) for name in ("eta_W", "eta_V", "rho_W", "rho_V")}
+    numbers = {"lambda": gains.forgetting, **rates, **radii}
+    return ", ".join(f"{name} {value:.4g}" for name, value in numbers.items())
 
 
 def _along(history: History, design: PaperIdentifier) -> str:
@@ -314,9 +317,8 @@ def _proposal(
         return f"no better gains at this bandwidth: {error}"
     gains, verdict = better.gains, certify(better, vehicle, driving).verdict
     return (
-        f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
-        f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
-        f"{gains.rho_V:.4g}{_radii(gains)}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
+        f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, {_rates(gains)}"
+        f"{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
         f"write it with: tireid check --tune design.toml --method {design.law}{_given(options)}"
     )
 

@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
     _require_ranges(options)
     seed, model = shared.seed_of(options), shared.stored_model(options.after)
-    vehicle = shared.car_of(options, model, options.after)
+    vehicle = shared.read_vehicle(options, model, options.after)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
             found = planning.plan(
