@@ -39,8 +39,7 @@ from tireid.figures.style import (
     figure_svg,
     force_range,
     force_unit_of,
-    impulse_unit,
-    save_figure,
+    save_figures,
     with_own_fonts,
 )
 from tireid.figures.tires import learnt_axles_figure, slip_figure
@@ -186,7 +185,7 @@ def test_same_data_give_the_same_bytes_and_leave_matplotlib_alone(tmp_path: Path
     before = dict(matplotlib.rcParams)
     first, second = figure_png(FIGURES["error"]()), figure_png(FIGURES["error"]())
     assert first == second
-    save_figure(FIGURES["error"](), tmp_path / "error.png")
+    save_figures(tmp_path, {"error": FIGURES["error"]()})
     assert (tmp_path / "error.png").read_bytes() == first
     assert dict(matplotlib.rcParams) == before
 

@@ -481,7 +481,7 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
     from codegen.writing import write_file
     from models.files import write_atomically
     from tireid.cli import one_line
-    from tireid.figures.style import save_figure
+    from tireid.figures.style import save_figures
     from tireid.output import output_folder, write_csv, write_json, write_table
 
     columns = {"t_s": np.random.default_rng(0).random(9999)}
@@ -496,11 +496,11 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
         "rows.csv": lambda path: write_csv(path, columns),
         "rows.parquet": lambda path: write_table(path, [columns]),
         "model.json": lambda path: write_atomically(path, text),
-        "figure.png": lambda path: save_figure(Figure(), path),
+        "figure.png": lambda path: save_figures(path.parent, {path.stem: Figure()}),
         "page.html": lambda path: write_file(path, text),
         "results": folder,
     }
-    save_figure(Figure(), here / "warm.png")
+    save_figures(here, {"warm": Figure()})
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
     for name, write in writers.items():
         try:

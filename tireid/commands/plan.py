@@ -71,7 +71,7 @@ def add_parser(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> None:
     area, speed = parse_area(options.area), parse_speed(options.speed)
     ratio, rate = options.steering_ratio, options.steering_rate
     if ratio is not None and not 1.0 <= ratio <= 100.0:
@@ -97,9 +97,12 @@ def run(options: argparse.Namespace) -> int:
                 seed=seed,
                 progress=progress,
             )
-        driven = planning.rehearsals(found)
-        inputs = inputs_of(options, vehicle, area, speed)
-        _write_plan(folder, found, inputs, ratio)
+        driven, inputs = planning.rehearsals(found), _inputs_of(options, vehicle, area, speed)
+        write_csv(folder / "steering.csv", _steering_columns(found, ratio))
+        for k in range(len(found.passes)):
+            name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
+            write_csv(folder / name, _path_columns(found, k))
+        write_json(folder / "summary.json", _summary(found, inputs))
         figures = {
             "area": plan_area_figure(found),
             "steering": plan_steering_figure(found, ratio),
@@ -111,7 +114,6 @@ def run(options: argparse.Namespace) -> int:
         )
     tell("\n".join([*plan_words(found, driven), text_table([RIVALS, *rival_rows(found)], "<>>>")]))
     say(f"wrote {options.out}/")
-    return 0
 
 
 def _require_ranges(options: argparse.Namespace) -> None:
@@ -156,7 +158,7 @@ def parse_speed(text: str) -> float:
     return speed
 
 
-def inputs_of(
+def _inputs_of(
     options: argparse.Namespace, vehicle: Vehicle, area: tuple[float, float], speed: float
 ) -> dict[str, Any]:
     """Return all that went into a plan, ready for JSON.
@@ -213,15 +215,7 @@ def _path_columns(found: Plan, k: int) -> dict[str, Array]:
     return {"X_m": np.append(before[0], X), "Y_m": np.append(before[1], Y)}
 
 
-def _write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
-    write_csv(folder / "steering.csv", _steering_columns(found, ratio))
-    for k in range(len(found.passes)):
-        name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
-        write_csv(folder / name, _path_columns(found, k))
-    write_json(folder / "summary.json", summary(found, inputs))
-
-
-def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
+def _summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
     slips, before, after = found.deviations()
     hold = hold_of(found.tires, found.space.speed)
     return {

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
@@ -64,29 +63,34 @@ def run(options: argparse.Namespace) -> int:
     recording = prediction.recording
     if recording.estimated:
         say(f"{recording.name}: vy is estimated, beginning with the tires of the model")
-    verdict = prediction.verdict
-    facts, friction = Facts.of(prediction), verdict.friction
+    verdict, facts = prediction.verdict, _Facts.of(prediction)
     with output.output_folder(options.out, force=options.force) as folder:
-        columns = (force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
+        columns = (_force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
         output.write_long_csv(folder / "forces.csv", columns)
-        if friction is not None:
+        if (friction := verdict.friction) is not None:
             given = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
             given |= {"another": friction.another, "unexplained": friction.unexplained}
             output.write_csv(folder / "friction.csv", given)
         output.write_json(folder / "summary.json", summary(prediction, verdict, facts))
         lines = _prediction_text(prediction, friction, facts)
         say("drawing figures")
-        figures = draw(folder, prediction, verdict)
+        figures = {
+            "slip": slip_figure(model, recording),
+            "forces": prediction_figure(prediction),
+        }
+        if verdict.shown is not None:
+            figures["motion"] = motion_figure(verdict.shown, model.vehicle)
+        if friction is not None:
+            figures["friction"] = friction_figure(friction)
+        save_figures(folder, figures)
         write_predict_report(
-            folder,
-            prediction,
-            verdict,
-            figures,
-            given=lines,
-            source=options.model,
-            command=options.words,
+            folder, prediction, figures, lines, source=options.model, command=options.words
         )
-    table = error_table(prediction)
+    error, table = prediction.against_truth, ""
+    if error is not None:
+        name = visible(recording.name)
+        cells = [name, *error_cells(error, prediction.true_force)]
+        table = output.text_table([["predicted", "front", "rear"], cells], "<>>")
     tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
     say(f"wrote {options.out}/")
     return shared.exit_code(verdict, options)
@@ -109,7 +113,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-class Facts(NamedTuple):
+class _Facts(NamedTuple):
     """What is asked of a prediction, each None where nobody knows.
 
     half : width of the band of its forces (n, 2) [N].
@@ -125,7 +129,7 @@ class Facts(NamedTuple):
     against: tuple[Array, NDArray[np.bool_]] | None
 
     @classmethod
-    def of(cls, prediction: Prediction) -> "Facts":
+    def of(cls, prediction: Prediction) -> "_Facts":
         model, recording = prediction.model, prediction.recording
         half, truth, held = model.half_band_over(recording), recording.axle_force, None
         if half is not None and truth is not None and (half > 0.0).any():
@@ -140,7 +144,7 @@ class Facts(NamedTuple):
         )
 
 
-def force_columns(prediction: Prediction, half: Array | None, part: slice) -> dict[str, Array]:
+def _force_columns(prediction: Prediction, half: Array | None, part: slice) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
 
     half : width of its band (n, 2) [N]; None where the model has none.
@@ -155,7 +159,7 @@ def force_columns(prediction: Prediction, half: Array | None, part: slice) -> di
     return columns
 
 
-def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str, Any]:
+def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known."""
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     friction, model = verdict.friction, prediction.model
@@ -191,29 +195,7 @@ def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str,
     }
 
 
-def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Figure]:
-    figures = {
-        "slip": slip_figure(prediction.model, prediction.recording),
-        "forces": prediction_figure(prediction),
-    }
-    if verdict.shown is not None:
-        figures["motion"] = motion_figure(verdict.shown, prediction.model.vehicle)
-    if verdict.friction is not None:
-        figures["friction"] = friction_figure(verdict.friction)
-    return save_figures(folder, figures)
-
-
-def error_table(prediction: Prediction) -> str:
-    error, size = prediction.against_truth, prediction.true_force
-    if error is None:
-        return ""
-    name = visible(prediction.recording.name)
-    return output.text_table(
-        [["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>"
-    )
-
-
-def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: Facts) -> str:
+def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: _Facts) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
     friction : of the drive's road; None where nobody can tell.

@@ -40,7 +40,7 @@ from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.progress import Progress
 
 
-class Informer:
+class _Informer:
     """Tells the tracker of an oracle the true tire of the road that the car is on."""
 
     def __init__(self, setup: Setup) -> None:
@@ -48,7 +48,7 @@ class Informer:
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Change the tire where the friction has changed; return that it was done."""
-        mu = friction_now(self._friction, measured)
+        mu = _friction_now(self._friction, measured)
         if mu == self._mu:
             return None
         self._mu = mu
@@ -56,7 +56,7 @@ class Informer:
         return f"given friction {mu:g}"
 
 
-NOTED = 0.1  # change of the grip that is worth a note
+_NOTED = 0.1  # change of the grip that is worth a note
 
 
 class BacksOff:
@@ -73,14 +73,14 @@ class BacksOff:
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Ask what learns; return what it said, and the grip where that changed."""
         said = None if self._beside is None else self._beside.observe(measured, tracker)
-        if abs(tracker.grip - self._noted) < NOTED:
+        if abs(tracker.grip - self._noted) < _NOTED:
             return said
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
         return grip if said is None else f"{said}; {grip}"
 
 
-def friction_now(friction: Friction, measured: Measured) -> float:
+def _friction_now(friction: Friction, measured: Measured) -> float:
     """Return the friction where the car is, of a road whose changes are steps [-]."""
     mu = friction.scale
     for change in friction.changes:
@@ -143,7 +143,7 @@ LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learn
 FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
 WEAVES = (0.0, 0.5)  # m
-PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
+_PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,6 +222,19 @@ def require_compiler() -> None:
         )
 
 
+def delay_periods(delay: float, name: str = "delay") -> int:
+    """Return a delay in control periods.
+
+    delay : a multiple of the period [s].   name : of the argument, in an error.
+    """
+    periods = delay / PERIOD
+    if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
+        raise ValueError(
+            f"{name} must be 0 to 100 ms in steps of {1e3 * PERIOD:g} ms, it is {1e3 * delay:g}"
+        )
+    return round(periods)
+
+
 def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
     """Return the tire that a tracker is given at the start."""
     if label == LINEAR:
@@ -275,7 +288,7 @@ def run_drive(
             dither=weave,
             laps=conditions.laps,
             widest=WIDEST,
-            plan_every=PLAN_EVERY,
+            plan_every=_PLAN_EVERY,
             name=f"{setup.path.name}, {label}",
             progress=progress,
         )
@@ -293,7 +306,7 @@ def run_drive(
 
 def _learner(label: str, setup: Setup, learnt: TireModel | None) -> LearningTires | None:
     if label == ORACLE and setup.drops:
-        return Informer(setup)
+        return _Informer(setup)
     if label == LEARNING:
         assert learnt is not None
         return make_learner(learnt, setup.vehicle)
@@ -353,9 +366,7 @@ def drive(
         Where a number is not that of a drive, there is no tire to go on learning from, or no C
         compiler for the tracker.
     """
-    periods = delay / PERIOD
-    if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
-        raise ValueError(f"delay must be 0 to 0.1 s in steps of {PERIOD:g} s, it is {delay:g}")
+    periods = delay_periods(delay)
     for name, value in (("share", share), ("laps", laps), ("speed", speed)):
         if value is not None and not value > 0.0:
             raise ValueError(f"{name} must be positive, it is {value:g}")
@@ -378,7 +389,7 @@ def drive(
     )
     conditions = Conditions(
         setup=setup,
-        delay=round(periods),
+        delay=periods,
         noise=noise,
         seed=seed,
         laps=laps,

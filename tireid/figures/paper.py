@@ -57,8 +57,8 @@ def error_figure(
         axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
     for t_freeze in freeze_times:
         style.mark_freeze(axes, t_freeze, prediction=False)
-    unit = style.impulse_unit(style.paper_design(history).force_unit)
-    axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit}]")
+    unit = force_unit_name(style.paper_design(history).force_unit)
+    axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit} s]")
     style.label_time(axes, recording.t)
     style.legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
     return figure

@@ -26,9 +26,8 @@ from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
-from identifier.setup import force_unit_name
 
-P = ParamSpec("P")
+_P = ParamSpec("_P")
 
 PAGE = 7.16  # width of both columns of a paper [in]
 _RESOLUTION = 200  # [dots per inch]
@@ -48,11 +47,11 @@ _look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_defau
 LOOK: dict[str, Any] = dict(_look.items())
 
 
-def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+def styled(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
     """Return a drawing function that works in the look of the project, whatever the user's own."""
 
     @wraps(draw)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
         with style.context(["default", LOOK]):
             return draw(*args, **kwargs)
 
@@ -151,15 +150,10 @@ def figure_svg(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG."""
-    write_file(path, figure_png(figure))
-
-
 def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
     """Write figures as PNG under their names, and return them."""
     for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
+        write_file(folder / f"{name}.png", figure_png(figure))
     return figures
 
 
@@ -170,7 +164,7 @@ AXLES = ("Front axle", "Rear axle")
 FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
 
 
-FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
+_FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
 _DIGITS_SHOWN = 100.0  # s
 
 
@@ -180,7 +174,7 @@ def _clock_zero(t: Array) -> float:
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return 0.0 if abs(first) < FAR else _DIGITS_SHOWN * float(np.floor(first / _DIGITS_SHOWN))
+    return 0.0 if abs(first) < _FAR else _DIGITS_SHOWN * float(np.floor(first / _DIGITS_SHOWN))
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:
@@ -281,7 +275,7 @@ def _bolder(legend: Legend) -> None:
             line.set_alpha(1.0)
 
 
-FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
+_FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
 
 
 class ForceUnit(NamedTuple):
@@ -311,14 +305,6 @@ def force_unit_of(force: Array) -> ForceUnit:
     return _KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else _NEWTON
 
 
-def impulse_unit(force_unit: float) -> str:
-    """Return the name of the unit of ξ, the force unit times one second.
-
-    force_unit : U [N].
-    """
-    return f"{force_unit_name(force_unit)} s"
-
-
 def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units."""
     if not isinstance(history.design, PaperIdentifier):
@@ -332,7 +318,7 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
     """
     largest = _finite(reference)
-    bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
+    bound = _FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
     every = np.concatenate([largest, *(_finite(other) for other in others)])
     every = every[np.abs(every) <= 1e12]
     low = max(float(every.min(initial=0.0)), -bound)

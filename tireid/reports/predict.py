@@ -6,7 +6,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from identifier.prediction import Prediction
-from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from tireid import report as page
@@ -31,17 +30,20 @@ from tireid.verdicts import (
 def write_predict_report(
     folder: Path,
     prediction: Prediction,
-    verdict: Verdict,
     figures: Mapping[str, Figure],
+    lines: str,
     *,
-    given: str,
     source: Path,
     command: str,
 ) -> None:
-    model, recording = prediction.model, prediction.recording
+    """Write the report of a prediction.
+
+    lines : what is said of it beside its errors.   source : the model's file.
+    """
+    model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
     notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
     found: list[page.Block] = [*_errors(prediction)]
-    found += [page.Paragraph(text=page.printed(line)) for line in given.splitlines()]
+    found += [page.Paragraph(text=page.printed(line)) for line in lines.splitlines()]
     captions = {
         "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
         "forces": "Axle forces over time.",
