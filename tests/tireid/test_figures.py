@@ -280,11 +280,6 @@ def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:
 def test_forces_of_a_model_car_are_in_newtons() -> None:
     assert FIGURES["forces of a model car"]().axes[0].get_ylabel() == "lateral force [N]"
     assert force_unit_of(np.array([np.nan, -2000.0])).name == "kN"
-    assert (impulse_unit(1.0), impulse_unit(1000.0), impulse_unit(10.0)) == (
-        "N s",
-        "kN s",
-        "10 N s",
-    )
 
 
 def unlike_axles() -> AxleModel:

@@ -106,7 +106,7 @@ def run(options: argparse.Namespace) -> int:
         tables = [results.summary_table(comparison)]
         if len(comparison.names) ** 2 <= _FEW_PAIRS:
             tables.append(results.pair_tables(comparison))
-    tables += [verdicts_text(verdicts)] if verdicts else []
+    tables += [verdicts_text(verdicts, "default identified on")] if verdicts else []
     tell("\n".join(tables))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)

@@ -28,7 +28,7 @@ from tireid.learning import identify, with_v_y
 from tireid.output import output_folder, require_curves, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import guaranteed_text, side_slip_text, write_identify_report
-from tireid.verdicts import asked_text, verdict_text
+from tireid.verdicts import verdict_text, verdicts_text
 
 LEARNING, _JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
 
@@ -162,7 +162,7 @@ def run(options: argparse.Namespace) -> int:
             closing,
             "" if options.bound is None else guaranteed_text(found.model),
             doctor_text(diagnosis, repair, options.repair),
-            asked_text(asked),
+            verdicts_text(asked, "replayed on"),
             verdict_text(verdict),
         )
     if repair:
