@@ -12,7 +12,6 @@ from matplotlib import font_manager
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
@@ -32,7 +31,6 @@ from tireid.figures.forces import (
     side_by_side_figure,
 )
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
-from tireid.figures.scheme import BLOCKS, scheme_figure
 from tireid.figures.style import (
     BLACK,
     figure_png,
@@ -246,28 +244,6 @@ def test_the_paper_s_measure_stands_below_the_error_to_the_truth() -> None:
     assert figure.axes[2].get_title("right") == "RMSE 0.43 kN\npast to online 0.26 kN"
     assert figure.axes[3].get_title("right") == "RMSE 0.21 kN\npast to online 0.14 kN"
     assert not clipped(figure)
-
-
-def test_the_scheme_holds_every_equation_inside_its_frames() -> None:
-    figure = scheme_figure()
-    assert not clipped(figure)
-    (axes,) = figure.axes
-    frames = [
-        patch.get_window_extent() for patch in axes.patches if isinstance(patch, FancyBboxPatch)
-    ]
-    inside = [text for text in axes.texts if text.get_text() in {b.text for b in BLOCKS.values()}]
-    assert len(frames) == len(inside) == len(BLOCKS)
-    for frame, text in zip(frames, inside, strict=True):
-        written = text.get_window_extent()
-        assert frame.x0 < written.x0 < written.x1 < frame.x1, text.get_text()
-        assert frame.y0 < written.y0 < written.y1 < frame.y1, text.get_text()
-    said = " ".join(text.get_text() for text in inside)
-    for equation in ("(6)", "(7)", "(8)", "(10)", "(11)-(13)"):
-        assert equation in said
-    labels = [text for text in axes.texts if text not in inside and text.get_text()]
-    for label in labels:
-        for frame in frames:
-            assert not label.get_window_extent().overlaps(frame), label.get_text()
 
 
 def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:

@@ -19,13 +19,13 @@ from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
-    SCHEME,
     settings,
     study_table,
     table_text,
     write_study,
 )
 from tireid.figures.forces import side_by_side_figure
+from tireid.figures.paper import SCHEME
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
 from tireid.reports.common import READ, REPORT, drawing, origin
@@ -185,12 +185,10 @@ def _paper_study(
             f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the axle "
             "identifier above; its figures are in the folder paper_network."
         ),
-        *_drawn(
-            figures,
-            {
-                SCHEME: "The identifier, as Fig. 1 of the paper; orange is what the laws "
-                "differ in, and where a freeze cuts."
-            },
+        page.Picture(
+            image=SCHEME.with_suffix(".svg"),
+            caption="The identifier, as Fig. 1 of the paper; orange is what the laws differ in, "
+            "and where a freeze cuts.",
         ),
         page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(

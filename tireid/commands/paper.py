@@ -21,8 +21,7 @@ from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import verdict_line
 from tireid.commands.options import add_output
 from tireid.figures.forces import force_figure
-from tireid.figures.paper import comparison_figure
-from tireid.figures.scheme import scheme_figure
+from tireid.figures.paper import SCHEME, comparison_figure
 from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, say, tell
@@ -157,7 +156,6 @@ def settings(gains: Gains, network: Network) -> str:
     )
 
 
-SCHEME = "fig1_scheme"
 _FIGURES = {  # number of the paper's figure, by maneuver and law
     ("step_steer", "instantaneous"): "fig2",
     ("step_steer", "integral"): "fig3",
@@ -185,7 +183,8 @@ def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
     write_json(folder / "diverged.json", study.diverged())
     write_file(folder / "tables.txt", _study_text(study) + "\n")
     say("drawing figures")
-    figures = {SCHEME: scheme_figure()}
+    write_file(folder / SCHEME.name, SCHEME.read_bytes())
+    figures: dict[str, Figure] = {}
     for maneuver in study.errors:
         figures |= _draw(study, maneuver)
     return save_figures(folder, figures)

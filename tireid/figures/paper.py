@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
 from tireid.figures.thinned import shown_of_run
 
+SCHEME = Path(__file__).with_name("fig1_scheme.png")  # Fig. 1, and as .svg beside it
 WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 
 
