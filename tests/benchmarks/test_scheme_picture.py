@@ -1,4 +1,4 @@
-"""The picture of the paper's Fig. 1: its equations stand in their frames, and the files are there."""
+"""The picture of Fig. 1 of the paper: its equations stand in their frames; its files are there."""
 
 from matplotlib.patches import FancyBboxPatch
 
