@@ -8,6 +8,7 @@ working.
 import logging
 import math
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -216,24 +217,12 @@ def _time_text(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
 
 
-def _columns() -> int:
-    """Return how wide the terminal is."""
-    given = os.environ.get("COLUMNS", "")
-    if given.isdecimal() and int(given) > 0:
-        return int(given)
-    try:
-        found = os.get_terminal_size(sys.stderr.fileno()).columns
-    except (OSError, ValueError):
-        found = 0
-    return found or 80
-
-
 def _show(line: str) -> None:
     """Put a line in the place of the changing one; one that is too long is cut."""
     global _live
     from codegen.escape import visible
 
-    width = _columns() - 1
+    width = shutil.get_terminal_size().columns - 1
     wiped = _wiped()
     _live = True
     _print(f"{wiped}{_escaped(visible(f'  {line}'))[:width]}")

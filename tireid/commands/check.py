@@ -45,7 +45,7 @@ from tireid.figures.style import paper_design, save_figures
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
 
-BOUNDS = {
+_BOUNDS = {
     "error_bound": "proven bound, leakage",
     "projection_bound": "proven bound, projection",
     "trivial_bound": "no network",
@@ -72,22 +72,24 @@ def draw_check(
 def _error_bounds(certificate: Certificate) -> dict[str, float]:
     """Return the bounds of the error norm [U s] in a certificate, by the name in a legend."""
     known = {entry.name: entry.value for entry in certificate.properties}
-    return {title: known[name] for name, title in BOUNDS.items() if name in known}
+    return {title: known[name] for name, title in _BOUNDS.items() if name in known}
 
 
-CONDITIONS = {  # field of the declared driving, and the option that says otherwise
-    "v_x": "speed",
-    "slip": "slip",
-    "friction": "friction",
-    "bandwidth": "bandwidth",
-    "noise_v_x": "noise_v_x",
-    "noise_v_y": "noise_v_y",
-    "noise_r": "noise_r",
-    "noise_delta": "noise_delta",
+_CONDITIONS = {"v_x": "speed"} | {  # field of the declared driving, and the option of it
+    name: name
+    for name in (
+        "slip",
+        "friction",
+        "bandwidth",
+        "noise_v_x",
+        "noise_v_y",
+        "noise_r",
+        "noise_delta",
+    )
 }
 _OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-_OF_GAINS = tuple(option for field, option in CONDITIONS.items() if field not in _OF_ALL)
-TEXT, NUMBERS = "certificate.txt", "certificate.json"
+_OF_GAINS = tuple(option for field, option in _CONDITIONS.items() if field not in _OF_ALL)
+_TEXT, _NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
@@ -168,8 +170,8 @@ def run(options: argparse.Namespace) -> int:
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
-            write_json(folder / NUMBERS, numbers)
-            write_file(folder / TEXT, f"{text}\n")
+            write_json(folder / _NUMBERS, numbers)
+            write_file(folder / _TEXT, f"{text}\n")
             if paper is not None:
                 learnt = history or identify(drive_to_learn(), vehicle, paper)
                 draw_check(folder, learnt, paper.operation(vehicle, driving), certificate)
@@ -240,7 +242,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
                 raise ValueError("--phase-margin and --keep go with --tune FILE")
-    for name in (*CONDITIONS.values(), "phase_margin"):
+    for name in (*_CONDITIONS.values(), "phase_margin"):
         value, noise = getattr(options, name), name.startswith("noise")
         if value is not None and not (0.0 < value < math.inf or (noise and value == 0.0)):
             rule = "not be negative" if noise else "be positive"
@@ -250,12 +252,14 @@ def _require_sense(options: argparse.Namespace) -> None:
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, float]:
-    given = {field: getattr(options, option) for field, option in CONDITIONS.items()}
+    given = {field: getattr(options, option) for field, option in _CONDITIONS.items()}
     return {field: value for field, value in given.items() if value is not None}
 
 
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
-    changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
+    changed = ", ".join(
+        f"--{_CONDITIONS[field].replace('_', '-')}" for field in _overrides(options)
+    )
     stored = options.design is not None and design.driving is not None
     origin = "none stored in the design, those of the car" if options.design else "of the car"
     said = f"conditions: {'as stored in the design' if stored else origin}"
@@ -325,7 +329,7 @@ def _proposal(
 
 def _given(options: argparse.Namespace) -> str:
     """Return the options that say which car drives how hard, as they were given."""
-    names = ("vehicle", *CONDITIONS.values())
+    names = ("vehicle", *_CONDITIONS.values())
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     return "".join(
         f" --{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in given.items()

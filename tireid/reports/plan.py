@@ -12,7 +12,7 @@ from models.files import digest
 from tireid.report import Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
 
-PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
+_PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
 
 
 def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
@@ -27,7 +27,7 @@ def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     ]
     slalom = found.rivals[0]
     said.append(_against(slalom, found))
-    distance = space.speed**2 / (2.0 * PULL)
+    distance = space.speed**2 / (2.0 * _PULL)
     said.append(
         f"Up to {found.lateral_acceleration:.1f} m/s² sideways, {100.0 * space.share:.0f} % of the "
         f"grip of the likely tires; the car stays {found.clearance:.2g} m from the edge with "
@@ -37,28 +37,26 @@ def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     if driven:
         side_slip = max(one.side_slip for one in driven)
         said.append(
-            f"Rehearsed on the double-track car of the vehicle file: {least(driven):.2g} m from "
+            f"Rehearsed on the double-track car of the vehicle file: {_least(driven):.2g} m from "
             f"the edge, side slip up to {math.degrees(side_slip):.1f} degrees."
         )
     return said
 
 
-def least(driven: Sequence[Rehearsal]) -> float:
+def _least(driven: Sequence[Rehearsal]) -> float:
     """Return the least distance to the edge in rehearsals [m]."""
     return min(one.clearance for one in driven)
 
 
 def _against(slalom: Rival, found: Plan) -> str:
     """Return what a slalom would need."""
+    later = "is not as good in ten times of it"
     if math.isfinite(slalom.catches_up):
         length = slalom.length * slalom.catches_up / found.time
-        return (
-            f"A slalom at the same share of the grip leaves {100.0 * slalom.error:.1f} % in that "
-            f"time, and is as good after {slalom.catches_up:.0f} s, {length:.0f} m."
-        )
+        later = f"is as good after {slalom.catches_up:.0f} s, {length:.0f} m"
     return (
         f"A slalom at the same share of the grip leaves {100.0 * slalom.error:.1f} % in that time, "
-        f"and is not as good in ten times of it."
+        f"and {later}."
     )
 
 
@@ -98,7 +96,13 @@ def write_plan_report(
                         figures["band"], "The band of 90 % before and after.", READ["plan_band"]
                     ),
                     Paragraph(text=words[1]),
-                    _rivals(found),
+                    Table(
+                        caption="The plan and maneuvers of the same length at the same share of "
+                        "the grip, error over the grip; their room is that on an open field, "
+                        "without margins; random is the median of eight.",
+                        header=RIVALS,
+                        rows=rival_rows(found),
+                    ),
                 ],
             ),
             Section(heading="Safety", blocks=[Paragraph(text=text) for text in words[2:]]),
@@ -120,9 +124,9 @@ def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     ]
     if not found.space.held:
         said.append("Open loop: disturbances of the course are not corrected.")
-    if driven and least(driven) < 0.0:
+    if driven and _least(driven) < 0.0:
         said.append(
-            f"The double-track car of the vehicle file leaves the area by {-least(driven):.2g} m: "
+            f"The double-track car of the vehicle file leaves the area by {-_least(driven):.2g} m: "
             "its tires are outside the planned set. Set --mu, or ask for less --grip."
         )
     return said
@@ -163,13 +167,3 @@ def rival_rows(found: Plan) -> list[list[str]]:
         room = f"{one.length:.0f} x {one.width:.1f} m"
         rows.append([one.name, time, room, f"{100.0 * one.error:.1f} %"])
     return rows
-
-
-def _rivals(found: Plan) -> Table:
-    return Table(
-        caption="The plan and maneuvers of the same length at the same share of the grip, error "
-        "over the grip; their room is that on an open field, without margins; random is the "
-        "median of eight.",
-        header=RIVALS,
-        rows=rival_rows(found),
-    )
