@@ -25,7 +25,7 @@ from tireid.commands import (
 )
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
-LONGEST_LINE = 900  # characters of a message, command and option not counted
+_LONGEST_LINE = 900  # characters of a message, command and option not counted
 
 
 class _Parser(argparse.ArgumentParser):
@@ -124,7 +124,7 @@ def one_line(error: Exception | str) -> str:
     text = " ".join(words.split()) or type(error).__name__
     if isinstance(error, MemoryError):
         text = f"not enough memory: {text}"
-    return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
+    return text if len(text) <= _LONGEST_LINE else f"{text[:_LONGEST_LINE]}..."
 
 
 def entry() -> NoReturn:

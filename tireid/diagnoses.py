@@ -20,7 +20,7 @@ from tireid import report as page
 from tireid.output import text_table
 from tireid.reports.common import READ, REPORT, drawing, origin
 
-HEADER = ("found", "size", "confidence", "repair")
+_HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
     "acceleration_sensor_x": "accelerometer ahead of the c.g.",
     "center_of_gravity": "center of gravity stated too far back",
@@ -44,7 +44,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "zero": "reads exactly 0 again and again",
 }
 
-GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
+_GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
 _OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
 
 
@@ -63,7 +63,7 @@ def _finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
     return [
         [
             " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
-            size_text(one),
+            _size_text(one),
             one.percent + (", sure" if one.sure else ""),
             "none" if one.repair is None else repair_text(one.repair),
         ]
@@ -71,7 +71,7 @@ def _finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
     ]
 
 
-def size_text(finding: Finding) -> str:
+def _size_text(finding: Finding) -> str:
     """Return the size of a finding to the digits that its deviation leaves, with its unit."""
     if math.isnan(finding.size):
         return ""
@@ -88,7 +88,7 @@ def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
-        table = text_table([list(HEADER), *_finding_rows(diagnosis)], "<<<<")
+        table = text_table([list(_HEADER), *_finding_rows(diagnosis)], "<<<<")
         return "\n".join([head, table, *diagnosis.lines(unobservable=unobservable)])
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unobservable=unobservable)])
 
@@ -115,7 +115,7 @@ def diagnosis_section(
         )
     ]
     if rows:
-        blocks.append(page.Table(caption="What was found.", header=list(HEADER), rows=rows))
+        blocks.append(page.Table(caption="What was found.", header=list(_HEADER), rows=rows))
         blocks += [page.Paragraph(text=page.printed(one.text)) for one in diagnosis.findings]
     else:
         blocks.append(page.Paragraph(text="Nothing was found."))
@@ -155,7 +155,7 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
             "doctor",
             None,
             f"doctor: {one.text}",
-            one.code in GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
+            one.code in _GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
         )
         for one in left
     ]

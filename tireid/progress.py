@@ -123,7 +123,7 @@ class Stopwatch:
 # How far work has come. On a terminal one line that changes and goes away, elsewhere a line now and
 # then; in a program that only uses the library nothing at all.
 
-QUIET, PLAIN, LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
+_QUIET, _PLAIN, _LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
 _TELLING = 0.02  # share from which the time left is given
 _listening = False
 _live = False  # whether such a line stands on the terminal
@@ -157,7 +157,7 @@ class Progress:
         self._what, self._parts, self._long = what, dict(parts or {"": 1.0}), long
         self._whole = sum(self._parts.values())
         self._begun = time.perf_counter()
-        self._told = self._begun + QUIET - (LIVE if _on_terminal() else PLAIN)
+        self._told = self._begun + _QUIET - (_LIVE if _on_terminal() else _PLAIN)
         self._before, self._weight, self._name = 0.0, 0.0, ""
         self._done = 0
         self.begin(next(iter(self._parts)))
@@ -199,7 +199,7 @@ class Progress:
         """
         now = time.perf_counter()
         live = _on_terminal()
-        if not _listening or now - self._told < (LIVE if live else PLAIN):
+        if not _listening or now - self._told < (_LIVE if live else _PLAIN):
             return
         self._told = now
         done = min(self._before + self._weight * share, 1.0)

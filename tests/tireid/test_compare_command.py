@@ -15,7 +15,7 @@ from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tests.tireid.conftest import refusal
 from tireid.cli import main
-from tireid.commands.compare_results import ERROR_COLUMNS
+from tireid.commands.compare_results import _ERROR_COLUMNS
 from tireid.figures.compare import short_names
 from tireid.output import write_json
 
@@ -157,7 +157,7 @@ def test_times_are_over_that_of_the_integral_law(numbers):
 def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
     with (result / "compare.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == ERROR_COLUMNS
+    assert tuple(rows[0]) == _ERROR_COLUMNS
     assert len(rows) == 4 * 2 + 3 * 4  # online, and frozen where there is a model
     for row in rows:
         method = numbers["methods"][row["method"]]

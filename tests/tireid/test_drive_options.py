@@ -7,8 +7,8 @@ import pytest
 
 from models.faults import SensorFault
 from tireid.cli import build_parser, main
-from tireid.commands.drive_case import conditions_of, parse_drop, parse_fault, parse_speed
-from tireid.driving.runs import BacksOff
+from tireid.commands.drive_case import _parse_drop, _parse_speed, conditions_of, parse_fault
+from tireid.driving.runs import _BacksOff
 from tireid.driving.setup import SpeedWish
 
 
@@ -23,7 +23,7 @@ from tireid.driving.setup import SpeedWish
     ],
 )
 def test_a_speed_is_a_share_of_the_grip_or_has_a_unit(text, share, speed):
-    wish = parse_speed(text)
+    wish = _parse_speed(text)
     assert wish == SpeedWish(
         None if share is None else pytest.approx(share),
         None if speed is None else pytest.approx(speed),
@@ -44,12 +44,12 @@ def test_a_speed_is_a_share_of_the_grip_or_has_a_unit(text, share, speed):
 )
 def test_what_is_no_speed_is_refused_with_its_rule(text, said):
     with pytest.raises(ValueError, match="--speed") as refusal:
-        parse_speed(text)
+        _parse_speed(text)
     assert said in str(refusal.value)
 
 
 def test_a_drop_is_a_place_and_a_friction():
-    assert parse_drop("60:0.5") == (60.0, 0.5)
+    assert _parse_drop("60:0.5") == (60.0, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_a_drop_is_a_place_and_a_friction():
 )
 def test_what_is_no_drop_is_refused_with_its_rule(text, said):
     with pytest.raises(ValueError, match="--mu-drop") as refusal:
-        parse_drop(text)
+        _parse_drop(text)
     assert said in str(refusal.value)
 
 
@@ -112,7 +112,7 @@ def test_caution_is_a_share_and_zero_by_default():
 
 
 def test_a_tracker_that_backs_off_is_noted_once():
-    noted, said = BacksOff(None), []
+    noted, said = _BacksOff(None), []
     for grip in (1.0, 0.95, 0.7, 0.68, 0.72, 0.9):
         said.append(noted.observe(None, SimpleNamespace(grip=grip)))
     assert said == [

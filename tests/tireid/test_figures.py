@@ -33,12 +33,12 @@ from tireid.figures.forces import (
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
 from tireid.figures.style import (
     BLACK,
+    _with_own_fonts,
     figure_png,
     figure_svg,
     force_range,
     force_unit_of,
     save_figures,
-    with_own_fonts,
 )
 from tireid.figures.tires import learnt_axles_figure, slip_figure
 
@@ -546,9 +546,9 @@ def test_fonts_of_matplotlib_are_found_where_the_list_of_the_machine_lacks_them(
     for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
         with pytest.raises(ValueError, match=name):
             fonts.findfont(name, fallback_to_default=False)
-    with_own_fonts()
+    _with_own_fonts()
     for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
         assert Path(fonts.findfont(name, fallback_to_default=False)).is_file()
     listed = len(fonts.ttflist)
-    with_own_fonts()
+    _with_own_fonts()
     assert len(fonts.ttflist) == listed

@@ -16,7 +16,7 @@ from tireid.figures.forces import inputs_figure
 from tireid.figures.thinned import cloud, drawn_times, shown, shown_of_run
 from tireid.learning import identify
 from tireid.output import require_curves, write_csv, write_long_csv, write_table
-from tireid.reports.common import recording_digest
+from tireid.reports.common import _recording_digest
 
 N = 500_000
 
@@ -151,8 +151,8 @@ def test_the_hash_of_a_long_recording_tells_one_bit(drive, monkeypatch):
     monkeypatch.setattr(arrays, "LONG", 100)
     r = np.array(drive.r)
     r[2999] = np.nextafter(r[2999], 1.0)
-    assert recording_digest(drive) == recording_digest(replace(drive))
-    assert recording_digest(drive) != recording_digest(replace(drive, r=r))
+    assert _recording_digest(drive) == _recording_digest(replace(drive))
+    assert _recording_digest(drive) != _recording_digest(replace(drive, r=r))
 
 
 def test_a_parquet_table_in_parts_holds_every_digit_of_every_column(tmp_path):

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from tests.pages import faults_of, outline
 from tireid.figures.style import figure_png, figure_svg
 from tireid.report import (
-    FINE,
-    STYLE,
+    _FINE,
+    _STYLE,
     Headline,
     Marked,
     Paragraph,
@@ -142,9 +142,9 @@ def test_what_something_is_worth_is_seen() -> None:
 
 
 def test_no_figure_is_wider_than_a_small_screen() -> None:
-    small = STYLE[STYLE.index("@media screen") : STYLE.index("@media print")]
+    small = _STYLE[_STYLE.index("@media screen") : _STYLE.index("@media print")]
     assert "img" not in small
-    assert "figure img { display: block; width: 100%; height: auto; }" in STYLE
+    assert "figure img { display: block; width: 100%; height: auto; }" in _STYLE
 
 
 def test_a_film_is_embedded_as_what_it_is() -> None:
@@ -209,10 +209,10 @@ def test_headline_numbers_and_warnings_come_before_everything_else() -> None:
     text = outline(report_html(report)).text
     places = [text.index(one) for one in ("2.4 %", "a & b", "What & why")]
     assert places == sorted(places)
-    assert "missed <frozen>" in text and FINE not in text
+    assert "missed <frozen>" in text and _FINE not in text
     calm = Report(title="T", sections=SECTIONS, warnings=[])
-    assert FINE in outline(report_html(calm)).text
-    assert FINE not in page_of("T", SECTIONS), "where nobody looked, nobody says that all is well"
+    assert _FINE in outline(report_html(calm)).text
+    assert _FINE not in page_of("T", SECTIONS), "where nobody looked, nobody says that all is well"
 
 
 def test_a_folded_section_shows_its_heading_only() -> None:

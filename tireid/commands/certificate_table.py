@@ -13,7 +13,7 @@ from identifier.stability import Certificate, Property
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
-ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
+_ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
 HEADER = ("property", "value", "limit", "margin", "")
 
 
@@ -109,7 +109,7 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
     beyond = [
         f"{name} is {number(size)} {unit}".rstrip() + f", proven up to {number(bound)}"
         for name, values, bound, unit in layers
-        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + ROUNDING)
+        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + _ROUNDING)
     ]
     if not beyond:
         return ""

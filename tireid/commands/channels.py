@@ -28,7 +28,7 @@ from tireid.progress import say, tell
 _MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
 _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
-LONGEST_NAME = 48  # letters of a channel in the table
+_LONGEST_NAME = 48  # letters of a channel in the table
 
 
 def add_parser(commands: Any) -> None:
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         tell(f"{choice.column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
     if rolls or missing:
-        tell(missing_text(options.log, missing, proposal, signals))
+        tell(_missing_text(options.log, missing, proposal, signals))
     if said:
         tell(said)
     if options.write is not None:
@@ -155,7 +155,7 @@ def _channels_text(
             samples = int(np.count_nonzero(~np.isnan(channel.values)))
             low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
                 "empty", "")  # fmt: skip
-        name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
+        name = visible(one.name if len(one.name) <= _LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one, signals, proposal, known)
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
@@ -204,7 +204,7 @@ def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> s
     return "\n".join(said)
 
 
-def missing_text(
+def _missing_text(
     log: str, missing: Sequence[str], proposal: Proposal, signals: Mapping[str, Signal]
 ) -> str:
     if not missing:

@@ -146,7 +146,7 @@ def write_comparison(
     path = folder / "compare.csv"
     with naming(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(ERROR_COLUMNS)
+        writer.writerow(_ERROR_COLUMNS)
         for row in _error_rows(comparison):
             writer.writerow(f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row)
     say("drawing figures")
@@ -201,7 +201,7 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     }
 
 
-ERROR_COLUMNS = (
+_ERROR_COLUMNS = (
     *("method", "kind", "identified_on", "replayed_on", "front_N", "rear_N"),
     *("front_percent", "rear_percent", "both_percent"),
 )

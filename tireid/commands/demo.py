@@ -43,7 +43,7 @@ from tireid.verdicts import (
     verdict_warnings,
 )
 
-REFERENCE = (
+_REFERENCE = (
     'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire '
     'Forces"'
 )
@@ -62,7 +62,7 @@ def _demo_report(
     model, runs, verdict = story.axle.model, story.axle.runs, story.axle.verdict
     return page.Report(
         title=_TITLE,
-        summary=SUMMARY,
+        summary=_SUMMARY,
         numbers=[
             verdict_headline(verdict),
             *missed_headline(verdict),
@@ -192,7 +192,7 @@ def _paper_study(
         ),
         page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(
-            text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
+            text=f"{_REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets earlier driving. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
@@ -243,19 +243,19 @@ def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[p
 
 
 _TITLE = "tireid: lateral tire forces, identified while driving"
-SUMMARY = (
+_SUMMARY = (
     "tireid identifies the tire forces of a driven car from speed, lateral velocity, yaw rate "
     "and steering. The frozen model then predicts validation drives and steers the car."
 )
 SEEDS = 20
-LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
-_TESTING, DRIVING = "the frozen-weight test of the paper", "driving on the identified tires"
+_LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
+_TESTING, _DRIVING = "the frozen-weight test of the paper", "driving on the identified tires"
 _REPORTING = "writing the report"
-PARTS = {
-    LEARNING: 15.0,
+_PARTS = {
+    _LEARNING: 15.0,
     _EXPORTING: 20.0,
     _TESTING: 20.0,
-    DRIVING: 40.0,
+    _DRIVING: 40.0,
     _REPORTING: 2.0,
 }  # about s
 
@@ -277,9 +277,9 @@ def run(options: argparse.Namespace) -> None:
     watch = Stopwatch()
     with (
         output_folder(options.out, force=options.force) as folder,
-        Progress("demo", PARTS, long=True) as work,
+        Progress("demo", _PARTS, long=True) as work,
     ):
-        story = run_story(partial(work.begin(LEARNING).step, 2 * len(STORY)))
+        story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
@@ -293,7 +293,7 @@ def run(options: argparse.Namespace) -> None:
         shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
         study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))
         figures["paper"] = write_study(folders["paper"], study)
-        work.begin(DRIVING)
+        work.begin(_DRIVING)
         driven = demo_parts.drive_story(story, folder)
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)

@@ -126,7 +126,7 @@ NOT_BUILT = (
 )
 
 
-class Check(NamedTuple):
+class _Check(NamedTuple):
     """A build of the package on this machine.
 
     precision : float or double.   verdict : of its self-test.   difference : largest of a force
@@ -144,14 +144,14 @@ class Shipped(NamedTuple):
     """What was exported, and its builds here: none without a compiler."""
 
     exported: Exported
-    checks: Sequence[Check]
+    checks: Sequence[_Check]
 
 
 def ship(story: Story, folder: Path) -> Shipped:
     """Export what the axle identifier learnt, as `tireid export` does, compile it and test it."""
     learnt, model = story.axle.runs[0], story.axle.model
     exported = export(learnt.design, folder, start=model, vehicle=story.car)
-    name, checks = exported.package.specialized.name, list[Check]()
+    name, checks = exported.package.specialized.name, list[_Check]()
     if find_compiler() is not None:
         expected = identify(learnt.recording, story.car, learnt.design, model).axle_force
         for precision, single in (("double", False), ("float", True)):
@@ -160,7 +160,7 @@ def ship(story: Story, folder: Path) -> Shipped:
             run = CompiledPackage.from_folder(folder, single=single).run(learnt.recording)
             difference = float(np.abs(run.axle_force - expected).max())
             refused = int(np.count_nonzero(run.status))
-            checks.append(Check(precision, verdict, difference, refused, len(run.status)))
+            checks.append(_Check(precision, verdict, difference, refused, len(run.status)))
     return Shipped(exported, checks)
 
 

@@ -32,7 +32,7 @@ SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/
 SLALOM = Slalom(
     amplitude=np.radians(4.0), frequency=0.5, onset=2.0, rate_limit=RATE_LIMIT, duration=30.0
 )
-LANE_CHANGE = DoubleLaneChange(
+_LANE_CHANGE = DoubleLaneChange(
     amplitude=np.radians(4.5),
     frequency=0.6,
     pause=1.0,
@@ -40,18 +40,18 @@ LANE_CHANGE = DoubleLaneChange(
     rate_limit=RATE_LIMIT,
     duration=10.0,
 )
-STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
-FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
+_STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
+_FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
 STORY: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]; to learn on is the first
     "slalom": (SLALOM, SPEED),
-    "double_lane_change": (LANE_CHANGE, SPEED),
-    "step_steer": (STEP, SPEED),
+    "double_lane_change": (_LANE_CHANGE, SPEED),
+    "step_steer": (_STEP, SPEED),
 }
 DRIVES: Mapping[str, tuple[Maneuver, float]] = {
     "slalom_20": (SLALOM, 20.0),
-    "step_steer": (STEP, 20.0),
-    "lane_change": (LANE_CHANGE, 20.0),
-    "slalom_25": (FASTER, 25.0),
+    "step_steer": (_STEP, 20.0),
+    "lane_change": (_LANE_CHANGE, 20.0),
+    "slalom_25": (_FASTER, 25.0),
 }
 
 

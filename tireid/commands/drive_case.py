@@ -34,7 +34,7 @@ from tireid.verdicts import warn_of
 _PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
-def parse_speed(text: str) -> SpeedWish:
+def _parse_speed(text: str) -> SpeedWish:
     """Return what --speed says.
 
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
@@ -55,7 +55,7 @@ def parse_speed(text: str) -> SpeedWish:
     return SpeedWish(share, None)
 
 
-def parse_drop(text: str) -> tuple[float, float]:
+def _parse_drop(text: str) -> tuple[float, float]:
     """Return the place [m] and the friction from there on [-] of --mu-drop S:MU.
 
     text : such as 60:0.5.
@@ -122,8 +122,8 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
         mu=options.mu,
-        drops=[parse_drop(text) for text in options.mu_drop],
-        wish=parse_speed(options.speed),
+        drops=[_parse_drop(text) for text in options.mu_drop],
+        wish=_parse_speed(options.speed),
     )
     hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
     require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")

@@ -30,7 +30,7 @@ from tireid.progress import Progress, say, tell
 from tireid.reports.identify import guaranteed_text, side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, verdicts_text
 
-LEARNING, _JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
+_LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
 
 
 def add_parser(commands: Any) -> None:
@@ -122,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
     if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
-    parts = {LEARNING: 1.0 + count, _JUDGING: count, DRAWING: 2.0 + 3.0 * count}
+    parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("identify", parts) as progress,
@@ -154,7 +154,7 @@ def run(options: argparse.Namespace) -> int:
                 tire = guaranteed(learnt, bound, last, tire)
             found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
             closing = _closing_line(learnt, last, vehicle, resumed=start is not None)
-        figures = found.write(folder, curves=options.curves, progress=progress.begin(DRAWING))
+        figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (

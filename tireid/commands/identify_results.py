@@ -42,14 +42,14 @@ from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 
-NETWORK = "network"
-OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
-ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
+_NETWORK = "network"
+_OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
+_ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
     "v_y_estimated_m_s": "v_y",
     "v_y_sd_m_s": "v_y_sd",
     "side_slip_observable": "side_slip_observable",
 }
-WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
+_WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
 _OWN_PAST = "  its past, against online"
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 _CURVE_POINTS = 201
@@ -61,7 +61,7 @@ class Results:
     """Models that were frozen, or a network, over recordings.
 
     runs : of the method, over the recording that was learnt and over others.
-    models, frozen : by freeze time as text [s], or `NETWORK`, models and their replays by
+    models, frozen : by freeze time as text [s], or `_NETWORK`, models and their replays by
         recording; the last counts.
     verdict : on the last.   asked : on it over the others, by name.
     parts : of the first run, where it is over several logs.   about : a network, its file.
@@ -111,7 +111,7 @@ class Results:
         verdict: Verdict,
         asked: Mapping[str, Verdict],
     ) -> "Results":
-        found: Any = {"models": {NETWORK: model}, "frozen": {NETWORK: _replays(model, runs)}}
+        found: Any = {"models": {_NETWORK: model}, "frozen": {_NETWORK: _replays(model, runs)}}
         about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
         found["about"] = {"file": source, **about}
         return cls(method=method, runs=runs, verdict=verdict, asked=asked, **found)
@@ -129,7 +129,7 @@ class Results:
     @property
     def by_label(self) -> dict[str, Mapping[str, Replay]]:
         """The replays by what a table calls their model."""
-        return {k if k == NETWORK else f"{k} s": replays for k, replays in self.frozen.items()}
+        return {k if k == _NETWORK else f"{k} s": replays for k, replays in self.frozen.items()}
 
     def table(self) -> str:
         """Return a table of the errors per axle, and as a share of the force where there is truth.
@@ -143,7 +143,7 @@ class Results:
             for name, result in replays.items():
                 size, sides = force_rms(runs[name]), result.reproduction
                 errors = {(label, visible(name)): result.against_truth or result.against_online}
-                if label == NETWORK:
+                if label == _NETWORK:
                     words = f"{self.method}, learning online", visible(name)
                     errors[words] = online_error(runs[name])
                 elif sides is not None:
@@ -193,7 +193,7 @@ class Results:
             "vehicle": vehicle_numbers(learnt.vehicle),
             "diverged_at_s": learnt.diverged_at,
             "version": __version__,
-            **({NETWORK: dict(self.about)} if self.about else {}),
+            **({_NETWORK: dict(self.about)} if self.about else {}),
         }
 
     def write(
@@ -219,15 +219,15 @@ class Results:
         learnt, count = self.runs[0], len(self.runs)
         for k, run in enumerate(self.runs):
             replays = {
-                key if key == NETWORK else f"frozen_{key}s": by_name[run.recording.name]
+                key if key == _NETWORK else f"frozen_{key}s": by_name[run.recording.name]
                 for key, by_name in self.frozen.items()
             }
             end = "" if run is learnt else f"_{file_name(run.recording)}"
             share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
             write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, share))
-        if NETWORK in self.models:
+        if _NETWORK in self.models:
             return
-        if OBSERVED in learnt.outputs:
+        if _OBSERVED in learnt.outputs:
             found = (_error_columns(learnt, one) for one in learnt.blocks())
             write_table(folder / f"errors.{curves}", found)
         if learnt.online:
@@ -238,7 +238,7 @@ class Results:
         recording, name = learnt.recording, learnt.recording.name
         figures = {"inputs": inputs_figure(recording)}
         asked = self.runs[1:]
-        if NETWORK in self.models:
+        if _NETWORK in self.models:
             asked = self.runs
             for run in self.runs:
                 end = "" if run is learnt else f"_{file_name(run.recording)}"
@@ -248,7 +248,7 @@ class Results:
             figures["slip"] = slip_figure(model, recording, _beside(learnt))
             figures["forces"] = force_figure(learnt, own)
             slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
-            if OBSERVED in learnt.outputs:
+            if _OBSERVED in learnt.outputs:
                 figures["error"] = error_figure(learnt, freeze_times=list(own))
                 figures["weights"] = weights_figure(learnt, list(own))
             if slip is not None:
@@ -306,7 +306,7 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
 def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
     return {
         "t_s": learnt.recording.t[block.part],
-        **axle_columns("xi_tilde_{}_Us", block.outputs[OBSERVED]),
+        **axle_columns("xi_tilde_{}_Us", block.outputs[_OBSERVED]),
         **axle_columns("z_{}_Us2", block.before["z"]),
     }
 
@@ -317,7 +317,7 @@ def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
     for block in learnt.blocks():
         rows = slice(-block.part.start % each, None, each)
         weights = {"t_s": learnt.recording.t[block.part][rows]}
-        for matrix in [name for name in WEIGHTS if name in block.state]:
+        for matrix in [name for name in _WEIGHTS if name in block.state]:
             values = block.before[matrix][rows]
             for place in np.ndindex(values.shape[1:]):
                 weights["_".join([matrix, *(str(k + 1) for k in place)])] = values[:, *place]
@@ -333,7 +333,9 @@ def _force_columns(
     """
     recording, car, n = run.recording, run.vehicle, len(run.recording)
     outputs = run.outputs
-    given = {column: outputs[port].ravel() for column, port in ESTIMATED.items() if port in outputs}
+    given = {
+        column: outputs[port].ravel() for column, port in _ESTIMATED.items() if port in outputs
+    }
     curves = {} if recording.axle_force is None else {"true": recording.axle_force}
     curves |= {"online": run.axle_force} if run.online else {}
     curves |= {label: replay.axle_force for label, replay in replays.items()}

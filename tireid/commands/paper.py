@@ -32,7 +32,7 @@ from tireid.report import Table, printed
 # Its gains, its car and its simulator are not public: these numbers stand beside ours, they are not
 # reproduced.
 
-PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
+_PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "step_steer": {  # Table I
         "instantaneous": {"online": 0.2690, "32": 0.6506, "35": 0.6488},
         "integral": {"online": 0.4077, "32": 0.5562, "35": 0.5015},
@@ -93,7 +93,7 @@ def _printed_values(maneuver: str) -> dict[str, dict[str, float]]:
     }
     return {
         law: {beside[name]: value for name, value in row.items()}
-        for law, row in PAPER[maneuver].items()
+        for law, row in _PAPER[maneuver].items()
     }
 
 

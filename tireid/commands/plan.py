@@ -24,8 +24,8 @@ from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.plan import RIVALS, plan_words, rival_rows, write_plan_report
 
-PERIOD = 0.01  # s, of steering.csv
-RUN_UP = 1.0  # s straight ahead, before each pass
+_PERIOD = 0.01  # s, of steering.csv
+_RUN_UP = 1.0  # s straight ahead, before each pass
 
 
 def add_parser(commands: Any) -> None:
@@ -72,7 +72,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    area, speed = parse_area(options.area), parse_speed(options.speed)
+    area, speed = _parse_area(options.area), _parse_speed(options.speed)
     ratio, rate = options.steering_ratio, options.steering_rate
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
@@ -132,7 +132,7 @@ def _require_ranges(options: argparse.Namespace) -> None:
         require_positive(ValueError, **{"--steering-rate": options.steering_rate})
 
 
-def parse_area(text: str) -> tuple[float, float]:
+def _parse_area(text: str) -> tuple[float, float]:
     """Return length and width [m] of --area.
 
     text : such as 40x40 or 60x20.5m.
@@ -149,7 +149,7 @@ def parse_area(text: str) -> tuple[float, float]:
     return sides[0], sides[1]
 
 
-def parse_speed(text: str) -> float:
+def _parse_speed(text: str) -> float:
     """Return the speed [m/s] of --speed: 15, 15m/s or 54km/h."""
     value, unit = shared.number_with_unit(text, "m/s", "km/h")
     speed = value / (3.6 if unit == "km/h" else 1.0)
@@ -189,7 +189,7 @@ def _steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """
     rows = []
     for k, one in enumerate(found.passes):
-        t = PERIOD * np.arange(round(one.steering.duration / PERIOD) + 1, dtype=np.float64)
+        t = _PERIOD * np.arange(round(one.steering.duration / _PERIOD) + 1, dtype=np.float64)
         delta = one.steering.steering(t)[:, 0]
         r = np.interp(t, one.t, one.motion.r[:, 0, 0])
         held = np.full(t.size, found.space.speed)
@@ -210,7 +210,7 @@ def _path_columns(found: Plan, k: int) -> dict[str, Array]:
     step = 0.4 * car.wheelbase / found.space.speed
     t = np.linspace(0.0, one.steering.duration, max(8, round(one.steering.duration / step)))
     X, Y, psi = one.course(t).T
-    back = np.arange(round(RUN_UP / step), 0, -1) * step * found.space.speed
+    back = np.arange(round(_RUN_UP / step), 0, -1) * step * found.space.speed
     before = X[0] - back * np.cos(psi[0]), Y[0] - back * np.sin(psi[0])
     return {"X_m": np.append(before[0], X), "Y_m": np.append(before[1], Y)}
 

@@ -59,7 +59,7 @@ class _Informer:
 _NOTED = 0.1  # change of the grip that is worth a note
 
 
-class BacksOff:
+class _BacksOff:
     """Stands between a drive and what learns, and notes where the tracker plans with less grip.
 
     Parameters
@@ -112,9 +112,9 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
-PROBED = 0.03  # rad: slip at which curves are asked how unsure they are
-SURE, UNSURE = 0.1, 0.25  # standard deviations over the prior's, between which a weave begins
-ASKED = 0.5  # s between two looks
+_PROBED = 0.03  # rad: slip at which curves are asked how unsure they are
+_SURE, _UNSURE = 0.1, 0.25  # standard deviations over the prior's, between which a weave begins
+_ASKED = 0.5  # s between two looks
 
 
 def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
@@ -125,14 +125,14 @@ def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
 
     def unknown() -> float:
         nonlocal last, calls
-        if calls % round(ASKED / PERIOD) == 0:
+        if calls % round(_ASKED / PERIOD) == 0:
             try:
-                sd = learner.supervisor.identifier.model().relative_sd(np.array([PROBED]))
+                sd = learner.supervisor.identifier.model().relative_sd(np.array([_PROBED]))
             except (DivergedError, CannotFreezeError, ValueError):  # no model now
                 sd = None
             if sd is not None:
                 unsure = float(sd.max())
-                last = min(max((unsure - SURE) / (UNSURE - SURE), 0.0), 1.0)
+                last = min(max((unsure - _SURE) / (_UNSURE - _SURE), 0.0), 1.0)
         calls += 1
         return last
 
@@ -283,7 +283,7 @@ def run_drive(
             sensors=conditions.driving_sensors,
             delay=conditions.delay,
             rng=np.random.default_rng([conditions.seed, 2]),
-            learner=BacksOff(beside) if conditions.caution > 0.0 else beside,
+            learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
             lateral=conditions.lateral(learnt),
             dither=weave,
             laps=conditions.laps,

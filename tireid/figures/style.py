@@ -97,7 +97,7 @@ def label_forces(panels: NDArray[Any], unit: "ForceUnit", *, residual: bool) -> 
         axes.set_ylabel(f"{'residual' if missed else 'lateral force'} [{unit.name}]")
 
 
-def with_own_fonts() -> None:
+def _with_own_fonts() -> None:
     """List the fonts that Matplotlib brings, where the list it keeps on this machine lacks them.
 
     A list that was made while an environment was being removed knows the fonts of the system only,
@@ -110,7 +110,7 @@ def with_own_fonts() -> None:
             fonts.addfont(path)
 
 
-with_own_fonts()
+_with_own_fonts()
 
 
 @contextmanager
@@ -161,7 +161,7 @@ Window = tuple[float, float] | None
 
 TIME = "time [s]"
 AXLES = ("Front axle", "Rear axle")
-FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
+_FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
 
 
 _FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
@@ -223,7 +223,7 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
         shade: Mapping[str, Any] = {"facecolor": "#F1EDE4", "edgecolor": "none", "zorder": 0}
         axes.axvspan(max(t_freeze, first), last, label=_PREDICTION, **shade)
     if first <= t_freeze <= last:
-        axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=FREEZE)
+        axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=_FREEZE)
 
 
 def few_ticks(axis: Axis) -> None:
@@ -241,7 +241,7 @@ def note(axes: Axes, text: str) -> None:
 
 
 def legend_above(
-    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (FREEZE, _PREDICTION)
+    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (_FREEZE, _PREDICTION)
 ) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 

@@ -17,17 +17,17 @@ from models.recordings import Recording
 
 COLUMNS = 1500  # of pixels, more than any panel has
 
-Samples = NDArray[Any]  # indices, or whether each sample is meant
-Signal = Callable[[slice | Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
+_Samples = NDArray[Any]  # indices, or whether each sample is meant
+Signal = Callable[[slice | _Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
 
 
-def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
+def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> _Samples:
     """Return which samples within the ends of a time axis are drawn.
 
     t : times of the samples (n,) [s].   ends : first and last time [s].
     """
     if len(t) <= LONG:
-        within: Samples = (t >= ends[0]) & (t <= ends[1])
+        within: _Samples = (t >= ends[0]) & (t <= ends[1])
         return within
     first = int(np.searchsorted(t, ends[0], side="left"))
     last = int(np.searchsorted(t, ends[1], side="right"))
@@ -88,7 +88,7 @@ def shown_of_run(
     return drawn_times(recording, np.concatenate(times)), joined
 
 
-def cloud(t: Array, *signals: Signal) -> Samples:
+def cloud(t: Array, *signals: Signal) -> _Samples:
     """Return which samples a cloud of points shows: some at even distances, and the outermost.
 
     t : times of the samples (n,) [s].   signals : across and up.

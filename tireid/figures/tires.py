@@ -22,8 +22,8 @@ from tireid.figures.thinned import cloud, shown_of_run
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
 
-UNKNOWN = "slip not known"
-BAND = "band of 90 %"
+_UNKNOWN = "slip not known"
+_BAND = "band of 90 %"
 _GUARANTEED = "guaranteed, steady"
 _CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
@@ -88,7 +88,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         _label_slip(lowest, axle)
     style.label_forces(panels, unit, residual=known is not None)
     labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
-    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(UNKNOWN,))
+    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(_UNKNOWN,))
     return figure
 
 
@@ -105,7 +105,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     if band is not None:  # under the points, which it would make grey
         edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in band)
-        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=BAND, **edge)
+        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
     look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
     for side in model.guaranteed_band(slip) or ():
         axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
@@ -118,7 +118,7 @@ def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
     """Shade the slip [deg] that the model does not know."""
     for low, high in ((ends[0], -known), (known, ends[1])):
         if low < high:
-            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
+            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=_UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -45,14 +45,14 @@ from models.recordings import LogMap, Recording, RecordingError, read_repaired, 
 from models.vehicle import Vehicle
 from tireid.fleet.store import INDEX, LogRow, Store, information_columns, needed, protocols
 
-TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
+_TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
 _PORTIONS = 16  # that few logs are shared into
 PART = 300.0  # s of a log whose information is kept as one
-DT = 0.01  # s, to which logs are brought
-Judging = Literal["motion", "none"]
-DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
+_DT = 0.01  # s, to which logs are brought
+_Judging = Literal["motion", "none"]
+_DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
 _FIELD = re.compile(r"\{(\w+)\}")
-EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
+_EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,7 @@ class Telling:
 
     log_map: LogMap
     start: TireModel | None = None
-    judging: Judging = "motion"
+    judging: _Judging = "motion"
     check: bool = True
     part: float = PART
 
@@ -113,7 +113,7 @@ class Telling:
         parts = (
             vehicle,
             (beliefs.mean.tobytes(), beliefs.information.tobytes()),
-            InertialIdentifier.for_vehicle(vehicle, dt=DT),
+            InertialIdentifier.for_vehicle(vehicle, dt=_DT),
             replace(self.log_map, dbc=""),
             Path(dbc).read_bytes() if dbc else b"",
             None if self.start is None else json.dumps(self.start.to_dict()),
@@ -201,7 +201,7 @@ def tag_pattern(tags: str) -> re.Pattern[str]:
         raise ValueError(f"--tags {tags}: wants {{name}} for parts of a path, each name once")
     parts = _FIELD.split(tags)
     words = [re.escape(text).replace(r"\*", "[^/]*") for text in parts[::2]]
-    groups = [f"(?P<{name}>{DATE if name == 'date' else '[^/]+?'})" for name in parts[1::2]]
+    groups = [f"(?P<{name}>{_DATE if name == 'date' else '[^/]+?'})" for name in parts[1::2]]
     body = "".join(a + b for a, b in zip(words, [*groups, ""], strict=True))
     return re.compile(rf"(?:^|/){body}$")
 
@@ -216,7 +216,7 @@ def _absolute(root: str) -> str:
     return _address(*needed("fsspec.core").url_to_fs(root)).rstrip("/") + "/"
 
 
-CHANGES = ("etag", "lastmodified", "md5hash", "contentmd5", "generation", "mtime", "created")
+_CHANGES = ("etag", "lastmodified", "md5hash", "contentmd5", "generation", "mtime", "created")
 
 
 def _stamp(address: str, info: Mapping[str, Any]) -> str:
@@ -226,7 +226,7 @@ def _stamp(address: str, info: Mapping[str, Any]) -> str:
         given: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
     else:
         some = {key.replace("_", "").lower(): value for key, value in info.items()}
-        given = [(key, str(some[key])) for key in CHANGES if some.get(key)]
+        given = [(key, str(some[key])) for key in _CHANGES if some.get(key)]
         if not given:
             return ""
         given.append(("size", info.get("size")))
@@ -264,7 +264,7 @@ def _learn_log(task: _Task, telling: Telling, car: Car, known: Set[str] = frozen
                     raise
             each = [replace(row, run=name) for name in names]
             return Learnt([_tried(one, path, car.vehicle, telling) for one in each], [])
-    except EXPECTED as error:
+    except _EXPECTED as error:
         return Learnt([_failed(row, error)], [])
 
 
@@ -291,7 +291,7 @@ def _tried(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRo
     """Return the row of a run; where it cannot be used, it says why."""
     try:
         return _of_run(row, path, vehicle, telling)
-    except EXPECTED as error:
+    except _EXPECTED as error:
         return _failed(row, error)
 
 
@@ -302,7 +302,7 @@ def _failed(row: LogRow, error: Exception) -> LogRow:
 
 def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRow:
     recording, vehicle = read_repaired(
-        path, vehicle, row.run or None, dt=DT, check=telling.check, log_map=telling.log_map
+        path, vehicle, row.run or None, dt=_DT, check=telling.check, log_map=telling.log_map
     )
     return learnt(row, recording, vehicle, telling)
 
@@ -310,7 +310,7 @@ def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogR
 def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling) -> LogRow:
     """Return the row with what is learnt of its log.
 
-    recording : the log, at `DT`.
+    recording : the log, at `_DT`.
     """
     counted_samples(recording, vehicle.lowest_speed)  # refuses a car that never drives
     begin, start = float(recording.t[0]), telling.start
@@ -323,7 +323,7 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
     model, _, parts = fit([measured], vehicle, priors, block=telling.part, coarse=True)
     return replace(
         row,
-        **conditions(recording),
+        **_conditions(recording),
         **(_judged(model, recording) if telling.judging == "motion" else {}),
         **_of_model(model),
         car=json.dumps(vehicle_numbers(vehicle)),
@@ -345,7 +345,7 @@ def _near(log: str) -> Iterator[Path]:
         yield near
 
 
-def conditions(recording: Recording) -> dict[str, Any]:
+def _conditions(recording: Recording) -> dict[str, Any]:
     """Return how a log was driven, by columns of a row."""
     a_y = recording.v_x * recording.r
     return {
@@ -485,7 +485,7 @@ def learn_fleet(
 
 
 def _portions(tasks: Sequence[_Task]) -> list[tuple[_Task, ...]]:
-    size = min(max(len(tasks) // _PORTIONS, 1), TOGETHER)
+    size = min(max(len(tasks) // _PORTIONS, 1), _TOGETHER)
     return [tuple(tasks[k : k + size]) for k in range(0, len(tasks), size)]
 
 
