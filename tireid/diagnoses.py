@@ -1,4 +1,4 @@
-"""A diagnosis as commands tell it: a table, lines, a section of a report, and the repair's file."""
+"""A diagnosis as commands print it: table, lines, section of a report, and the repair's file."""
 
 import argparse
 import math

@@ -117,13 +117,13 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
 
 
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
-    """Return a drive with its v_y, or with that which the tires or a filter tell.
+    """Return a drive with its v_y, or with that which the tires or a filter estimate.
 
     For tires of a fit a v_y that is rare or noisy is brought on time, as the fit reads it.
 
     Parameters
     ----------
-    tire : where it tells no v_y, the inertial identifier does, beginning with it where it can.
+    tire : where it estimates no v_y, the inertial identifier does, beginning with it where it can.
 
     Raises
     ------

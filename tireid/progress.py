@@ -1,4 +1,4 @@
-"""What a command tells: its results on standard output, its progress on standard error.
+"""What a command prints: its results on standard output, its progress on standard error.
 
 Both go through `codegen.escape.terminal`, so that no name that comes from a file commands the
 terminal; and a stream that nobody reads any more, or that cannot be written, is no reason to stop
@@ -65,7 +65,7 @@ def flush_out() -> None:
 
 
 def unwritten() -> bool:
-    """Tell whether results were lost because standard output could not be written."""
+    """Return whether results were lost because standard output could not be written."""
     return _lost
 
 
@@ -142,7 +142,7 @@ def _on_terminal() -> bool:
 
 
 class Progress:
-    """Tells how far something has come and how much time is left; short work says nothing.
+    """Prints how far something has come and how much time is left; short work says nothing.
 
     Use it as a context: the changing line goes away at its end.
 
@@ -193,7 +193,7 @@ class Progress:
         return lambda share: self(first + (last - first) * share)
 
     def __call__(self, share: float, text: str = "") -> None:
-        """Tell it where it is time.
+        """Print it where it is time.
 
         share : done of the part, 0 to 1.
         """

@@ -295,7 +295,7 @@ def _of(cell: Cell) -> Marked:
 
 
 def _is_number(cell: Cell) -> bool:
-    """Tell whether a cell is a number or a text that begins with one: "0.43 (0.41 to 0.45)"."""
+    """Return whether a cell is a number or a text that begins with one: "0.43 (0.41 to 0.45)"."""
     cell = cell.text if isinstance(cell, Marked) else cell
     if not isinstance(cell, str):
         return cell is not None

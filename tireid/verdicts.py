@@ -1,4 +1,4 @@
-"""A verdict as commands tell it: lines, a table of what was learnt, the exit code, a section."""
+"""A verdict as commands print it: lines, a table of what was learnt, the exit code, a section."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -128,7 +128,7 @@ def verdicts_headline(
 
 
 def known_headline(model: TireModel) -> list[Headline]:
-    """Return up to which slip a model knows the tires, as a number of a report, if it can tell."""
+    """Return the largest identified slip of a model, as a number of a report, where it has one."""
     if model.known_slip is None:
         return []
     front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))

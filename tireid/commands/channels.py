@@ -25,7 +25,7 @@ from tireid.commands.options import add_force, add_log_map, given_map, require_t
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
-_MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
+_MOST_NUMBERS = 5e7  # that are read for ranges; of a larger log only those of likely channels
 _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 _LONGEST_NAME = 48  # letters of a channel in the table
@@ -165,7 +165,7 @@ def _channels_text(
 def _meaning(
     listed: Listed, signals: Mapping[str, Signal], proposal: Proposal, known: frozenset[str]
 ) -> str:
-    """Return what a channel is taken for, or may be, in which unit where the file tells none."""
+    """Return what a channel is taken for, or may be, in which unit where the file gives none."""
     channel = listed.name
     for name, signal in signals.items():
         if channel in signal.channel:

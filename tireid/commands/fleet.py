@@ -231,7 +231,7 @@ class _Used:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    """Tell whose tires changed; return 1 where a change lasts."""
+    """Say whose tires changed; return 1 where a change lasts."""
     from tireid.reports.fleet import write_watch_report  # draws, which learning does not
 
     watching, used = _watching(options), _Used(options)

@@ -185,7 +185,7 @@ def _inputs_of(
 def _steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """Return the columns of steering.csv: pass by pass from its entry on, with the course.
 
-    ratio : hand wheel over front wheels; None tells no hand wheel.
+    ratio : hand wheel over front wheels; None gives no hand wheel.
     """
     rows = []
     for k, one in enumerate(found.passes):

@@ -198,7 +198,7 @@ def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str
 def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: _Facts) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
-    friction : of the drive's road; None where nobody can tell.
+    friction : of the drive's road; None where it is not observable.
     """
     motion, model, lines = prediction.motion, prediction.model, []
     inside, held, beyond, known = facts.inside, facts.held, facts.beyond, model.known_slip

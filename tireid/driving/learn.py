@@ -38,8 +38,8 @@ def learning_drive(
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
 
     grip : largest lateral acceleration [m/s²], which sizes the steering.
-    lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-    they show.
+    lateral : estimates v_y, and a_y in the plane of the road, in place of the sensors; None takes
+    what they measure.
     """
     # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
     amplitude = car.vehicle.wheelbase * grip / _SPEED**2 + _SLIP

@@ -41,7 +41,7 @@ from tireid.progress import Progress
 
 
 class _Informer:
-    """Tells the tracker of an oracle the true tire of the road that the car is on."""
+    """Gives the tracker of an oracle the true tire of the road that the car is on."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup, self._friction, self._mu = setup, setup.friction(), setup.mu
@@ -112,9 +112,9 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
-_PROBED = 0.03  # rad: slip at which curves are asked how unsure they are
-_SURE, _UNSURE = 0.1, 0.25  # standard deviations over the prior's, between which a weave begins
-_ASKED = 0.5  # s between two looks
+PROBED = 0.03  # rad: slip at which curves are asked how unsure they are
+SURE, UNSURE = 0.1, 0.25  # standard deviations over the prior's, between which a weave begins
+ASKED = 0.5  # s between two looks
 
 
 def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
@@ -125,14 +125,14 @@ def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
 
     def unknown() -> float:
         nonlocal last, calls
-        if calls % round(_ASKED / PERIOD) == 0:
+        if calls % round(ASKED / PERIOD) == 0:
             try:
-                sd = learner.supervisor.identifier.model().relative_sd(np.array([_PROBED]))
+                sd = learner.supervisor.identifier.model().relative_sd(np.array([PROBED]))
             except (DivergedError, CannotFreezeError, ValueError):  # no model now
                 sd = None
             if sd is not None:
                 unsure = float(sd.max())
-                last = min(max((unsure - _SURE) / (_UNSURE - _SURE), 0.0), 1.0)
+                last = min(max((unsure - SURE) / (UNSURE - SURE), 0.0), 1.0)
         calls += 1
         return last
 
@@ -177,7 +177,7 @@ class Conditions:
         return inertial_unit() if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
-        """Return what tells v_y on a drive, None where a sensor shows it."""
+        """Return what estimates v_y on a drive, None where a sensor measures it."""
         return None if self.kind == FULL else lateral_velocity(self.setup.vehicle, learnt)
 
     @property
@@ -345,7 +345,7 @@ def drive(
     learning : go on learning from the tire while driving, and hand over what is fit.
     noise : whether sensors are noisy.
     sensors : full, or imu: gyro, accelerometer, wheel speed, steering and a localization of
-        position and heading, but no v_y, which an inertial identifier tells.
+        position and heading, but no v_y, which an inertial identifier estimates.
     laps : of a closed path.
     dither : deviation that a weave may make which teaches [m], at most 0.5; 0 keeps to the path.
         With learning tires it fades as their uncertainty falls.

@@ -34,7 +34,7 @@ _DAY = 86_400.0  # s
 
 @styled
 def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
-    """Draw the cornering stiffness that each log tells, over the days, a color for each car.
+    """Draw the cornering stiffness identified in each log, over the days, a color for each car.
 
     rows : of logs that were learnt; what the verdict refuses is drawn hollow.
     """

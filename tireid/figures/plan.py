@@ -13,7 +13,7 @@ from identifier.axle.curve import unit_matrix
 from identifier.plan import Plan
 from tireid.figures import style
 
-_ARROW = 0.07  # lengths of the area: that shows where and whither a pass comes in
+_ARROW = 0.07  # lengths of the area: of the arrow at the entry of a pass
 
 
 @style.styled

@@ -18,7 +18,7 @@ from tireid.figures.thinned import Signal, drawn_times, shown
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
 
-_FIRST = "inertial"  # which has the band where several tell v_y
+_FIRST = "inertial"  # which has the band where several estimate v_y
 _MOST = 4  # recordings that are drawn
 _OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
 _COLUMNS = 5  # entries of a row of the legend

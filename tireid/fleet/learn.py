@@ -1,7 +1,7 @@
 """Learning from thousands of logs: which they are, what is learnt of one, and who does it.
 
 A log is read and fitted as `tireid identify` does it, without figures, its samples averaged to 50
-Hz; what it tells without the prior is kept (`identifier.estimate.information`). A log that cannot
+Hz; its information without the prior is kept (`identifier.estimate.information`). A log that cannot
 be used becomes a row with its error. Work is done by processes of this machine or by a Dask
 cluster; a process that dies loses what it was doing, which is done again, and a log that it dies of
 twice becomes a row with an error.
@@ -220,7 +220,7 @@ _CHANGES = ("etag", "lastmodified", "md5hash", "contentmd5", "generation", "mtim
 
 
 def _stamp(address: str, info: Mapping[str, Any]) -> str:
-    """Return a hash of what changes with a file; empty where its file system tells nothing."""
+    """Return a hash of what changes with a file; empty where its file system says nothing."""
     if "://" not in address:
         at = Path(address).stat()  # of the file itself, where `info` is of a link to it
         given: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
@@ -540,7 +540,7 @@ def on_this_machine(jobs: int) -> Map:
 def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     """Return a map over portions of logs that outlives workers that die; its order is any.
 
-    elsewhere : of `tireid.cluster.cluster`; tells `lost` what several workers died of.
+    elsewhere : of `tireid.cluster.cluster`; gives `lost` what several workers died of.
     """
 
     def spread_map(work: Any, portions: Any) -> Iterator[Learnt]:
@@ -555,7 +555,7 @@ def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     return spread_map
 
 
-_WORK: list[LearnSome] = []  # of a process: told once, as it holds what the store knows
+_WORK: list[LearnSome] = []  # of a process: given once, as it holds what the store knows
 
 
 def _prepare_process(work: LearnSome) -> None:

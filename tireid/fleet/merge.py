@@ -1,11 +1,11 @@
 """One model of many logs, and of many cars where the next one starts.
 
-What logs tell adds up (`identifier.estimate.information`), and the model of a group is the optimum
-of their sum and the prior of its car, counted once. Sensors are those of the car, in each log off
-by an error of its own (`_APART` of their prior). Where the evidence of a log asks for another
+The information of logs adds up (`identifier.estimate.information`). The model of a group is the
+optimum of their sum and the prior of its car, counted once. Sensors are those of the car, in each
+log off by an error of its own (`_APART` of their prior). Where the evidence of a log asks for another
 friction, by `PRICE` as inside a log, its friction is its own.
 
-Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs tell θ̂_v with covariance P_v.
+Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs give θ̂_v with covariance P_v.
 m and T are found by expectation and maximization (N. Laird and J. Ware, Biometrics 38, 1982), both
 held by the prior of the estimate: m ~ N(m₀, S₀), T as by `_WORTH` more cars. Where the next car
 starts is m, as sure as N(m, T + M), M = (V/T + 1/S₀)⁻¹.
@@ -130,7 +130,7 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[_Key, L
         if car != row.car:
             raise MergeError(
                 f"{first} and {row.name} are of cars whose files differ: merge --by vehicle (or "
-                "tell it by --tags), or --by setting; fleet prior is for many cars"
+                "declare it by --tags), or --by setting; fleet prior is for many cars"
             )
         setting = settings.setdefault((key, *row.key[:2]), row.setting)
         if setting != row.setting:
@@ -145,7 +145,7 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[_Key, L
 def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merged]:
     """Return the model of each group of logs, by its key; rows are held one at a time.
 
-    rows : yields them, three times: what all say tells on which road each was, and most.
+    rows : yields them, three times: the sum of all shows on which road each was, and most.
     by : what the logs of a group have in common; empty merges all.
     """
     sums: dict[_Key, _Sum] = {}
@@ -160,7 +160,7 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
 
 
 class _Sum:
-    """What the logs of a group tell, in three rounds.
+    """The information of the logs of a group, in three rounds.
 
     At the optimum of all on one road (round 1) the friction of each part over it is found (2);
     their median is the road of the curves, and parts far from it have a friction of their own (3).
@@ -201,7 +201,7 @@ class _Sum:
         self.logs += 1
 
     def _on_its_road(self, one: Information) -> Information:
-        """Return what a part tells, its friction its own where the evidence asks for it."""
+        """Return the information of a part, its friction its own where the evidence asks for it."""
         if self.at is None:
             return one
         u, slopes = self.at

@@ -175,7 +175,7 @@ class LogRow:
 
     @property
     def parts(self) -> list[Information]:
-        """What its parts tell of the tires, in the order of time."""
+        """The information of its parts, in the order of time."""
         k, q = len(self.part_begin), len(_OBSERVABLE)
         self.numbers("part_begin", k)
         triangles = self.numbers("matrix", k, q * (q + 1) // 2)
@@ -216,7 +216,7 @@ _HEAVY = (*_LISTS, "car", "model")  # read where they are asked for by name
 
 
 def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
-    """Return the columns that hold what parts of a log tell."""
+    """Return the columns that hold the information of the parts of a log."""
     rows, columns = _OBSERVABLE[np.array(np.triu_indices(len(_OBSERVABLE)))]
     return {
         "part_seconds": [one.seconds for one in parts],

@@ -74,7 +74,7 @@ class Watching:
 
 
 class _Part(NamedTuple):
-    """A part of a log that tells of the tires: its log, when it began, what it tells."""
+    """A part of a log: its log, when it began, and its information on the tires."""
 
     log: str
     date: str
@@ -188,7 +188,7 @@ class Watch:
 def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watch:
     """Return which cars' tires changed.
 
-    by : what tells cars, or their sets of tires, apart.
+    by : what keeps cars, or their sets of tires, apart.
     """
     cars: dict[str, Vehicle] = {}
     parts: dict[str, list[_Part]] = {}

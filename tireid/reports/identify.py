@@ -102,7 +102,7 @@ def _how_learnt(learnt: History) -> str:
 
 
 def side_slip_text(learnt: History) -> str:
-    """Return how well a run knew side slip, where it tells it; else nothing."""
+    """Return how well a run knew side slip, where it estimated it; else nothing."""
     if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
         return ""
     moves = learnt.recording.v_x >= learnt.design.min_speed
