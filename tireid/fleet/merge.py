@@ -2,8 +2,8 @@
 
 The information of logs adds up (`identifier.estimate.information`). The model of a group is the
 optimum of their sum and the prior of its car, counted once. Sensors are those of the car, in each
-log off by an error of its own (`_APART` of their prior). Where the evidence of a log asks for another
-friction, by `PRICE` as inside a log, its friction is its own.
+log off by an error of its own (`_APART` of their prior). Where the evidence of a log asks for
+another friction, by `PRICE` as inside a log, its friction is its own.
 
 Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs give θ̂_v with covariance P_v.
 m and T are found by expectation and maximization (N. Laird and J. Ware, Biometrics 38, 1982), both
