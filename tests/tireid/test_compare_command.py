@@ -212,12 +212,9 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(
     logs_named = [one for one in extra if one.endswith(".csv")]
     named = [first, *logs_named, *rest, *(one for one in extra if one not in logs_named)]
     assert said in refusal(capsys, [*named, "--out", out])
+    needed = "--vehicle FILE is needed with a LOG"
+    assert needed in refusal(capsys, ["compare", logs / "slalom.csv", "--out", out])
     assert not out.exists()
-
-
-def test_a_log_needs_its_vehicle(logs, tmp_path, capsys):
-    assert main(["compare", str(logs / "slalom.csv"), "--out", str(tmp_path / "out")]) == 2
-    assert "--vehicle FILE is needed with a LOG" in capsys.readouterr().err
 
 
 def test_without_a_log_the_plant_drives(tmp_path, laid_out):

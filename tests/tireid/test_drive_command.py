@@ -225,16 +225,8 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     tire = ti.identify(log, car).freeze()
     heavy = replace(tire, vehicle=replace(car, mass=1.1 * car.mass, name="heavy"))
     heavy.save(tmp_path / "heavy.json")
-    words = [
-        "drive",
-        "--path",
-        bend,
-        "--weights",
-        tmp_path / "heavy.json",
-        "--out",
-        tmp_path / "out",
-    ]
-    said = refusal(capsys, words)
+    words = ["drive", "--path", bend, "--weights", tmp_path / "heavy.json"]
+    said = refusal(capsys, [*words, "--out", tmp_path / "out"])
     masses = f"(mass {1.1 * car.mass:.6g} there, {car.mass:.6g} here)"
     assert (
         f"was identified on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said
