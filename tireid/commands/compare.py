@@ -20,7 +20,6 @@ from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
-from tireid.reports.compare import write_compare_report
 from tireid.verdicts import verdicts_text
 
 _FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
@@ -102,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
         )
         work.begin("step times, tables and figures")
         figures = results.write_comparison(folder, comparison, verdicts)
-        write_compare_report(folder, comparison, figures, verdicts, options.words)
+        results.write_compare_report(folder, comparison, figures, verdicts, options.words)
         tables = [results.summary_table(comparison)]
         if len(comparison.names) ** 2 <= _FEW_PAIRS:
             tables.append(results.pair_tables(comparison))

@@ -1,11 +1,13 @@
 """`tireid predict MODEL LOG`: the axle forces of a drive by a stored model, and what they miss."""
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
@@ -15,7 +17,10 @@ from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
 from identifier.tire_model import UNCALIBRATED, TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
+from identifier.verdict.verdict import PERCENT
+from models.files import digest
 from tireid import __version__, output
+from tireid import report as page
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.identify_results import error_cells
@@ -25,8 +30,23 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.predict import write_predict_report
-from tireid.verdicts import verdict_text
+from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.identify import (
+    asked_warnings,
+    band_sentence,
+    curve_drawing,
+    guaranteed_sentence,
+)
+from tireid.verdicts import (
+    known_headline,
+    missed_headline,
+    of_answer,
+    stored_warning,
+    verdict_headline,
+    verdict_section,
+    verdict_text,
+    verdict_warnings,
+)
 
 
 def add_parser(commands: Any) -> None:
@@ -247,3 +267,90 @@ def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
         f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "
         f"moments of 0.3 s contradict it (front / rear), first at {t[broken.any(axis=1)][0]:g} s"
     )
+
+
+def write_predict_report(
+    folder: Path,
+    prediction: Prediction,
+    figures: Mapping[str, Figure],
+    lines: str,
+    *,
+    source: Path,
+    command: str,
+) -> None:
+    """Write the report of a prediction.
+
+    lines : what is said of it beside its errors.   source : the model's file.
+    """
+    model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
+    notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
+    found: list[page.Block] = [*_errors(prediction)]
+    found += [page.Paragraph(text=page.printed(line)) for line in lines.splitlines()]
+    captions = {
+        "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
+        "forces": "Axle forces over time.",
+        "friction": "Friction of the road over that of the identification drive.",
+    }
+    found += [
+        drawing(figures[name], caption, READ["replay" if name == "forces" else name])
+        for name, caption in captions.items()
+        if name in figures
+    ]
+    tires = [
+        page.Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))
+    ]
+    report = page.Report(
+        title=f"Tires of {source.name} on {recording.name}",
+        summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
+        "identification.",
+        numbers=[
+            verdict_headline(verdict, notes),
+            *of_answer(verdict, [*missed_headline(verdict), *_predict_headlines(prediction)]),
+        ],
+        lead=[curve_drawing(figures, verdict)],
+        warnings=[*verdict_warnings(verdict), *notes],
+        sections=[
+            verdict_section(verdict),
+            page.Section(
+                heading="What it predicts", blocks=[*found, *(one for one in tires if one.text)]
+            ),
+            origin(
+                command,
+                model.vehicle,
+                [recording],
+                model=f"{source.name}, hash {digest(model.to_dict())}",
+            ),
+        ],
+    )
+    page.write_report(folder / REPORT, report)
+
+
+def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
+    """Return what is missed of the true force, explained of the motion, and the known slip."""
+    numbers = []
+    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
+    if error is not None and size is not None and min(size.front, size.rear) > 0.0:
+        shares = error.front / size.front, error.rear / size.rear
+        front, rear = (f"{PERCENT * share:.1f}" for share in shares)
+        numbers.append(page.Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
+    if motion is not None and None not in motion.explained:
+        lateral, yaw = (f"{PERCENT * max(share or 0.0, 0.0):.1f}" for share in motion.explained)
+        numbers.append(
+            page.Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
+        )
+    return [*numbers, *known_headline(prediction.model)]
+
+
+def _errors(prediction: Prediction) -> list[page.Block]:
+    error, size = prediction.against_truth, prediction.true_force
+    if error is None or size is None:
+        return []
+    rows: list[list[page.Cell]] = [
+        [axle, newtons, PERCENT * newtons / force if force > 0.0 else None]
+        for axle, newtons, force in (
+            ("front", error.front, size.front),
+            ("rear", error.rear, size.rear),
+        )
+    ]
+    caption = "RMSE of the axle force against the true one, and its share of the rms force."
+    return [page.Table(caption=caption, header=["axle", "RMSE [N]", "share [%]"], rows=rows)]
