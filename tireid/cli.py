@@ -41,12 +41,13 @@ def build_parser(words: Sequence[str]) -> _Parser:
     parser = _Parser(
         prog="tireid",
         description="Turns a driving log into the car's tire curves, with error bars and a "
-        "verdict.",
+        "verdict. Begin with tireid demo, or with tireid sample and tireid identify. A command is "
+        "explained by tireid COMMAND --help, words by docs/first_steps.md and docs/glossary.md.",
         epilog=limits_text(),
     )
     parser.add_argument("--version", action="store_true", help="show the version and exit")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     named = next((word for word in words if not word.startswith("-")), None)
     for name, text in COMMANDS.items():
         if name == named:

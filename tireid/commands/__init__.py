@@ -26,13 +26,13 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
         "plan": "the most informative steering within an area",
         "identify": "tire curves from a log, with error bars and a verdict",
-        "predict": "axle forces of a drive by a stored model, and their error",
+        "predict": "axle forces of another drive by stored tire curves, and their error",
         "compare": "all methods on the same logs, side by side",
-        "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
+        "check": "what is proven of an identifier: limits, margins, bounds; or its gains, designed",
         "export": "C for a microcontroller, FMU and ONNX for simulators",
         "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
         "drive": "steer a car along a path at the limit of grip, on the identified tires",
-        "paper": "Tables I and II of the paper and ours, over many seeds",
+        "paper": "Tables I and II of the paper (Hong and Choi) beside ours, over many seeds",
     }
 )
 
