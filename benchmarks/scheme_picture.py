@@ -15,14 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch
 
+from tireid.figures import style
 from tireid.figures.paper import SCHEME
 from tireid.figures.style import (
     BLACK,
     GREY,
     ORANGE,
     PAGE,
-    figure_png,
-    figure_svg,
     new_figure,
     styled,
 )
@@ -116,8 +115,8 @@ def _draw_signal(axes: Axes, signal: Signal) -> None:
 def main() -> None:
     """Draw both files."""
     figure = scheme_figure()
-    SCHEME.with_suffix(".svg").write_bytes(figure_svg(figure))
-    SCHEME.write_bytes(figure_png(figure))
+    SCHEME.with_suffix(".svg").write_bytes(style.figure_svg(figure))
+    SCHEME.write_bytes(style.figure_png(figure))
     print(f"wrote {SCHEME} and .svg")
 
 

@@ -11,10 +11,10 @@ from models.vehicle import sedan
 from tireid.animation import film as frames
 from tireid.animation.known import known_over_time
 from tireid.commands import demo_parts as demo_drive
-from tireid.commands import drive_results
 from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
 from tireid.commands.demo_story import run_story
-from tireid.commands.drive_results import Drives
+from tireid.driving import results as drive_results
+from tireid.driving.results import Drives
 from tireid.report import Picture
 
 

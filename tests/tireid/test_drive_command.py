@@ -19,9 +19,9 @@ from tests.pages import faults_of, outline
 from tests.tireid.conftest import refusal
 from tireid.animation import film
 from tireid.cli import main
-from tireid.commands.drive_results import steady_curve
 from tireid.driving import learn as drive_learn
 from tireid.driving import runs as drive_runs
+from tireid.driving.results import steady_curve
 from tireid.learning import identify
 
 SIDE = 3.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 9)))

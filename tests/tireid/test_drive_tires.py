@@ -10,7 +10,7 @@ from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import prediction_tire
-from tireid.commands.drive_results import _known_curves, steady_curve
+from tireid.driving.results import _known_curves, steady_curve
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.figures.drive import AT_THE_END

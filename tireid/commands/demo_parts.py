@@ -14,7 +14,7 @@ from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
 from tireid.commands.demo_story import Story
-from tireid.commands.drive_results import SCORES, Drives, headline, score_rows
+from tireid.driving.results import SCORES, Drives, headline, score_rows
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, Verdict, export, self_test

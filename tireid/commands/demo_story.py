@@ -20,7 +20,7 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.commands.identify_results import Results
+from tireid.identified import Results
 from tireid.output import text_table
 
 SPEED = 20.0  # m/s

@@ -21,9 +21,9 @@ from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import resumed_line, verdict_line
-from tireid.commands.identify_results import Results, file_name
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
+from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
 from tireid.output import output_folder, require_curves, require_free, write_json
 from tireid.progress import Progress, say, tell

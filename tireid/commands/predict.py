@@ -23,11 +23,11 @@ from tireid import __version__, output
 from tireid import report as page
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
-from tireid.commands.identify_results import error_cells
 from tireid.figures.forces import prediction_figure
 from tireid.figures.predict import friction_figure, motion_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
+from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
 from tireid.reports.common import READ, REPORT, drawing, origin

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from models.files import digest
 from mpc.handover.rules import Verdict
 from mpc.loop.record import estimate_scores
-from tireid.commands.drive_results import SCORES, Drives, headline, score_rows
+from tireid.driving.results import SCORES, Drives, headline, score_rows
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report

@@ -25,8 +25,8 @@ from models.files import digest
 from models.recordings import Recording
 from tireid import report as page
 from tireid import verdicts
-from tireid.commands.identify_results import Results
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
+from tireid.identified import Results
 from tireid.reports.common import READ, REPORT, drawing, drawings, origin
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
