@@ -150,10 +150,15 @@ def figure_svg(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG."""
+    write_file(path, figure_png(figure))
+
+
 def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
     """Write figures as PNG under their names, and return them."""
     for name, figure in figures.items():
-        write_file(folder / f"{name}.png", figure_png(figure))
+        save_figure(figure, folder / f"{name}.png")
     return figures
 
 
