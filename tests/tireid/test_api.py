@@ -526,7 +526,7 @@ def test_learnt_tires_steer_better_than_linear_ones(car):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ({"delay": 0.015}, "steps of 0.01 s"),
+        ({"delay": 0.015}, "delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
         ({"share": 0.0}, "share must be positive"),
         ({"friction": 9.0}, "friction must lie between"),
         ({"laps": 2.0}, "laps are of a closed path"),
