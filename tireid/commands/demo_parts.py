@@ -14,13 +14,12 @@ from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
 from tireid.commands.demo_story import Story
-from tireid.driving.results import SCORES, Drives, headline, score_rows
+from tireid.driving.results import SCORES, Drives, headline, known_blocks, score_rows
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, Verdict, export, self_test
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
-from tireid.reports.drive import known_blocks
 
 LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 _FILM = FORMATS[0]

@@ -11,10 +11,9 @@ from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION
-from tireid.driving.results import NO_FILM, Drives, headline
+from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
 from tireid.output import output_folder
 from tireid.progress import say, tell
-from tireid.reports.drive import write_drive_report
 
 _NOT_COMPLETED = 1
 _EPILOG = (
