@@ -111,7 +111,7 @@ def _require_replaceable(target: Path, final: Path, force: bool) -> None:
         raise OutputError(f"{target} is a file, --out needs a folder")
     if final.is_mount():
         raise OutputError(f"{target} is a mount point: choose a folder inside it")
-    strange = _foreign(final)
+    strange = foreign(final)
     if strange is not None:
         raise OutputError(
             f"{target} is not empty and holds {strange}, which no run of tireid wrote there: "
@@ -170,7 +170,7 @@ def _read_marker(folder: Path) -> _Written | None:
         return None
 
 
-def _foreign(folder: Path) -> str | None:
+def foreign(folder: Path) -> str | None:
     """Return the first thing below a folder that is not as a run of tireid wrote it, or None."""
     written = _read_marker(folder) or _Written({}, frozenset())
 
@@ -234,7 +234,7 @@ def _swap(new: Path, target: Path, final: Path, *, aside: Path) -> None:
     try:
         at_once = exchange(new, final)
         (new if at_once else final).rename(aside)
-        strange = _foreign(aside)  # nobody finds it here, so that it stays as it is looked at
+        strange = foreign(aside)  # nobody finds it here, so that it stays as it is looked at
         if strange is not None:
             raise OutputError(f"{target} came to hold {strange} while this ran")
         if not at_once:

@@ -13,7 +13,7 @@ import pytest
 from tireid import exchange as exchange_module
 from tireid import output as output_module
 from tireid.exchange import ClaimedError, claim, exchange
-from tireid.output import MARKER, OutputError, _foreign, output_folder
+from tireid.output import MARKER, OutputError, foreign, output_folder
 
 
 @pytest.fixture(params=["at once", "in two steps"])
@@ -114,9 +114,9 @@ def test_a_link_leads_to_the_folder_and_stays_a_link(tmp_path):
     write(link, "again", force=True)
     assert link.is_symlink()
     assert content(tmp_path / "real")["result.txt"] == "again"
-    _foreign = tmp_path / "foreign"
-    _foreign.mkdir()
-    (_foreign / "log.csv").write_text("precious")
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "log.csv").write_text("precious")
     link.unlink()
     link.symlink_to("foreign")
     assert "holds log.csv" in refused(link)
@@ -229,7 +229,7 @@ def test_what_a_user_does_while_a_run_works_survives_force(tmp_path, spoil):
             before = content(out)
     assert content(out) == before
     assert content(tmp_path / "out-2") == {"result.txt": "hours of work"}
-    assert _foreign(tmp_path / "out-2") is None
+    assert foreign(tmp_path / "out-2") is None
 
 
 @each_change
@@ -248,7 +248,7 @@ def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatc
     monkeypatch.setattr(output_module, "exchange", late)
     with pytest.raises(OutputError, match=r"came to hold .*; what this run computed is in .*out-2"):
         write(out, force=True)
-    assert _foreign(out) is not None
+    assert foreign(out) is not None
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "out-2"]
     assert content(tmp_path / "out-2") == {"result.txt": "new"}
 
